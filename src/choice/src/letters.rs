@@ -24,8 +24,7 @@ pub(super) static AFTER_I: LazyLock<Regex> =
 /// Every letter that names a choice, from left to right. A letter beyond the choices is included only if it is firmly
 /// delimited.
 pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<Name> {
-    let names = text
-        .bytes()
+    text.bytes()
         .enumerate()
         .filter(|(at, byte)| byte.is_ascii_alphabetic() && !is_inside(text.as_bytes(), *at))
         .filter_map(|(start, byte)| {
@@ -39,8 +38,8 @@ pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<
                 delimiting,
                 state: State::Affirmed,
             })
-        });
-    names.collect()
+        })
+        .collect()
 }
 
 /// Whether a letter has another one beside it.

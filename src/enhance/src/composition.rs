@@ -119,19 +119,22 @@ impl Composition {
         outputs: &[OutputTensor<'a>],
         size: [usize; 2],
     ) -> Result<Vec<ImageTensor<'a>>, OtherSize> {
-        let laid_out = self.outputs.iter().zip(outputs).map(|(reading, output)| {
-            let layout = reading
-                .layout(&output.dims, size)
-                .ok_or_else(|| OtherSize {
-                    layout: reading.layout.unwrap_or(reading.preferred),
-                    dims: output.dims.clone(),
-                })?;
-            Ok(ImageTensor {
-                samples: output.samples,
-                layout,
+        self.outputs
+            .iter()
+            .zip(outputs)
+            .map(|(reading, output)| {
+                let layout = reading
+                    .layout(&output.dims, size)
+                    .ok_or_else(|| OtherSize {
+                        layout: reading.layout.unwrap_or(reading.preferred),
+                        dims: output.dims.clone(),
+                    })?;
+                Ok(ImageTensor {
+                    samples: output.samples,
+                    layout,
+                })
             })
-        });
-        laid_out.collect()
+            .collect()
     }
 
     /// The bytes of a part of the result; `size` is that of the outputs, `dark` that part of the dark image, if it is needed.

@@ -214,9 +214,9 @@ impl ExtraValue {
                 Err(format!("extra.{name} is {value}; expected a finite number"))
             }
             Self::List(numbers) => {
-                let mut numbers = numbers.iter();
-                let wrong =
-                    numbers.find(|n| matches!(n, Number::Float(value) if !value.is_finite()));
+                let wrong = numbers
+                    .iter()
+                    .find(|n| matches!(n, Number::Float(value) if !value.is_finite()));
                 wrong.map_or(Ok(()), |value| {
                     Err(format!("extra.{name} has {value}; expected finite numbers"))
                 })

@@ -35,17 +35,19 @@ impl RangePair {
 
     /// The pairs with an input that has a mean and a deviation; the output is in 0..1, or has them too, unless its range is stated.
     pub(super) fn normalised(output: Option<ValueRange>) -> Vec<Self> {
-        let pairs = Normalisation::ALL.into_iter().flat_map(|normalisation| {
-            let input = ValueScale::Normalised(normalisation);
-            let outputs = match output {
-                Some(range) => vec![ValueScale::Range(range)],
-                None => vec![ValueScale::Range(ValueRange::Unit), input],
-            };
-            outputs
-                .into_iter()
-                .map(move |output| Self { input, output })
-        });
-        pairs.collect()
+        Normalisation::ALL
+            .into_iter()
+            .flat_map(|normalisation| {
+                let input = ValueScale::Normalised(normalisation);
+                let outputs = match output {
+                    Some(range) => vec![ValueScale::Range(range)],
+                    None => vec![ValueScale::Range(ValueRange::Unit), input],
+                };
+                outputs
+                    .into_iter()
+                    .map(move |output| Self { input, output })
+            })
+            .collect()
     }
 
     /// The lines of a sidecar that state it.

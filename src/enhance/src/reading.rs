@@ -134,9 +134,10 @@ impl OutputReading {
                 .chain(TensorLayout::ALL)
                 .collect(),
         };
-        let channels = self.channels.iter();
-        let mut all =
-            channels.flat_map(|count| layouts.iter().map(move |layout| (*layout, *count)));
+        let mut all = self
+            .channels
+            .iter()
+            .flat_map(|count| layouts.iter().map(move |layout| (*layout, *count)));
         all.find(|(layout, count)| fits(*layout, *count))
     }
 

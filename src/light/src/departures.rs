@@ -135,18 +135,19 @@ fn banding(rows: usize) -> [f64; 3] {
 fn documented() -> Vec<(String, [f64; 3])> {
     let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/method.md");
     let page = std::fs::read_to_string(place).unwrap();
-    let rows = page.lines().filter_map(|line| {
-        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
-        let [_, name, red, green, blue, _] = cells[..] else {
-            return None;
-        };
-        let figure = |cell: &str| cell.trim_start_matches('×').parse().ok();
-        Some((
-            name.to_owned(),
-            [figure(red)?, figure(green)?, figure(blue)?],
-        ))
-    });
-    rows.collect()
+    page.lines()
+        .filter_map(|line| {
+            let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+            let [_, name, red, green, blue, _] = cells[..] else {
+                return None;
+            };
+            let figure = |cell: &str| cell.trim_start_matches('×').parse().ok();
+            Some((
+                name.to_owned(),
+                [figure(red)?, figure(green)?, figure(blue)?],
+            ))
+        })
+        .collect()
 }
 
 /// Two units of the last digit, or three per cent.

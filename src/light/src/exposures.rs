@@ -37,9 +37,9 @@ impl Exposures {
                 synthesis,
             } => {
                 let cached = self.negatives.remove(reading);
-                let cached = cached.filter(|negative| negative.serves(*severity));
-                let negative =
-                    cached.unwrap_or_else(|| Negative::new(clean, key, synthesis, *severity));
+                let negative = cached
+                    .filter(|negative| negative.serves(*severity))
+                    .unwrap_or_else(|| Negative::new(clean, key, synthesis, *severity));
                 let degraded = negative.develop(*severity);
                 self.negatives.insert(reading.clone(), negative);
                 degraded

@@ -97,16 +97,16 @@ fn middle_gain() -> f64 {
 fn the_ratio_of_raw_samples_is_that_of_the_formula() {
     for reading in LightReading::ALL {
         for grey in GREYS {
-            let deviations = Severity::LADDER.map(|level| {
-                let [found, expected] = raw(reading, middle_gain(), grey, level);
-                let name = reading.name();
-                assert!(
-                    (found / expected - 1.0).abs() < 0.03,
-                    "{name}, {grey}, {level:?}: {found} against {expected}"
-                );
-                found
-            });
-            let falls: Vec<f64> = deviations
+            let falls: Vec<f64> = Severity::LADDER
+                .map(|level| {
+                    let [found, expected] = raw(reading, middle_gain(), grey, level);
+                    let name = reading.name();
+                    assert!(
+                        (found / expected - 1.0).abs() < 0.03,
+                        "{name}, {grey}, {level:?}: {found} against {expected}"
+                    );
+                    found
+                })
                 .windows(2)
                 .map(|pair| pair[0] / pair[1])
                 .collect();
@@ -148,24 +148,25 @@ fn the_formula_of_another_reading_does_not_hold() {
 fn documented() -> Vec<(String, [[f64; 5]; 4])> {
     let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/light.md");
     let page = std::fs::read_to_string(place).unwrap();
-    let rows = page.lines().filter_map(|line| {
-        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
-        let [_, name, numbers @ .., _] = &cells[..] else {
-            return None;
-        };
-        let numbers: Vec<[f64; 5]> = numbers
-            .iter()
-            .map(|cell| -> Option<[f64; 5]> {
-                cell.split(' ')
-                    .map(|word| word.parse().ok())
-                    .collect::<Option<Vec<f64>>>()?
-                    .try_into()
-                    .ok()
-            })
-            .collect::<Option<_>>()?;
-        Some((name.trim_matches('`').to_owned(), numbers.try_into().ok()?))
-    });
-    rows.collect()
+    page.lines()
+        .filter_map(|line| {
+            let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+            let [_, name, numbers @ .., _] = &cells[..] else {
+                return None;
+            };
+            let numbers: Vec<[f64; 5]> = numbers
+                .iter()
+                .map(|cell| -> Option<[f64; 5]> {
+                    cell.split(' ')
+                        .map(|word| word.parse().ok())
+                        .collect::<Option<Vec<f64>>>()?
+                        .try_into()
+                        .ok()
+                })
+                .collect::<Option<_>>()?;
+            Some((name.trim_matches('`').to_owned(), numbers.try_into().ok()?))
+        })
+        .collect()
 }
 
 /// Two per cent: the numbers of the page have two digits or three.

@@ -405,9 +405,9 @@ mod tests {
     }
 
     fn greatest_difference(one: &Bayer, other: &Bayer) -> f32 {
-        let sites = (0..one.height()).flat_map(|row| (0..one.width()).map(move |at| (row, at)));
-        let differences =
-            sites.map(|(row, at)| (one.sample(row, at) - other.sample(row, at)).abs());
+        let differences = (0..one.height())
+            .flat_map(|row| (0..one.width()).map(move |at| (row, at)))
+            .map(|(row, at)| (one.sample(row, at) - other.sample(row, at)).abs());
         differences.fold(0.0, f32::max)
     }
 

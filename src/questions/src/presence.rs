@@ -62,9 +62,9 @@ fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason
         // The reason is that of the largest segment. If none is listed, all are tiny.
         return Err(first_flaw.unwrap_or(Reason::Small));
     }
-    let shown = shown.into_iter();
-    let found =
-        shown.map(|(word, segment)| candidate(context, class, word, 0, &[segment], json!({})));
+    let found = shown
+        .into_iter()
+        .map(|(word, segment)| candidate(context, class, word, 0, &[segment], json!({})));
     Ok(found.collect())
 }
 

@@ -198,7 +198,7 @@ fn always(
 /// The chance line: a cell for each family and reading, with the accuracy of a uniform guess.
 fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
-    let cells = std::iter::once(None)
+    std::iter::once(None)
         .chain(families.into_iter().map(Some))
         .flat_map(|family| {
             let of_family = questions
@@ -221,6 +221,6 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
                 accuracy,
                 always: None,
             })
-        });
-    cells.collect()
+        })
+        .collect()
 }

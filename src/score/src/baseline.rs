@@ -56,25 +56,29 @@ pub fn baseline_rows(
         failed: health[subject].failures(),
         cost: cost(subject),
     };
-    let rows = pairs.iter().filter_map(|&(new, old)| {
-        let image = |subject, item| grid.trial(subject, item)?.sent();
-        let is_other = |item| {
-            image(new, item)
-                .zip(image(old, item))
-                .is_some_and(|(new, old)| new != old)
-        };
-        let mode = ReadingMode::Strict;
-        Some(BaselineRow {
-            subject: grid.subjects[new].clone(),
-            paired: PairedComparison::on_items(grid, new, old, mode, |item, _| !is_other(item))?,
-            holm: 1.0,
-            significance: Significance::TooFew,
-            detectable: f64::INFINITY,
-            other_images: (0..grid.items.len()).filter(|item| is_other(*item)).count(),
-            sides: [side(new), side(old)],
+    let mut rows: Vec<BaselineRow> = pairs
+        .iter()
+        .filter_map(|&(new, old)| {
+            let image = |subject, item| grid.trial(subject, item)?.sent();
+            let is_other = |item| {
+                image(new, item)
+                    .zip(image(old, item))
+                    .is_some_and(|(new, old)| new != old)
+            };
+            let mode = ReadingMode::Strict;
+            Some(BaselineRow {
+                subject: grid.subjects[new].clone(),
+                paired: PairedComparison::on_items(grid, new, old, mode, |item, _| {
+                    !is_other(item)
+                })?,
+                holm: 1.0,
+                significance: Significance::TooFew,
+                detectable: f64::INFINITY,
+                other_images: (0..grid.items.len()).filter(|item| is_other(*item)).count(),
+                sides: [side(new), side(old)],
+            })
         })
-    });
-    let mut rows: Vec<BaselineRow> = rows.collect();
+        .collect();
     for is_reference in [false, true] {
         let own = rows
             .iter_mut()

@@ -151,25 +151,26 @@ mod tests {
             35..45 => [Ambiguous, Right],
             _ => [Right, Wrong],
         };
-        let all = (0..50).flat_map(|i| {
-            people
-                .into_iter()
-                .zip(both(i))
-                .map(move |(person, finding)| {
-                    let check = Check {
-                        person: person.to_owned(),
-                        family: if i % 2 == 0 {
-                            Family::Color
-                        } else {
-                            Family::Presence
-                        },
-                        scene: format!("{i}"),
-                        finding,
-                    };
-                    ((person.to_owned(), QuestionId(format!("{i}"))), check)
-                })
-        });
-        all.collect()
+        (0..50)
+            .flat_map(|i| {
+                people
+                    .into_iter()
+                    .zip(both(i))
+                    .map(move |(person, finding)| {
+                        let check = Check {
+                            person: person.to_owned(),
+                            family: if i % 2 == 0 {
+                                Family::Color
+                            } else {
+                                Family::Presence
+                            },
+                            scene: format!("{i}"),
+                            finding,
+                        };
+                        ((person.to_owned(), QuestionId(format!("{i}"))), check)
+                    })
+            })
+            .collect()
     }
 
     #[test]

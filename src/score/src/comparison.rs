@@ -167,8 +167,7 @@ type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
 
 /// The comparisons that have items, not yet corrected.
 fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
-    let found = jobs
-        .into_par_iter()
+    jobs.into_par_iter()
         .filter_map(|(kind, family, first, second)| {
             let paired = |mode| PairedComparison::new(grid, first, second, family, mode);
             let strict = paired(ReadingMode::Strict)?;
@@ -187,8 +186,8 @@ fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
                 lenient: TestedComparison::new(lenient),
                 least_holm: 1.0,
             })
-        });
-    found.collect()
+        })
+        .collect()
 }
 
 /// Comparisons of the kind [`Light`](ComparisonKind::Light) between different names of one model, which was asked in the same way under

@@ -66,21 +66,24 @@ impl Health {
 /// Health of every subject, in the order of the grid.
 #[must_use]
 pub fn healths(grid: &Grid<'_>) -> Vec<Health> {
-    let healths = grid.subjects.iter().enumerate().map(|(index, subject)| {
-        let mut health = Health {
-            subject: subject.clone(),
-            replies: 0,
-            read: 0,
-            lenient_only: 0,
-            unread: BTreeMap::new(),
-            failed: BTreeMap::new(),
-        };
-        for item in 0..grid.items.len() {
-            if let Some(trial) = grid.trial(index, item) {
-                health.count(grid.result(index, item), trial);
+    grid.subjects
+        .iter()
+        .enumerate()
+        .map(|(index, subject)| {
+            let mut health = Health {
+                subject: subject.clone(),
+                replies: 0,
+                read: 0,
+                lenient_only: 0,
+                unread: BTreeMap::new(),
+                failed: BTreeMap::new(),
+            };
+            for item in 0..grid.items.len() {
+                if let Some(trial) = grid.trial(index, item) {
+                    health.count(grid.result(index, item), trial);
+                }
             }
-        }
-        health
-    });
-    healths.collect()
+            health
+        })
+        .collect()
 }

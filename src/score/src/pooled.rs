@@ -164,7 +164,7 @@ impl PooledSet {
     fn all(grid: &Grid<'_>) -> BTreeSet<Self> {
         let seeing = grid.subjects.iter();
         // Findings are about levels, and the darkness of pairs is none: it has comparisons of its own.
-        let sets = seeing
+        seeing
             .filter(|subject| subject.view == Some(View::Image) && subject.variant.pair.is_none())
             .flat_map(|subject| {
                 let raw = PooledKind::for_raw(subject.variant.kind);
@@ -177,8 +177,8 @@ impl PooledSet {
                     variant: subject.variant.clone(),
                     enhancer: subject.enhancer.clone(),
                 })
-            });
-        sets.collect()
+            })
+            .collect()
     }
 
     /// The two subjects of a model at a level, by their indices; `other` is the model of the second side.
@@ -434,9 +434,9 @@ fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
     let mut findings: Vec<PooledFinding> = groups
         .into_iter()
         .flat_map(|family| {
-            let levels = levels.iter();
-            let of_family =
-                levels.filter_map(|(level, items)| finding(grid, set, pool, *level, items, family));
+            let of_family = levels
+                .iter()
+                .filter_map(|(level, items)| finding(grid, set, pool, *level, items, family));
             corrected(of_family.collect())
         })
         .collect();

@@ -14,24 +14,26 @@ pub struct RankRange {
 
 /// Ranks of the models of a comparison by area, in its order. Models without a detected difference share places.
 pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
-    let ranks = best.models.iter().map(|model| {
-        let (mut better, mut worse) = (0, 0);
-        for pair in &best.pairs {
-            let (is_first, is_second) = (pair.first == model.model, pair.second == model.model);
-            match pair.significance {
-                Significance::Better if is_second => better += 1,
-                Significance::Worse if is_first => better += 1,
-                Significance::Better if is_first => worse += 1,
-                Significance::Worse if is_second => worse += 1,
-                _ => {}
+    best.models
+        .iter()
+        .map(|model| {
+            let (mut better, mut worse) = (0, 0);
+            for pair in &best.pairs {
+                let (is_first, is_second) = (pair.first == model.model, pair.second == model.model);
+                match pair.significance {
+                    Significance::Better if is_second => better += 1,
+                    Significance::Worse if is_first => better += 1,
+                    Significance::Better if is_first => worse += 1,
+                    Significance::Worse if is_second => worse += 1,
+                    _ => {}
+                }
             }
-        }
-        RankRange {
-            first: better + 1,
-            last: best.models.len() - worse,
-        }
-    });
-    ranks.collect()
+            RankRange {
+                first: better + 1,
+                last: best.models.len() - worse,
+            }
+        })
+        .collect()
 }
 
 #[cfg(test)]

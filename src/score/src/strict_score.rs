@@ -154,30 +154,33 @@ fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
     for (index, item) in grid.items.iter().enumerate() {
         items.entry(&*item.asked.question).or_default().push(index);
     }
-    let groups = by_name.into_values().map(|members| {
-        let questions: Vec<&RunQuestion> = members.iter().map(|(_, question)| *question).collect();
-        let family = questions.first().map(|question| &question.family);
-        let of_group = questions
-            .iter()
-            .filter_map(|question| items.get(&question.id));
-        Group {
-            size: members
+    let mut groups: Vec<Group<'a>> = by_name
+        .into_values()
+        .map(|members| {
+            let questions: Vec<&RunQuestion> =
+                members.iter().map(|(_, question)| *question).collect();
+            let family = questions.first().map(|question| &question.family);
+            let of_group = questions
                 .iter()
-                .map(|(group, _)| group.size)
-                .max()
-                .unwrap_or(0),
-            family: family.filter(|family| {
-                questions
+                .filter_map(|question| items.get(&question.id));
+            Group {
+                size: members
                     .iter()
-                    .map(|question| &question.family)
-                    .all(|other| other == *family)
-            }),
-            items: of_group.flatten().copied().collect(),
-            questions,
-            cluster: 0,
-        }
-    });
-    let mut groups: Vec<Group<'a>> = groups.collect();
+                    .map(|(group, _)| group.size)
+                    .max()
+                    .unwrap_or(0),
+                family: family.filter(|family| {
+                    questions
+                        .iter()
+                        .map(|question| &question.family)
+                        .all(|other| other == *family)
+                }),
+                items: of_group.flatten().copied().collect(),
+                questions,
+                cluster: 0,
+            }
+        })
+        .collect();
     join_clusters(grid, &mut groups);
     groups
 }

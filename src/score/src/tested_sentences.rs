@@ -282,23 +282,24 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
         ComparisonKind::RealSynthetic,
         ComparisonKind::RealEnhanced,
     ];
-    let questions = kinds.map(|kind| {
-        let is_stated = |comparison: &Comparison| {
-            comparison.kind == kind
-                && comparison.family.is_none()
-                && comparison.first.variant.photograph().is_some()
-                && (comparison.first.enhancer.is_none() || kind == ComparisonKind::RealEnhanced)
-                && models.contains(&*comparison.first.model)
-                && comparison.strict.significance.is_possible()
-        };
-        let stated = findings
-            .comparisons
-            .iter()
-            .enumerate()
-            .filter(|(_, comparison)| is_stated(comparison));
-        TestTree::group(stated.map(|(index, _)| TestTree::leaf(Test::Comparison(index))))
-    });
-    questions.into()
+    kinds
+        .map(|kind| {
+            let is_stated = |comparison: &Comparison| {
+                comparison.kind == kind
+                    && comparison.family.is_none()
+                    && comparison.first.variant.photograph().is_some()
+                    && (comparison.first.enhancer.is_none() || kind == ComparisonKind::RealEnhanced)
+                    && models.contains(&*comparison.first.model)
+                    && comparison.strict.significance.is_possible()
+            };
+            let stated = findings
+                .comparisons
+                .iter()
+                .enumerate()
+                .filter(|(_, comparison)| is_stated(comparison));
+            TestTree::group(stated.map(|(index, _)| TestTree::leaf(Test::Comparison(index))))
+        })
+        .into()
 }
 
 /// The subjects of raw images at the darkest level of each main variant, of the models over which findings are pooled.

@@ -331,19 +331,21 @@ mod tests {
         ] {
             let total: i64 = differences.iter().sum();
             let n = differences.len();
-            let extreme = (0..1_u32 << n).filter(|signs| {
-                let sum: i64 = (0..n)
-                    .map(|i| {
-                        if signs >> i & 1 == 0 {
-                            differences[i]
-                        } else {
-                            -differences[i]
-                        }
-                    })
-                    .sum();
-                sum.abs() >= total.abs()
-            });
-            let expected = extreme.count() as f64 / f64::from(1_u32 << n);
+            let expected = (0..1_u32 << n)
+                .filter(|signs| {
+                    let sum: i64 = (0..n)
+                        .map(|i| {
+                            if signs >> i & 1 == 0 {
+                                differences[i]
+                            } else {
+                                -differences[i]
+                            }
+                        })
+                        .sum();
+                    sum.abs() >= total.abs()
+                })
+                .count() as f64
+                / f64::from(1_u32 << n);
             assert!(
                 (sign_flip(&differences) - expected).abs() < 1e-12,
                 "{differences:?}"

@@ -283,22 +283,25 @@ impl KeyedFlag {
             let value = Some(text.to_owned());
             return Ok(vec![KeyedSetting { flag, value }]);
         }
-        let settings = parts.iter().enumerate().map(|(place, part)| {
-            if let Some(setting) = keyed(part) {
-                return Ok(setting);
-            }
-            if let (0, [(_, flag)]) = (place, &plain[..]) {
-                let value = Some((*part).to_owned());
-                return Ok(KeyedSetting { flag, value });
-            }
-            let key = name(part);
-            let near = match suggestion(&key, &names) {
-                near if near.is_empty() => format!("; keys: {}", names.join(", ")),
-                near => near,
-            };
-            Err(format!("unknown key {key:?}{near}"))
-        });
-        settings.collect()
+        parts
+            .iter()
+            .enumerate()
+            .map(|(place, part)| {
+                if let Some(setting) = keyed(part) {
+                    return Ok(setting);
+                }
+                if let (0, [(_, flag)]) = (place, &plain[..]) {
+                    let value = Some((*part).to_owned());
+                    return Ok(KeyedSetting { flag, value });
+                }
+                let key = name(part);
+                let near = match suggestion(&key, &names) {
+                    near if near.is_empty() => format!("; keys: {}", names.join(", ")),
+                    near => near,
+                };
+                Err(format!("unknown key {key:?}{near}"))
+            })
+            .collect()
     }
 }
 

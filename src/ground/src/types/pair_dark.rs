@@ -171,9 +171,9 @@ impl FromStr for PairDark {
             None => (kind, None),
             Some((kind, reading)) => (kind, Some(ReadingName::new(reading)?)),
         };
-        let kind = Kind::from_word(word).filter(|kind| kind.can_match());
-        let kind =
-            kind.ok_or_else(|| wrong("the forms are match-ev, match-noise and match-auto"))?;
+        let kind = Kind::from_word(word)
+            .filter(|kind| kind.can_match())
+            .ok_or_else(|| wrong("the forms are match-ev, match-noise and match-auto"))?;
         if reading.is_some() && !kind.has_readings() {
             return Err(wrong("this kind has no light readings"));
         }

@@ -176,18 +176,21 @@ fn elements(
     for patch in patches {
         totals[patch.cell] += patch.count;
     }
-    let found = patches.iter().enumerate().filter_map(|(index, patch)| {
-        let outside = totals[patch.cell] - patch.count;
-        (patch.mask > 0 && patch.count.min(outside) >= least).then(|| Element {
-            patch: index,
-            cell: patch.cell,
-            tile: tile_of(patch.cell),
-            mask: patch.mask,
-            inside: f64::from(patch.count),
-            outside: f64::from(outside),
+    patches
+        .iter()
+        .enumerate()
+        .filter_map(|(index, patch)| {
+            let outside = totals[patch.cell] - patch.count;
+            (patch.mask > 0 && patch.count.min(outside) >= least).then(|| Element {
+                patch: index,
+                cell: patch.cell,
+                tile: tile_of(patch.cell),
+                mask: patch.mask,
+                inside: f64::from(patch.count),
+                outside: f64::from(outside),
+            })
         })
-    });
-    found.collect()
+        .collect()
 }
 
 #[cfg(test)]

@@ -182,9 +182,11 @@ fn measure(
         whole[element.mask as usize].add(filter);
     }
     let single = [false, true].map(|is_disturbed| {
-        let elements = scale.elements.iter().zip(&filters);
-        let alike =
-            elements.filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
+        let alike = scale
+            .elements
+            .iter()
+            .zip(&filters)
+            .filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
         inflation(alike.map(|(_, filter)| filter))
     });
     let shared = inflation(whole.iter());

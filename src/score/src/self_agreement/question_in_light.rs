@@ -55,23 +55,25 @@ pub(super) fn questions_in_light(
             *counts.entry(choice).or_default() += 1;
         }
     }
-    let questions = counts.into_iter().map(|(index, counts)| {
-        let example = bank.examples[index];
-        let images = counts.values().sum();
-        let top = counts.iter().rev().max_by_key(|(_, count)| **count);
-        QuestionInLight {
-            model: model.to_owned(),
-            index,
-            bank_id: example.bank_id().to_owned(),
-            text: example.text.clone(),
-            family: example.family.clone(),
-            images,
-            top: top.map_or_else(String::new, |(top, _)| (*top).to_owned()),
-            top_share: top.map_or(0.0, |(_, count)| *count as f64 / images as f64),
-            entropy: entropy(counts.values().copied(), example.choices.len()),
-        }
-    });
-    questions.collect()
+    counts
+        .into_iter()
+        .map(|(index, counts)| {
+            let example = bank.examples[index];
+            let images = counts.values().sum();
+            let top = counts.iter().rev().max_by_key(|(_, count)| **count);
+            QuestionInLight {
+                model: model.to_owned(),
+                index,
+                bank_id: example.bank_id().to_owned(),
+                text: example.text.clone(),
+                family: example.family.clone(),
+                images,
+                top: top.map_or_else(String::new, |(top, _)| (*top).to_owned()),
+                top_share: top.map_or(0.0, |(_, count)| *count as f64 / images as f64),
+                entropy: entropy(counts.values().copied(), example.choices.len()),
+            }
+        })
+        .collect()
 }
 
 /// Shannon entropy of counts over that of `choices` equally frequent answers: 0 if all answers are the same, 1 if none is more
