@@ -515,7 +515,7 @@ fn what_the_camera_cannot_do_is_refused() {
             ),
             (
                 "--variant motion --levels L3",
-                "--levels: L3 is a level of ev, noise, auto, of which --variant motion names none",
+                "--levels: L3 is a level of ev, noise, auto, but --variant motion selects none of them",
             ),
             (
                 "--variant blur",

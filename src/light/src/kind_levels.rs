@@ -42,7 +42,7 @@ impl Levels {
                         .map(Kind::word)
                         .collect();
                     let problem = format_args!(
-                        "{level} is a level of {}, of which --variant {kinds} names none",
+                        "{level} is a level of {}, but --variant {kinds} selects none of them",
                         words.join(", ")
                     );
                     return Err(Error::usage("--levels", problem));
@@ -128,13 +128,13 @@ mod tests {
             (
                 "L0,L3",
                 "motion",
-                "L3 is a level of ev, noise, auto, of which --variant motion names none",
+                "L3 is a level of ev, noise, auto, but --variant motion selects none of them",
             ),
             ("L0-L5,2.5", "motion", "L1 is a level of ev, noise, auto"),
             (
                 "L0-L5,T5",
                 "both",
-                "T5 is a level of motion, of which --variant both names none",
+                "T5 is a level of motion, but --variant both selects none of them",
             ),
         ] {
             let error = of(levels, kinds).unwrap_err();

@@ -117,7 +117,7 @@ pub(super) fn lacks_notes<T: Serialize + StoredLine>(path: &Path) -> bool {
     let mut lines: Vec<T> = Vec::with_capacity(count);
     each_readable_line(path, |line| lines.push(line));
     match replace(path, &lines) {
-        Ok(()) => tracing::warn!("{damage}; what it lacks is made again from the data"),
+        Ok(()) => tracing::warn!("{damage}; its missing lines are computed again from the data"),
         Err(e) => tracing::warn!("{damage}; {e}; the report lacks it"),
     }
     true

@@ -176,7 +176,7 @@ fn paid(bad: &[BadLine]) -> String {
         })
         .collect();
     match known.len() {
-        0 => "what was paid for it cannot be read".to_owned(),
+        0 => "its cost cannot be read".to_owned(),
         n if n == bad.len() => format!("{} tokens were paid for it", known.iter().sum::<u64>()),
         n => format!(
             "{} tokens were paid for {n} of them",

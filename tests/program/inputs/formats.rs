@@ -196,11 +196,8 @@ fn what_cannot_be_shown_as_it_is_is_refused_by_name() {
         ),
         (rgb(262, 3), "palette colours; convert it"),
         (rgb(262, 8), "a Lab image; convert it"),
-        (rgb(254, 1), "a camera's RAW file, of which only a preview"),
-        (
-            rgb(50706, 1),
-            "a camera's RAW file, of which only a preview",
-        ),
+        (rgb(254, 1), "a camera's RAW file: only its preview"),
+        (rgb(50706, 1), "a camera's RAW file: only its preview"),
         (rgb(262, 32803), "a camera's RAW file"),
         (rgb(339, 3), "floating-point samples"),
         (

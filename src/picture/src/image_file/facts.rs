@@ -141,7 +141,7 @@ impl FileFacts {
 /// Why a TIFF cannot be shown as it is; `None` if nothing is known before it is decoded.
 fn unshowable(outline: &TiffOutline<'_>) -> Option<String> {
     if outline.is_raw {
-        let problem = "a camera's RAW file, of which only a preview could be read; develop it to a 16-bit TIFF or PNG first";
+        let problem = "a camera's RAW file: only its preview could be read; develop it to a 16-bit TIFF or PNG first";
         return Some(problem.to_owned());
     }
     if outline.is_float {
