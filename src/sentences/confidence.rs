@@ -46,7 +46,7 @@ impl<'f> Confidence<'f> {
                 model,
                 level,
                 dark,
-                clean: rows().find(|row| row.subject.is_for(&clean)),
+                clean: rows().find(|row| row.subject.matches_up_to_group(&clean)),
             }
         });
         all.collect()

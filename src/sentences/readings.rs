@@ -1,14 +1,14 @@
 //! The sentence about light readings: how many findings hold under all of them.
 
 use super::sentence::{Numbers, Sentence, Tone};
-use darkqa_score::by_reading::{FindingByReading, LightClaim, Robustness};
+use darkqa_score::by_reading::{FindingByReading, NoiseHypothesis, Robustness};
 use darkqa_score::cluster::ClusterUnit;
 
 /// How many findings about noise hold under which readings; `None` with one reading. The levels of one finding count once.
 pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<Sentence> {
     let readings = found.first()?.effects.len();
     let whole = found.iter();
-    let whole = whole.filter(|one| !matches!(one.claim, LightClaim::NoiseCompounds(Some(_))));
+    let whole = whole.filter(|one| !matches!(one.claim, NoiseHypothesis::NoiseCompounds(Some(_))));
     let whole: Vec<&FindingByReading> = whole.collect();
     let of = |robustness: Robustness| {
         let mut findings = whole.iter();

@@ -8,7 +8,7 @@ use crate::text::words::{self, ends_in_points, points, reach, stops};
 use crate::types::degradation::Kind;
 use crate::types::{AxisLevel, ReadingName};
 use darkqa_score::by_reading::{
-    EffectInReading, FindingByReading, LightClaim, Robustness, Standing, TestedEffect,
+    EffectInReading, FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,
 };
 use darkqa_score::curve::Curve;
 use darkqa_score::findings::Findings;
@@ -197,27 +197,27 @@ fn span(levels: &[AxisLevel], whole: usize) -> String {
 fn title(finding: &FindingByReading) -> String {
     let levels = &finding.levels;
     match &finding.claim {
-        LightClaim::NoiseCompounds(None) => {
+        NoiseHypothesis::NoiseCompounds(None) => {
             format!(
                 "noise compounds the drop, {}: exposure drop − with noise",
                 span(levels, 5)
             )
         }
-        LightClaim::NoiseCompounds(Some(level)) => format!("· at {level}"),
-        LightClaim::DarknessCosts => "darkness costs: L5 with noise − L0".to_owned(),
-        LightClaim::EnhancerHarms(name) => {
+        NoiseHypothesis::NoiseCompounds(Some(level)) => format!("· at {level}"),
+        NoiseHypothesis::DarknessCosts => "darkness costs: L5 with noise − L0".to_owned(),
+        NoiseHypothesis::EnhancerHarms(name) => {
             format!(
                 "{name} harms where light is left, {}: enhanced − raw",
                 span(levels, 3)
             )
         }
-        LightClaim::EnhancerHelps(name) => {
+        NoiseHypothesis::EnhancerHelps(name) => {
             format!(
                 "{name} helps in the dark, {}: enhanced − raw",
                 span(levels, 2)
             )
         }
-        LightClaim::BelowBlind(family, level) => {
+        NoiseHypothesis::BelowBlind(family, level) => {
             let other = finding.blind.as_ref();
             let of = other.map(|name| format!(" of {name}")).unwrap_or_default();
             format!(
@@ -232,12 +232,14 @@ fn title(finding: &FindingByReading) -> String {
 fn clause(finding: &FindingByReading) -> String {
     let levels = &finding.levels;
     match &finding.claim {
-        LightClaim::NoiseCompounds(None) => "Noise compounds the drop".to_owned(),
-        LightClaim::NoiseCompounds(Some(level)) => format!("Noise compounds the drop at {level}"),
-        LightClaim::DarknessCosts => "Darkness with noise costs accuracy".to_owned(),
-        LightClaim::EnhancerHarms(name) => format!("{name} harms at {}", span(levels, 3)),
-        LightClaim::EnhancerHelps(name) => format!("{name} helps at {}", span(levels, 2)),
-        LightClaim::BelowBlind(family, level) => {
+        NoiseHypothesis::NoiseCompounds(None) => "Noise compounds the drop".to_owned(),
+        NoiseHypothesis::NoiseCompounds(Some(level)) => {
+            format!("Noise compounds the drop at {level}")
+        }
+        NoiseHypothesis::DarknessCosts => "Darkness with noise costs accuracy".to_owned(),
+        NoiseHypothesis::EnhancerHarms(name) => format!("{name} harms at {}", span(levels, 3)),
+        NoiseHypothesis::EnhancerHelps(name) => format!("{name} helps at {}", span(levels, 2)),
+        NoiseHypothesis::BelowBlind(family, level) => {
             let family = words::family(Some(family));
             format!("{level} with noise, {family}: below the words alone")
         }
@@ -246,14 +248,14 @@ fn clause(finding: &FindingByReading) -> String {
 
 /// What each reading says, as `Noise compounds the drop under paper, eld; open under physical (−1.2 to 5.0 points).`
 fn sentence(finding: &FindingByReading) -> String {
-    let of = |standing: Standing| -> Vec<String> {
+    let of = |standing: Support| -> Vec<String> {
         let effects = finding.effects.iter();
         let effects = effects.filter_map(|one| Some((&one.reading, one.effect.as_ref()?)));
         let effects = effects.filter(|(_, effect)| effect.standing == standing);
         effects
             .map(|(reading, effect)| match standing {
-                Standing::Holds => reading.to_string(),
-                Standing::Opposite | Standing::Open => {
+                Support::Holds => reading.to_string(),
+                Support::Opposite | Support::Open => {
                     format!(
                         "{reading} ({} points)",
                         ends_in_points(effect.difference).replace(", ", " to ")
@@ -265,9 +267,9 @@ fn sentence(finding: &FindingByReading) -> String {
     let unasked = finding.effects.iter().filter(|one| one.effect.is_none());
     let unasked: Vec<String> = unasked.map(|one| one.reading.to_string()).collect();
     let parts = [
-        ("holds under", of(Standing::Holds)),
-        ("the opposite under", of(Standing::Opposite)),
-        ("open under", of(Standing::Open)),
+        ("holds under", of(Support::Holds)),
+        ("the opposite under", of(Support::Opposite)),
+        ("open under", of(Support::Open)),
         ("not asked under", unasked),
     ];
     let parts = parts.iter().filter(|(_, readings)| !readings.is_empty());
@@ -281,7 +283,7 @@ fn sentence(finding: &FindingByReading) -> String {
 fn notes(found: &[FindingByReading]) -> Vec<String> {
     let models: BTreeSet<String> = found.iter().map(subject).collect();
     let decided = found.iter().filter(|finding| {
-        let is_detail = matches!(finding.claim, LightClaim::NoiseCompounds(Some(_)));
+        let is_detail = matches!(finding.claim, NoiseHypothesis::NoiseCompounds(Some(_)));
         finding.robustness != Robustness::Open && !is_detail
     });
     let mut notes: Vec<String> = decided
@@ -309,7 +311,7 @@ mod tests {
     use crate::types::Severity;
     use darkqa_score::estimate::Estimate;
 
-    fn effect_of(reading: &str, low: f64, high: f64, standing: Standing) -> EffectInReading {
+    fn effect_of(reading: &str, low: f64, high: f64, standing: Support) -> EffectInReading {
         let value = f64::midpoint(low, high);
         let difference = Estimate {
             value,
@@ -335,13 +337,13 @@ mod tests {
         let mut finding = FindingByReading {
             model: "m".to_owned(),
             group: None,
-            claim: LightClaim::NoiseCompounds(None),
+            claim: NoiseHypothesis::NoiseCompounds(None),
             levels: vec![level],
             blind: None,
             effects: vec![
-                effect_of("paper", 0.1, 0.3, Standing::Holds),
-                effect_of("eld", 0.2, 0.4, Standing::Holds),
-                effect_of("physical", -0.012, 0.05, Standing::Open),
+                effect_of("paper", 0.1, 0.3, Support::Holds),
+                effect_of("eld", 0.2, 0.4, Support::Holds),
+                effect_of("physical", -0.012, 0.05, Support::Open),
             ],
             robustness: Robustness::Some,
             dropped: 0,
@@ -354,9 +356,10 @@ mod tests {
             effect(finding.effects[2].effect.as_ref()),
             "+1.9 [−1.2, +5.0] open"
         );
-        finding.effects[1] = effect_of("eld", -0.4, -0.2, Standing::Opposite);
+        finding.effects[1] = effect_of("eld", -0.4, -0.2, Support::Opposite);
         finding.effects[2].effect = None;
-        finding.claim = LightClaim::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());
+        finding.claim =
+            NoiseHypothesis::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());
         assert_eq!(
             sentence(&finding),
             "ruas harms at L5: holds under paper; the opposite under eld (−40.0 to −20.0 points); not asked under physical."

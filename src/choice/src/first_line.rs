@@ -1,6 +1,6 @@
 //! A first line that is an answer by itself: [`first_line`].
 
-use super::names::{Delimiting, Name, State};
+use super::names::{Delimiting, Name, NameState};
 use super::strict;
 use super::view::ReplyView;
 use super::words::Role;
@@ -15,13 +15,13 @@ pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
         _ => None,
     };
     let index = read(line)?;
-    if view.state(0) == State::Repeated {
+    if view.state(0) == NameState::Repeated {
         return None;
     }
     let mut at = line.len() + 1;
     let mut differs = false;
     for other in rest.lines() {
-        let listed = view.state(at) != State::Affirmed;
+        let listed = view.state(at) != NameState::Affirmed;
         differs |= !listed && other != line && read(other).is_some_and(|other| other != index);
         at += other.len() + 1;
     }

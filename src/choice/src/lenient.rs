@@ -9,13 +9,13 @@
 //! 7. The letters that are left, then the texts that are left.
 //!
 //! From level 5 on, only affirmed names count. A name does not count that is in a list of all choices, in a question, in a condition, a
-//! color of the image, or denied ([`State`]). A level that finds two different answers accepts neither, and no later level is tried.
+//! color of the image, or denied ([`NameState`]). A level that finds two different answers accepts neither, and no later level is tried.
 
 use super::choice_views::ChoiceViews;
 use super::clean;
 use super::contradiction::contradiction;
 use super::first_line::first_line;
-use super::names::{Delimiting, Name, State};
+use super::names::{Delimiting, Name, NameState};
 use super::plain::{fold, plain};
 use super::refusal::declines;
 use super::stated::{alternative, stated};
@@ -127,18 +127,18 @@ fn texts(view: &ReplyView<'_>) -> Option<Answer> {
 /// Whether a choice is denied anywhere.
 fn is_denied(view: &ReplyView<'_>, index: usize) -> bool {
     view.names.all().any(|name| {
-        name.choice == Some(index) && matches!(name.state, State::Denied | State::Excluded)
+        name.choice == Some(index) && matches!(name.state, NameState::Denied | NameState::Excluded)
     })
 }
 
 /// The reason for a reply in which no choice is said to be there.
 fn unread(view: &ReplyView<'_>) -> UnreadReason {
-    let has = |states: &[State]| view.names.all().any(|name| states.contains(&name.state));
+    let has = |states: &[NameState]| view.names.all().any(|name| states.contains(&name.state));
     if declines(view.folded) {
         UnreadReason::Refused
-    } else if has(&[State::Denied, State::Excluded]) {
+    } else if has(&[NameState::Denied, NameState::Excluded]) {
         UnreadReason::Negated
-    } else if has(&[State::Repeated]) {
+    } else if has(&[NameState::Repeated]) {
         UnreadReason::Ambiguous
     } else {
         UnreadReason::NoChoice

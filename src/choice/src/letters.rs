@@ -6,7 +6,7 @@ use regex::Regex;
 
 use super::clauses::Clauses;
 use super::clean::compiled;
-use super::names::{Delimiting, Name, State, continues_word, index_of, unspaced};
+use super::names::{Delimiting, Name, NameState, continues_word, index_of, unspaced};
 use super::plain::RANGE;
 use super::words::Role;
 
@@ -36,7 +36,7 @@ pub(super) fn letters(text: &str, choices: usize, clauses: &Clauses<'_>) -> Vec<
                 end: start + 1,
                 choice,
                 delimiting,
-                state: State::Affirmed,
+                state: NameState::Affirmed,
             })
         })
         .collect()

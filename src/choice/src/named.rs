@@ -1,7 +1,7 @@
 //! All names of choices in a text: [`Names`].
 
 use super::markers;
-use super::names::{Name, State};
+use super::names::{Name, NameState};
 
 /// The names of choices in a text.
 pub(super) struct Names<'a> {
@@ -105,7 +105,7 @@ impl Names<'_> {
     }
 
     /// Sets the state of each name.
-    pub(super) fn set_states(&mut self, state: impl Fn(&Name) -> State) {
+    pub(super) fn set_states(&mut self, state: impl Fn(&Name) -> NameState) {
         for name in self.letters.iter_mut().chain(&mut self.texts) {
             name.state = state(name);
         }

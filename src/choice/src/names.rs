@@ -13,7 +13,7 @@ pub(super) enum Delimiting {
 
 /// Attitude of a text to a choice that it names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub(super) enum State {
+pub(super) enum NameState {
     /// The choice is said to be there.
     #[default]
     Affirmed,
@@ -31,7 +31,7 @@ pub(super) enum State {
     Repeated,
 }
 
-impl State {
+impl NameState {
     /// Whether the name counts: it is said, or stands in the way of another one.
     pub(super) fn counts(self) -> bool {
         self <= Self::Denied
@@ -48,13 +48,13 @@ pub(super) struct Name {
     /// Index of the choice; `None` for a letter beyond the choices.
     pub(super) choice: Option<usize>,
     pub(super) delimiting: Delimiting,
-    pub(super) state: State,
+    pub(super) state: NameState,
 }
 
 impl Name {
     /// Whether the choice is said to be there.
     pub(super) fn is_affirmed(&self) -> bool {
-        self.state == State::Affirmed
+        self.state == NameState::Affirmed
     }
 }
 

@@ -3,7 +3,7 @@
 use super::lenient;
 use super::letters::{AFTER_A, AFTER_I, abbreviated, called_letter, hyphenated};
 use super::markers::{self, Lead, Marker, MarkerKind};
-use super::names::{Delimiting, Name, State, continues_word, index_of};
+use super::names::{Delimiting, Name, NameState, continues_word, index_of};
 use super::plain::fold;
 use super::view::ReplyView;
 use super::words::Role;
@@ -39,7 +39,7 @@ pub(super) fn stated(view: &ReplyView<'_>) -> Option<Answer> {
         // Questions, counterfactuals and repetitions of the prompt announce nothing.
         if matches!(
             view.state(marker.start),
-            State::Questioned | State::Conditional | State::Repeated
+            NameState::Questioned | NameState::Conditional | NameState::Repeated
         ) {
             continue;
         }
@@ -66,7 +66,7 @@ fn leftovers<'a>(view: &'a ReplyView<'_>) -> impl Iterator<Item = Marker> + 'a {
     let first = view
         .names
         .all()
-        .filter(|name| matches!(name.state, State::Denied | State::Excluded))
+        .filter(|name| matches!(name.state, NameState::Denied | NameState::Excluded))
         .map(|name| name.start)
         .min()
         .unwrap_or(usize::MAX);
@@ -106,7 +106,7 @@ fn last(view: &ReplyView<'_>, announcements: &[Announcement]) -> Option<Answer> 
         if announcements.iter().any(|announcement| {
             announcement.at > at && announcement.statement == Statement::IsNot(chosen)
         }) || view.names.all().any(|name| {
-            name.start > at && name.choice == Some(chosen) && name.state == State::Excluded
+            name.start > at && name.choice == Some(chosen) && name.state == NameState::Excluded
         }) {
             Answer::Unparsed(UnreadReason::Negated)
         } else {
@@ -166,13 +166,13 @@ fn announcement(view: &ReplyView<'_>, marker: Marker, end: usize) -> Option<Anno
     };
     let statement = match announced(view, &lead) {
         Some((name, answer)) => match view.state(name.start) {
-            State::Affirmed => Statement::Is(answer),
-            State::Denied => Statement::IsNot(name.choice?),
-            State::Excluded
-            | State::OfImage
-            | State::Conditional
-            | State::Questioned
-            | State::Repeated => {
+            NameState::Affirmed => Statement::Is(answer),
+            NameState::Denied => Statement::IsNot(name.choice?),
+            NameState::Excluded
+            | NameState::OfImage
+            | NameState::Conditional
+            | NameState::Questioned
+            | NameState::Repeated => {
                 return None;
             }
         },
@@ -269,7 +269,7 @@ pub(super) fn alternative(view: &ReplyView<'_>, name: &Name) -> bool {
     };
     let other = letter_at(view, element.start).or_else(|| view.names.text_at(element.start));
     other.is_some_and(|other| {
-        other.choice != name.choice && view.state(other.start) == State::Affirmed
+        other.choice != name.choice && view.state(other.start) == NameState::Affirmed
     })
 }
 
@@ -287,7 +287,7 @@ fn letter_at(view: &ReplyView<'_>, at: usize) -> Option<Name> {
         end: start + 1,
         choice: index_of(letter).filter(|index| *index < view.offered.texts.len()),
         delimiting: Delimiting::Firm,
-        state: State::Affirmed,
+        state: NameState::Affirmed,
     };
     let after = right.chars().next();
     if continues_word(after)
@@ -368,5 +368,5 @@ fn remains(view: &ReplyView<'_>, name: &Name) -> bool {
         && view
             .names
             .all()
-            .any(|other| other.state == State::Excluded && other.start < name.start))
+            .any(|other| other.state == NameState::Excluded && other.start < name.start))
 }

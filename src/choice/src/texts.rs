@@ -2,7 +2,7 @@
 
 use super::choice_views::{ChoiceViews, Naming};
 use super::determiner;
-use super::names::{Delimiting, Name, State, part_of_number, same_word};
+use super::names::{Delimiting, Name, NameState, part_of_number, same_word};
 use super::plain::RANGE;
 use super::tokens::{Token, TokenKind};
 use super::words::{Role, phrase_at};
@@ -52,7 +52,7 @@ pub(super) fn texts(
             end: span.end,
             choice: Some(candidate.choice),
             delimiting: Delimiting::Plain,
-            state: State::Affirmed,
+            state: NameState::Affirmed,
         });
     }
     names.sort_by_key(|name| name.start);

@@ -8,7 +8,7 @@ use super::exclusions::excluded;
 use super::image_words::image_colors;
 use super::letters::letters;
 use super::named::Names;
-use super::names::{Delimiting, Name, State};
+use super::names::{Delimiting, Name, NameState};
 use super::questions::questioned;
 use super::ranges::Ranges;
 use super::repetitions::repetitions;
@@ -41,17 +41,17 @@ struct Scopes {
 
 impl Scopes {
     /// State of a name that begins at a byte. The first rule that applies decides.
-    fn state(&self, byte: usize) -> State {
+    fn state(&self, byte: usize) -> NameState {
         let states = [
-            (&self.repeated, State::Repeated),
-            (&self.questioned, State::Questioned),
-            (&self.conditional, State::Conditional),
-            (&self.of_image, State::OfImage),
-            (&self.excluded, State::Excluded),
-            (&self.denied, State::Denied),
+            (&self.repeated, NameState::Repeated),
+            (&self.questioned, NameState::Questioned),
+            (&self.conditional, NameState::Conditional),
+            (&self.of_image, NameState::OfImage),
+            (&self.excluded, NameState::Excluded),
+            (&self.denied, NameState::Denied),
         ];
         let state = states.iter().find(|(ranges, _)| ranges.contain(byte));
-        state.map_or(State::Affirmed, |(_, state)| *state)
+        state.map_or(NameState::Affirmed, |(_, state)| *state)
     }
 }
 
@@ -95,7 +95,7 @@ impl<'a> ReplyView<'a> {
     }
 
     /// State of a name that begins at a byte.
-    pub(super) fn state(&self, byte: usize) -> State {
+    pub(super) fn state(&self, byte: usize) -> NameState {
         self.scopes.state(byte)
     }
 

@@ -119,7 +119,7 @@ impl Enhancer {
             ImageOutput::Known => String::new(),
             ImageOutput::Unknown => self.output_title() + ", ",
         };
-        let columns = shown(&output, &probe, as_stated, &swapped, order, others);
+        let columns = conventions_to_draw(&output, &probe, as_stated, &swapped, order, others);
         Ok(Examination {
             settled: found.settled,
             frames,
@@ -269,7 +269,7 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
 
 /// The conventions to draw: the plausible ones, and the partly stated one that a run would use. If none is plausible, all of them. `output`
 /// names the output to read if the image is not known.
-fn shown(
+fn conventions_to_draw(
     output: &str,
     probe: &Probe,
     stated: Option<RangePair>,

@@ -134,10 +134,10 @@ impl Seen {
 
 /// A handle to the note of an enhancer, which grows while it is used.
 #[derive(Debug, Clone, Default)]
-pub struct Usage(Arc<Mutex<State>>);
+pub struct Usage(Arc<Mutex<UsageState>>);
 
 #[derive(Debug, Default)]
-struct State {
+struct UsageState {
     note: EnhancerNote,
     /// Number of images that cannot be enhanced images.
     impossible: usize,
@@ -241,7 +241,7 @@ impl Usage {
         })
     }
 
-    fn with<T>(&self, use_state: impl FnOnce(&mut State) -> T) -> T {
+    fn with<T>(&self, use_state: impl FnOnce(&mut UsageState) -> T) -> T {
         use_state(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }

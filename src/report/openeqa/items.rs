@@ -91,7 +91,8 @@ fn data<'a>(
 fn shown<'a>(own: &'a subject::Subject, all: &[&subject::Subject]) -> Subject<'a> {
     let clean = own.level.and_then(|_| {
         let clean = subject::Subject::seeing(&own.model, AxisLevel::L0, &own.variant, None);
-        all.iter().position(|other| other.is_for(&clean))
+        all.iter()
+            .position(|other| other.matches_up_to_group(&clean))
     });
     Subject {
         name: words::name(own),

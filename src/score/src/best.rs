@@ -240,7 +240,7 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> BTreeSet<AxisL
         .filter(|subject| {
             let is_degraded =
                 subject.model == model && subject.enhancer.is_none() && subject.variant == *variant;
-            is_degraded || subject.is_for(&clean)
+            is_degraded || subject.matches_up_to_group(&clean)
         })
         .filter_map(|subject| subject.level)
         .collect()

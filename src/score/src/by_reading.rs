@@ -22,7 +22,7 @@ use darkqa_ground::types::{
 
 /// A statement about noise that may hold under one light reading and not under another.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub enum LightClaim {
+pub enum NoiseHypothesis {
     /// With noise, accuracy is lower than by the exposure drop alone: L1–L5 together, or one level.
     NoiseCompounds(Option<AxisLevel>),
     /// Darkness with noise costs accuracy: L5 against L0.
@@ -35,7 +35,7 @@ pub enum LightClaim {
     BelowBlind(Family, AxisLevel),
 }
 
-impl LightClaim {
+impl NoiseHypothesis {
     /// The word in files.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -95,7 +95,7 @@ fn paper_levels() -> Vec<AxisLevel> {
 
 /// Test result of a claim, after the correction over claims and readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
+pub enum Support {
     /// The effect is detected on the side of the claim.
     Holds,
     /// The effect is detected on the other side.
@@ -104,7 +104,7 @@ pub enum Standing {
     Open,
 }
 
-impl Standing {
+impl Support {
     /// The word in tables and files.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -160,7 +160,7 @@ pub struct TestedEffect {
     /// The difference of accuracies with its 95 % interval by clusters.
     pub difference: Estimate,
     /// Test result of the claim.
-    pub standing: Standing,
+    pub standing: Support,
     /// p-value of no difference.
     pub p: f64,
     /// The p-value after Holm's correction over all claims and readings.
@@ -175,7 +175,7 @@ pub struct FindingByReading {
     /// The runs that show these images, in a report on runs that show different ones.
     pub group: Option<LightGroup>,
     /// The claim that was tested.
-    pub claim: LightClaim,
+    pub claim: NoiseHypothesis,
     /// The levels that every reading was asked at.
     pub levels: Vec<AxisLevel>,
     /// The model without images that the claim compares with, if it is another one.
@@ -203,7 +203,7 @@ pub fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
         .collect();
     let mut models: Vec<(&str, Option<&LightGroup>)> = models.into_iter().collect();
     models.sort_by_cached_key(|(model, _)| grid.listing.place(model));
-    let jobs: Vec<(&str, Option<&LightGroup>, LightClaim)> = models
+    let jobs: Vec<(&str, Option<&LightGroup>, NoiseHypothesis)> = models
         .into_iter()
         .flat_map(|(model, group)| {
             claims(grid, model)
@@ -226,23 +226,23 @@ fn noisy<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g Subject> {
 }
 
 /// The claims that may be computed for a model, in the order of the table.
-fn claims(grid: &Grid<'_>, model: &str) -> Vec<LightClaim> {
+fn claims(grid: &Grid<'_>, model: &str) -> Vec<NoiseHypothesis> {
     let enhancers: BTreeSet<&EnhancerName> = noisy(grid)
         .filter(|subject| subject.model == model)
         .filter_map(|subject| subject.enhancer.as_ref())
         .collect();
     let levels = paper_levels();
-    let mut claims = vec![LightClaim::NoiseCompounds(None)];
+    let mut claims = vec![NoiseHypothesis::NoiseCompounds(None)];
     let by_level = levels.iter();
-    claims.extend(by_level.map(|level| LightClaim::NoiseCompounds(Some(*level))));
-    claims.push(LightClaim::DarknessCosts);
+    claims.extend(by_level.map(|level| NoiseHypothesis::NoiseCompounds(Some(*level))));
+    claims.push(NoiseHypothesis::DarknessCosts);
     for name in enhancers {
-        claims.push(LightClaim::EnhancerHarms(name.clone()));
-        claims.push(LightClaim::EnhancerHelps(name.clone()));
+        claims.push(NoiseHypothesis::EnhancerHarms(name.clone()));
+        claims.push(NoiseHypothesis::EnhancerHelps(name.clone()));
     }
     for family in grid.families() {
         let dark = levels[3..].iter().rev();
-        claims.extend(dark.map(|level| LightClaim::BelowBlind(family.clone(), *level)));
+        claims.extend(dark.map(|level| NoiseHypothesis::BelowBlind(family.clone(), *level)));
     }
     claims
 }
@@ -258,7 +258,7 @@ impl Sides<'_, '_> {
     /// The two subjects of a claim at a level under a reading, by their indices.
     fn find(
         &self,
-        claim: &LightClaim,
+        claim: &NoiseHypothesis,
         level: AxisLevel,
         reading: &ReadingName,
     ) -> Option<(usize, usize)> {
@@ -275,15 +275,15 @@ impl Sides<'_, '_> {
         };
         let raw = seeing(level, &noisy, None);
         Some(match claim {
-            LightClaim::NoiseCompounds(_) => (
+            NoiseHypothesis::NoiseCompounds(_) => (
                 seeing(level, &light(Kind::Sensor.base(), None), None)?,
                 raw?,
             ),
-            LightClaim::DarknessCosts => (raw?, seeing(AxisLevel::L0, &noisy, None)?),
-            LightClaim::EnhancerHarms(name) | LightClaim::EnhancerHelps(name) => {
+            NoiseHypothesis::DarknessCosts => (raw?, seeing(AxisLevel::L0, &noisy, None)?),
+            NoiseHypothesis::EnhancerHarms(name) | NoiseHypothesis::EnhancerHelps(name) => {
                 (seeing(level, &noisy, Some(name))?, raw?)
             }
-            LightClaim::BelowBlind(..) => (raw?, self.blind()?),
+            NoiseHypothesis::BelowBlind(..) => (raw?, self.blind()?),
         })
     }
 
@@ -307,7 +307,7 @@ impl Sides<'_, '_> {
 /// A claim under every reading; `None` if no reading was asked on both sides.
 fn finding(
     sides: &Sides<'_, '_>,
-    claim: LightClaim,
+    claim: NoiseHypothesis,
     readings: &[&ReadingName],
 ) -> Option<FindingByReading> {
     let asked_at = |reading: &ReadingName| {
@@ -342,7 +342,7 @@ fn finding(
     if effects.iter().all(Option::is_none) {
         return None;
     }
-    let blind = matches!(claim, LightClaim::BelowBlind(..))
+    let blind = matches!(claim, NoiseHypothesis::BelowBlind(..))
         .then(|| sides.blind())
         .flatten()
         .map(|index| sides.grid.subjects[index].model.clone());
@@ -421,7 +421,7 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
     clusters.retain(|cluster| cluster.items > 0);
     let tested = PairedTest::new(&clusters, pairs.len() as f64, squares as f64);
     Some(TestedEffect {
-        standing: Standing::Open,
+        standing: Support::Open,
         difference: tested.difference,
         p: tested.p,
         holm: tested.p,
@@ -449,26 +449,26 @@ fn corrected(mut found: Vec<FindingByReading>) -> Vec<FindingByReading> {
     found
 }
 
-fn standing(effect: &TestedEffect, is_gain: bool) -> Standing {
+fn standing(effect: &TestedEffect, is_gain: bool) -> Support {
     if effect.holm >= ALPHA {
-        Standing::Open
+        Support::Open
     } else if (effect.difference.value > 0.0) == is_gain {
-        Standing::Holds
+        Support::Holds
     } else {
-        Standing::Opposite
+        Support::Opposite
     }
 }
 
 /// The claim under the readings. A reading that was not asked shows nothing, so that the claim cannot hold under all.
 fn robustness(effects: &[EffectInReading]) -> Robustness {
-    let count = |standing: Standing| {
+    let count = |standing: Support| {
         effects
             .iter()
             .filter_map(|effect| effect.effect)
             .filter(|effect| effect.standing == standing)
             .count()
     };
-    match (count(Standing::Holds), count(Standing::Opposite)) {
+    match (count(Support::Holds), count(Support::Opposite)) {
         (0, 0) => Robustness::Open,
         (0, _) => Robustness::None,
         (holding, 0) if holding == effects.len() => Robustness::All,

@@ -133,7 +133,7 @@ impl<'a> Grid<'a> {
         listing: &ModelListing,
         is_shown: impl Fn(&AskedItem, &str) -> bool,
     ) -> Self {
-        let met = Met::new(trials, |item, model| {
+        let met = GridScope::new(trials, |item, model| {
             let has_cluster = clusters.get(&item.frame, &item.question).is_some();
             has_cluster && is_shown(item, model)
         });
@@ -258,8 +258,11 @@ impl<'a> Grid<'a> {
     /// runs meets its own.
     #[must_use]
     pub fn stand_in(&self, subject: &Subject) -> Option<usize> {
-        self.find(subject)
-            .or_else(|| self.subjects.iter().position(|other| other.is_for(subject)))
+        self.find(subject).or_else(|| {
+            self.subjects
+                .iter()
+                .position(|other| other.matches_up_to_group(subject))
+        })
     }
 
     /// Items of a family, each with its result for a subject.
@@ -337,14 +340,14 @@ impl<'a> Grid<'a> {
 }
 
 /// The models in conditions and the items that a grid includes.
-struct Met {
+struct GridScope {
     /// Whether a model in a condition is shown, by its number.
     asked: Vec<bool>,
     /// The numbers of the items, in the order of the first trials about them.
     items: Vec<usize>,
 }
 
-impl Met {
+impl GridScope {
     fn new(trials: &Trials<ChoiceDetail>, is_shown: impl Fn(&AskedItem, &str) -> bool) -> Self {
         let mut met = Self {
             asked: vec![false; trials.asked().len()],

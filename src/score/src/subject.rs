@@ -122,9 +122,9 @@ impl Subject {
         format!("{light}{}{group}", enhancer.unwrap_or_default())
     }
 
-    /// Whether a subject of a report stands for this one: they are equal, but that their groups of runs need only meet.
+    /// True if both are the same model in the same condition and their groups of runs overlap.
     #[must_use]
-    pub fn is_for(&self, other: &Self) -> bool {
+    pub fn matches_up_to_group(&self, other: &Self) -> bool {
         let (one, two) = (&self.variant, &other.variant);
         self.model == other.model
             && (self.view, self.level) == (other.view, other.level)
@@ -142,7 +142,7 @@ impl Subject {
     }
 
     /// A model with images, at a level of a variant, raw or enhanced. L0 is the clean frame of every variant; it keeps the group
-    /// of runs, so that [`is_for`](Self::is_for) finds the clean frames of these runs.
+    /// of runs, so that [`matches_up_to_group`](Self::matches_up_to_group) finds the clean frames of these runs.
     #[must_use]
     pub fn seeing(
         model: &str,

@@ -20,12 +20,12 @@ pub(super) struct UnlockedLog {
     name: String,
     /// The length of the log after the last write of this process, in bytes.
     end: u64,
-    found: Found,
+    found: OtherWriter,
 }
 
 /// The other process that writes to the log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Found {
+enum OtherWriter {
     None,
     /// It started earlier, so that this process stops.
     Earlier,
@@ -45,7 +45,7 @@ impl UnlockedLog {
             marker: folder.join(WRITER),
             name: format!("process {}, {now} ns\n", process::id()),
             end: log.metadata().map_or(0, |log| log.len()),
-            found: Found::None,
+            found: OtherWriter::None,
         };
         files::write(&begun.marker, begun.name.as_bytes())?;
         tracing::warn!(
@@ -59,13 +59,13 @@ impl UnlockedLog {
     /// Looks for records of another process before this one appends `bytes` bytes.
     pub(super) fn appends(&mut self, log: &File, bytes: usize) {
         let length = log.metadata().map_or(self.end, |log| log.len());
-        if length != self.end && self.found == Found::None {
+        if length != self.end && self.found == OtherWriter::None {
             self.found = if self.is_last() {
-                Found::Earlier
+                OtherWriter::Earlier
             } else {
-                Found::Later
+                OtherWriter::Later
             };
-            if self.found == Found::Later {
+            if self.found == OtherWriter::Later {
                 tracing::warn!("another process has begun to write to this run; it stops");
             }
         }
@@ -74,7 +74,7 @@ impl UnlockedLog {
 
     /// The error that stops this process, if one that started earlier writes to the log.
     pub(super) fn problem(&self, folder: &Path) -> Option<Error> {
-        (self.found == Found::Earlier).then(|| Error::Run {
+        (self.found == OtherWriter::Earlier).then(|| Error::Run {
             path: folder.to_owned(),
             problem: "another process, which started earlier, writes to this run; wait for its end, then the same command goes on".to_owned(),
         })

@@ -34,19 +34,19 @@ struct Recipe {
     scale: [f32; 2],
     /// The main colours that it may have: names of paints, or sRGB codes in hexadecimal digits.
     colors: Vec<&'static str>,
-    parts: Vec<Part>,
+    parts: Vec<Solid>,
 }
 
 /// A solid of a piece, as its line has it.
 #[derive(Debug)]
-struct Part {
+struct Solid {
     copies: Copies,
     solid: &'static str,
     surface: &'static str,
     numbers: Vec<f32>,
 }
 
-/// How often a solid is there.
+/// Number and placement of the copies of a solid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Copies {
     One,
@@ -67,7 +67,7 @@ fn read(table: &'static str) -> Result<Vec<Recipe>, &'static str> {
         if line.starts_with('[') {
             recipes.push(head(line).ok_or(line)?);
         } else {
-            let part = part(line).filter(Part::is_known).ok_or(line)?;
+            let part = part(line).filter(Solid::is_known).ok_or(line)?;
             recipes.last_mut().ok_or(line)?.parts.push(part);
         }
     }
@@ -93,7 +93,7 @@ fn head(line: &'static str) -> Option<Recipe> {
 }
 
 /// A further line of an entry.
-fn part(line: &'static str) -> Option<Part> {
+fn part(line: &'static str) -> Option<Solid> {
     let mut words = line.split_whitespace().peekable();
     let copies = match words.next_if(|word| word.starts_with('*')) {
         None => Copies::One,
@@ -104,7 +104,7 @@ fn part(line: &'static str) -> Option<Part> {
             Copies::Around(count.parse().ok()?, [x.parse().ok()?, z.parse().ok()?])
         }
     };
-    Some(Part {
+    Some(Solid {
         copies,
         solid: words.next()?,
         surface: words.next()?,
@@ -114,7 +114,7 @@ fn part(line: &'static str) -> Option<Part> {
     })
 }
 
-impl Part {
+impl Solid {
     fn is_known(&self) -> bool {
         let dull = Surface::plain([128, 128, 128]);
         self.solid == "light" && self.numbers.len() == 5

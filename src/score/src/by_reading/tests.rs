@@ -4,14 +4,14 @@ use super::*;
 use crate::tests::{records, with_grid};
 use darkqa_ground::types::Record;
 
-fn find<'f>(found: &'f [FindingByReading], claim: &LightClaim) -> &'f FindingByReading {
+fn find<'f>(found: &'f [FindingByReading], claim: &NoiseHypothesis) -> &'f FindingByReading {
     found
         .iter()
         .find(|finding| finding.claim == *claim)
         .unwrap()
 }
 
-fn standings(finding: &FindingByReading) -> Vec<Option<Standing>> {
+fn standings(finding: &FindingByReading) -> Vec<Option<Support>> {
     finding
         .effects
         .iter()
@@ -35,11 +35,11 @@ fn a_claim_holds_where_its_interval_is_on_its_side() {
     let records = ladder(|item| Some(item % 4 == 0), |_| Some(true));
     with_grid(&records, |grid| {
         let found = by_reading(grid);
-        let noise = find(&found, &LightClaim::NoiseCompounds(None));
+        let noise = find(&found, &NoiseHypothesis::NoiseCompounds(None));
         assert_eq!(noise.levels.len(), 5);
         assert_eq!(
             standings(noise),
-            [Some(Standing::Holds), Some(Standing::Open)]
+            [Some(Support::Holds), Some(Support::Open)]
         );
         assert_eq!(noise.robustness, Robustness::Some);
         let effect = noise.effects[0].effect.unwrap();
@@ -58,10 +58,10 @@ fn a_claim_holds_where_its_interval_is_on_its_side() {
             .map(|one| one.p)
             .fold(1.0, f64::min);
         assert!(effect.holm >= 14.0 * smallest, "{effect:?}");
-        let costs = find(&found, &LightClaim::DarknessCosts);
+        let costs = find(&found, &NoiseHypothesis::DarknessCosts);
         assert_eq!(
             standings(costs),
-            [Some(Standing::Holds), Some(Standing::Open)]
+            [Some(Support::Holds), Some(Support::Open)]
         );
         assert!(costs.effects[0].effect.unwrap().difference.value < 0.0);
         // Nothing was enhanced or asked without images.
@@ -92,8 +92,8 @@ fn the_same_everywhere_is_open_and_the_opposite_is_reversed() {
     }
     with_grid(&opposite, |grid| {
         let found = by_reading(grid);
-        let noise = find(&found, &LightClaim::NoiseCompounds(None));
-        assert_eq!(standings(noise), [Some(Standing::Opposite); 2]);
+        let noise = find(&found, &NoiseHypothesis::NoiseCompounds(None));
+        assert_eq!(standings(noise), [Some(Support::Opposite); 2]);
         assert_eq!(noise.robustness, Robustness::None);
     });
 }
@@ -114,7 +114,7 @@ fn items_without_a_reply_leave_every_column_and_unasked_levels_are_named() {
     });
     with_grid(&records_, |grid| {
         let found = by_reading(grid);
-        let noise = find(&found, &LightClaim::NoiseCompounds(None));
+        let noise = find(&found, &NoiseHypothesis::NoiseCompounds(None));
         let levels: Vec<String> = noise.levels.iter().map(ToString::to_string).collect();
         assert_eq!(levels, ["L1", "L3", "L4", "L5"]);
         assert_eq!((noise.dropped, noise.robustness), (2, Robustness::All));
@@ -127,9 +127,9 @@ fn items_without_a_reply_leave_every_column_and_unasked_levels_are_named() {
             .subjects
             .iter()
             .find(|subject| subject.level.is_some_and(|level| level.to_string() == "L2"));
-        let claim = LightClaim::NoiseCompounds(second.and_then(|subject| subject.level));
+        let claim = NoiseHypothesis::NoiseCompounds(second.and_then(|subject| subject.level));
         let of_second = find(&found, &claim);
-        assert_eq!(standings(of_second), [Some(Standing::Holds), None]);
+        assert_eq!(standings(of_second), [Some(Support::Holds), None]);
         // A claim that was not asked under one reading does not hold under all.
         assert_eq!(of_second.robustness, Robustness::Some);
     });
@@ -153,22 +153,25 @@ fn enhancers_and_families_have_claims_of_their_own() {
     with_grid(&all, |grid| {
         let found = by_reading(grid);
         let name = EnhancerName::new("lift").unwrap();
-        let harms = find(&found, &LightClaim::EnhancerHarms(name.clone()));
+        let harms = find(&found, &NoiseHypothesis::EnhancerHarms(name.clone()));
         assert_eq!((harms.levels.len(), harms.robustness), (3, Robustness::All));
-        let helps = find(&found, &LightClaim::EnhancerHelps(name));
+        let helps = find(&found, &NoiseHypothesis::EnhancerHelps(name));
         assert_eq!(
             standings(helps),
-            [Some(Standing::Holds), Some(Standing::Open)]
+            [Some(Support::Holds), Some(Support::Open)]
         );
         // Items of one family are all even, those of the other all odd.
         let level = *harms.levels.last().unwrap();
         let darkest = helps.levels[1];
         assert!(level < darkest);
-        let below = find(&found, &LightClaim::BelowBlind(Family::RoomType, darkest));
+        let below = find(
+            &found,
+            &NoiseHypothesis::BelowBlind(Family::RoomType, darkest),
+        );
         assert_eq!(below.blind.as_deref(), Some("other"));
         assert_eq!(
             standings(below),
-            [Some(Standing::Holds), Some(Standing::Open)]
+            [Some(Support::Holds), Some(Support::Open)]
         );
         assert_eq!(below.effects[0].effect.unwrap().difference.n, 12);
     });

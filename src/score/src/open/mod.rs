@@ -116,7 +116,7 @@ pub fn open_summary_listed(
         for (baseline, other) in baselines(subject) {
             let Some((_, baseline_answers)) = by_subject
                 .iter()
-                .find(|(subject, _)| subject.is_for(&other))
+                .find(|(subject, _)| subject.matches_up_to_group(&other))
             else {
                 continue;
             };

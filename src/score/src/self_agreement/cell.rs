@@ -97,7 +97,7 @@ pub(super) fn cells(
     for subject in 0..grid.subjects.len() {
         for family in grid.groups() {
             let counts = grid.counts(subject, family, mode);
-            let part = Part {
+            let part = CellItems {
                 grid,
                 subject,
                 family,
@@ -120,14 +120,14 @@ pub(super) fn cells(
 }
 
 /// The items of a cell.
-struct Part<'g, 'r> {
+struct CellItems<'g, 'r> {
     grid: &'g Grid<'r>,
     subject: usize,
     family: Option<&'g Family>,
     mode: ReadingMode,
 }
 
-impl Part<'_, '_> {
+impl CellItems<'_, '_> {
     /// The cell without what follows from other cells.
     fn cell(&self, bank: &BankIndex<'_>, counts: &[ClusterCount]) -> AgreementCell {
         let (grid, subject, mode) = (self.grid, self.subject, self.mode);

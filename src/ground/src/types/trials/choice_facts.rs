@@ -17,8 +17,8 @@ const NONE: u32 = u32::MAX;
 pub struct ChoiceFacts {
     images: u32,
     more: u32,
-    strict: Option<Reading>,
-    lenient: Option<Reading>,
+    strict: Option<PackedReading>,
+    lenient: Option<PackedReading>,
     pub(super) outcome: TrialOutcome,
     /// Whether the reply is the letter of a choice and nothing else.
     pub(super) is_letter: bool,
@@ -26,12 +26,12 @@ pub struct ChoiceFacts {
 
 /// An [`AnswerReading`] in two bytes.
 #[derive(Debug, Clone, Copy)]
-enum Reading {
+enum PackedReading {
     Chosen(u8),
     Unread(Option<UnreadReason>),
 }
 
-impl From<AnswerReading> for Reading {
+impl From<AnswerReading> for PackedReading {
     fn from(reading: AnswerReading) -> Self {
         match reading.chosen {
             // A question has at most 26 choices.
@@ -41,14 +41,14 @@ impl From<AnswerReading> for Reading {
     }
 }
 
-impl From<Reading> for AnswerReading {
-    fn from(reading: Reading) -> Self {
+impl From<PackedReading> for AnswerReading {
+    fn from(reading: PackedReading) -> Self {
         match reading {
-            Reading::Chosen(index) => Self {
+            PackedReading::Chosen(index) => Self {
                 chosen: Some(usize::from(index)),
                 why: None,
             },
-            Reading::Unread(why) => Self { chosen: None, why },
+            PackedReading::Unread(why) => Self { chosen: None, why },
         }
     }
 }
@@ -89,8 +89,8 @@ impl ChoiceTables {
         ChoiceFacts {
             images,
             more: self.add_more(observed, options),
-            strict: detail.strict.map(Reading::from),
-            lenient: detail.lenient.map(Reading::from),
+            strict: detail.strict.map(PackedReading::from),
+            lenient: detail.lenient.map(PackedReading::from),
             outcome: detail.outcome,
             is_letter: reply.is_some_and(|reply| is_letter(reply, detail.choices.len())),
         }
