@@ -181,17 +181,14 @@ impl ImageCounts {
 
     /// The images that were not written, as words to append; empty if there are none.
     pub(crate) fn unwritten(self) -> String {
-        [
-            (
-                self.unchanged,
-                "left as they were (--force makes them again)",
-            ),
-            (self.failed, "failed"),
-        ]
-        .iter()
-        .filter(|(number, _)| *number > 0)
-        .map(|(number, what)| format!(", {number} {what}"))
-        .collect()
+        let part = |number: usize, what: &str| match number {
+            0 => String::new(),
+            _ => format!(", {number} {what}"),
+        };
+        part(
+            self.unchanged,
+            "left as they were (--force makes them again)",
+        ) + &part(self.failed, "failed")
     }
 }
 

@@ -27,7 +27,7 @@ enum ProgressForm {
 }
 
 /// The time between two lines of progress.
-pub(crate) const LINE_INTERVAL: Duration = Duration::from_secs(60);
+pub(crate) const LINE_INTERVAL: Duration = Duration::from_mins(1);
 
 /// Whether progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

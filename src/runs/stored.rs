@@ -65,7 +65,7 @@ impl<D: Detail> StoredRun<D> {
         })?;
         let mut run = Self::of_trials(folder, manifest, trials)?;
         if run.manifest.status == Status::Started {
-            let failed = run.trials.iter().map(|trial| trial.failed());
+            let failed = run.trials.iter().map(TrialRef::failed);
             run.manifest.counts = Counts::new(run.manifest.counts.trials, failed);
         }
         Ok(run)

@@ -194,16 +194,16 @@ impl<D: Detail> Driver<'_, D> {
         if let Some(quota) = &failure.quota {
             return self.quota_reached(part, quota);
         }
-        if !failure.may_have_effect {
-            let why = failure.failure.message.clone();
-            self.journal.record(part, Event::Refused { why })?;
-            if failure.is_permanent() {
-                return Err(self.fatal(part, failure));
-            }
-        } else {
+        if failure.may_have_effect {
             let failed = self.notes.failed_calls.entry(part).or_default();
             *failed += 1;
             if *failed >= MOST_FAILED {
+                return Err(self.fatal(part, failure));
+            }
+        } else {
+            let why = failure.failure.message.clone();
+            self.journal.record(part, Event::Refused { why })?;
+            if failure.is_permanent() {
                 return Err(self.fatal(part, failure));
             }
         }

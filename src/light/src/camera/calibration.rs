@@ -231,8 +231,7 @@ impl Calibration {
             .iter()
             .map(|step| {
                 step.gain
-                    .map(|own| libm::log(own / gain).abs())
-                    .unwrap_or(f64::INFINITY)
+                    .map_or(f64::INFINITY, |own| libm::log(own / gain).abs())
             })
             .enumerate()
             .min_by(|a, b| a.1.total_cmp(&b.1))

@@ -196,14 +196,13 @@ fn two_views_of_a_thing_must_show_the_same_colour() {
         results
             .candidates
             .into_iter()
-            .filter_map(|result| match result {
+            .find_map(|result| match result {
                 RuleResult::Viable(found) if found.family == Family::Color => Some(None),
                 RuleResult::Rejected(found) if found.family == Family::Color => {
                     Some(Some(found.reason))
                 }
                 _ => None,
             })
-            .next()
             .unwrap()
     };
     let named = WordSource::Name;

@@ -41,7 +41,7 @@ struct Recipe {
 #[derive(Debug)]
 struct Solid {
     copies: Copies,
-    solid: &'static str,
+    shape: &'static str,
     surface: &'static str,
     numbers: Vec<f32>,
 }
@@ -106,7 +106,7 @@ fn part(line: &'static str) -> Option<Solid> {
     };
     Some(Solid {
         copies,
-        solid: words.next()?,
+        shape: words.next()?,
         surface: words.next()?,
         numbers: words
             .map(|number| number.parse().ok())
@@ -117,7 +117,7 @@ fn part(line: &'static str) -> Option<Solid> {
 impl Solid {
     fn is_known(&self) -> bool {
         let dull = Surface::plain([128, 128, 128]);
-        self.solid == "light" && self.numbers.len() == 5
+        self.shape == "light" && self.numbers.len() == 5
             || self.add_to(&mut Mesh::default(), &dull).is_some()
     }
 
@@ -130,7 +130,7 @@ impl Solid {
                 .map(|pair| (pair[0], pair[1]))
                 .collect()
         };
-        match (self.solid, &self.numbers[..]) {
+        match (self.shape, &self.numbers[..]) {
             ("box", &[x, to_x, y, to_y, z, to_z]) => {
                 mesh.block(vec3(x, y, z), vec3(to_x, to_y, to_z), surface);
             }
@@ -243,7 +243,7 @@ pub(in super::super) fn painted(name: &str, main: Paint, dice: &mut Dice) -> Pie
     let scale = dice.between(recipe.scale[0], recipe.scale[1]);
     let mut light = None;
     for part in &recipe.parts {
-        match (part.solid, &part.numbers[..]) {
+        match (part.shape, &part.numbers[..]) {
             ("light", &[x, y, z, radius, strength]) => {
                 light = Some(LightSource::Bulb {
                     middle: vec3(x, y, z) * scale,

@@ -58,12 +58,11 @@ fn strict<'s>(score: &'s StrictScore, condition: &str) -> &'s GroupCell {
     score
         .cells
         .iter()
-        .filter(|cell| {
+        .find(|cell| {
             cell.family.is_none()
                 && cell.mode == ReadingMode::Strict
                 && cell.subject.condition() == condition
         })
-        .next()
         .unwrap()
 }
 
