@@ -3,6 +3,15 @@
 use super::files::Files;
 use super::source::{Kind, Part};
 
+/// The functions of `Digest` that compute one.
+const DIGEST_MAKERS: [&str; 5] = [
+    "canonical",
+    "canonical_value",
+    "from_bytes",
+    "from_parts",
+    "from_file_digests",
+];
+
 /// The functions that make a digest, by file and name, each with whether a text of it has debug output. Tests are left out.
 pub(crate) fn makers(files: &Files) -> Vec<(&str, &str, bool)> {
     let mut makers = Vec::new();
@@ -22,7 +31,7 @@ pub(crate) fn makers(files: &Files) -> Vec<(&str, &str, bool)> {
 
 fn makes_digest(path: &[String]) -> bool {
     match path {
-        [.., kind, name] if kind == "Digest" => name == "canonical" || name.starts_with("of"),
+        [.., kind, name] if kind == "Digest" => DIGEST_MAKERS.contains(&name.as_str()),
         [first, _, ..] => first == "blake3",
         _ => false,
     }
