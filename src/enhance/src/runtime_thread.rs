@@ -49,7 +49,8 @@ enum Event<T> {
 /// Time in which a job must end that was told to because of its memory; chosen.
 const GRACE: Duration = Duration::from_secs(10);
 
-/// Time between two looks at whether the thread is stuck in the job of another caller; chosen.
+/// Time between two looks at whether the thread is stuck in the job of another caller, and longest step in which a limit of time is counted;
+/// chosen.
 const LOOK: Duration = Duration::from_millis(500);
 
 impl RuntimeThread {
@@ -156,27 +157,35 @@ impl RuntimeThread {
     }
 }
 
-/// Waits until a job ends or takes more than its limits.
+/// Waits until a job ends or takes more than its limits. A pause of the process (Ctrl-Z, `scontrol suspend`) counts as one step of the time.
 fn wait_for_end<T>(events: &Receiver<Event<T>>, limits: JobLimits) -> Result<Ended<T>> {
-    let start = Instant::now();
+    let mut left = limits.time;
     loop {
-        let left = limits.time.map(|time| time.saturating_sub(start.elapsed()));
-        let event = match [left, limits.memory.look()].into_iter().flatten().min() {
+        let step = left.map(|left| left.min(LOOK));
+        let step = [step, limits.memory.look()].into_iter().flatten().min();
+        let start = Instant::now();
+        let event = match step {
             None => events.recv().map_err(|_| RecvTimeoutError::Disconnected),
-            Some(time) => events.recv_timeout(time),
+            Some(step) => events.recv_timeout(step),
         };
         match event {
             Ok(Event::Ended(result)) => return Ok(Ended::InTime(result)),
             Ok(Event::Started) | Err(RecvTimeoutError::Disconnected) => return Err(thread_ended()),
             Err(RecvTimeoutError::Timeout) => {}
         }
-        if limits.time.is_some_and(|time| start.elapsed() >= time) {
+        left = left.map(|left| left.saturating_sub(running_time(start.elapsed(), step)));
+        if left.is_some_and(|left| left.is_zero()) {
             return Ok(Ended::Late);
         }
         if limits.memory.is_exceeded() {
             return Ok(Ended::TooLarge);
         }
     }
+}
+
+/// The part of a wait in which the process ran: a wait that took longer than its step was paused.
+fn running_time(waited: Duration, step: Option<Duration>) -> Duration {
+    step.map_or(waited, |step| waited.min(step))
 }
 
 fn thread_ended() -> Error {
@@ -223,6 +232,14 @@ mod tests {
         let slow = || std::thread::sleep(Duration::from_millis(250));
         let small = thread.run_within(limits("1000000"), || {}, slow);
         assert_eq!(small.unwrap(), Ended::InTime(()));
+    }
+
+    #[test]
+    fn a_pause_of_the_process_costs_one_step() {
+        let (hour, step) = (Duration::from_hours(1), Duration::from_millis(500));
+        assert_eq!(running_time(hour, Some(step)), step);
+        assert_eq!(running_time(step / 5, Some(step)), step / 5);
+        assert_eq!(running_time(hour, None), hour);
     }
 
     #[test]
