@@ -65,7 +65,7 @@ struct ImportArgs {
     /// The kind of data set in --src
     #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
     kind: DataSetKind,
-    /// The data set, laid out as https://github.com/darkqa-eval/darkqa-eval/blob/main/src/docs/importing.md shows; repeatable: several folders are joined, each scene with its folder's number
+    /// The data set, laid out as src/docs/importing.md shows; repeatable: several folders are joined, each scene with its folder's number
     /// if two have one of its name
     #[arg(long, value_name = "DIR", required = true, add = Decides::Pixels)]
     src: Vec<PathBuf>,
