@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::alerts::of_runs;
 use super::combine::{Combined, check_comparable, clusters};
-use super::cost::dollars;
+use super::cost::{Charged, PricedRun};
 use super::join::join;
 use crate::error::{Error, Result};
 use crate::report::choice_report::ChoiceReport;
@@ -12,7 +12,6 @@ use crate::runs::stored::StoredRun;
 use crate::sentences::{against_baseline, no_verdict};
 use crate::tables::baseline;
 use crate::text::alert::Alert;
-use crate::types::manifest::RunManifest;
 use crate::types::{ChoiceDetail, TrialRef};
 use darkqa_score::baseline::{BaselineRow, baseline_rows};
 use darkqa_score::cluster::ClusterUnit;
@@ -33,6 +32,41 @@ pub(super) struct Baseline {
     alerts: Vec<Alert>,
 }
 
+/// The cost of each model in each condition, in US dollars. A subject of which no trial states its cost has none.
+#[derive(Default)]
+struct SubjectCosts(BTreeMap<Subject, f64>);
+
+impl SubjectCosts {
+    /// The costs of joined runs, each trial at the prices of the first run that has it.
+    ///
+    /// # Errors
+    /// If the prices in a manifest are broken.
+    fn from_joined(combined: &Combined) -> Result<Self> {
+        let mut costs = Self::default();
+        let mut is_counted = vec![false; combined.trials.len()];
+        for run in &combined.runs {
+            let mut priced = PricedRun::new(&run.manifest)?;
+            for place in run.trials.iter() {
+                if !std::mem::replace(&mut is_counted[place], true) {
+                    let trial = combined.trials.at(place);
+                    let model = combined.models.asked(trial.model());
+                    costs.add(trial, priced.charged(model, trial));
+                }
+            }
+        }
+        Ok(costs)
+    }
+
+    fn add(&mut self, trial: TrialRef<'_>, charged: Option<Charged>) {
+        let parts = charged
+            .into_iter()
+            .flat_map(|charged| [charged.reply, charged.lost]);
+        for dollars in parts.flatten() {
+            *self.0.entry(Subject::from_trial(trial)).or_default() += dollars;
+        }
+    }
+}
+
 impl Baseline {
     /// The new runs, which `combined` joins, against the old one.
     ///
@@ -44,9 +78,7 @@ impl Baseline {
         old: StoredRun<ChoiceDetail>,
     ) -> Result<Self> {
         let name = old.name();
-        let old_manifest = old.manifest.clone();
         let mut runs = new;
-        let new_manifests: Vec<RunManifest> = runs.iter().map(|run| run.manifest.clone()).collect();
         runs.push(old.clone());
         check_comparable(&runs)?;
         // The names of models and conditions tell nothing apart here: a new model is held against the old one of its name.
@@ -75,26 +107,17 @@ impl Baseline {
                 Some((index, grid.find(&old)?))
             });
         let pairs: Vec<(usize, usize)> = pairs.collect();
-        let mut by_subject = BTreeMap::<Subject, Vec<TrialRef<'_>>>::new();
-        for trial in trials.iter() {
-            by_subject
-                .entry(Subject::from_trial(trial))
-                .or_default()
-                .push(trial);
+        let mut costs = SubjectCosts::from_joined(combined)?;
+        let mut run = PricedRun::new(&old.manifest)?;
+        for trial in old_trials.iter() {
+            let marked = trial.model();
+            let model = marked.strip_suffix(&mark("")).unwrap_or(marked);
+            costs.add(trial, run.charged(model, trial));
         }
-        let cost = |index: usize| {
-            let subject = &grid.subjects[index];
-            let (model, manifests) = match subject.model.strip_suffix(&mark("")) {
-                Some(old) => (old, std::slice::from_ref(&old_manifest)),
-                None => (&*subject.model, &*new_manifests),
-            };
-            let trials = by_subject.get(subject).into_iter().flatten().copied();
-            dollars(manifests, combined.models.asked(model), trials)
-                .ok()
-                .flatten()
-        };
         Ok(Self {
-            rows: baseline_rows(&grid, &healths(&grid), &pairs, cost),
+            rows: baseline_rows(&grid, &healths(&grid), &pairs, |index| {
+                costs.0.get(&grid.subjects[index]).copied()
+            }),
             old: name,
             alerts,
         })

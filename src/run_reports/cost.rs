@@ -1,4 +1,4 @@
-//! The cost of the replies of a run: [`cost`], [`dollars`].
+//! The cost of the replies of a run: [`cost`], [`PricedRun`].
 
 use std::collections::HashMap;
 
@@ -12,37 +12,51 @@ use crate::types::manifest::RunManifest;
 use crate::types::{TrialRef, Via};
 use darkqa_score::record::Detail;
 
-/// The cost of a model's trials in US dollars, attempts without a reply included, at the prices of the first of these runs that knows the model;
-/// `None` if none does, or no reply states its tokens.
-///
-/// # Errors
-/// If the prices in a manifest are broken.
-pub(super) fn dollars<'m, 't, D: Detail + 't>(
-    runs: impl IntoIterator<Item = &'m RunManifest>,
-    model: &str,
-    trials: impl Iterator<Item = TrialRef<'t, D>>,
-) -> Result<Option<f64>> {
-    for manifest in runs {
-        let prices = Prices::of_settings(&manifest.settings)?;
-        if let Some(price) = price(&prices, manifest, model) {
-            let charged = trials.flat_map(|trial| {
-                let charged = Charged::new(price, prices.batch, trial);
-                [charged.reply, charged.lost]
-            });
-            let charged: Vec<f64> = charged.flatten().collect();
-            return Ok((!charged.is_empty()).then(|| charged.iter().sum()));
-        }
+/// A run with the prices that it had.
+pub(super) struct PricedRun<'m> {
+    manifest: &'m RunManifest,
+    prices: Prices,
+    /// The prices of the models so far; `None` for a model without a known price.
+    by_model: HashMap<String, Option<Price>>,
+}
+
+impl<'m> PricedRun<'m> {
+    /// The run of a manifest.
+    ///
+    /// # Errors
+    /// If the prices in the manifest are broken.
+    pub(super) fn new(manifest: &'m RunManifest) -> Result<Self> {
+        Ok(Self {
+            manifest,
+            prices: Prices::of_settings(&manifest.settings)?,
+            by_model: HashMap::new(),
+        })
     }
-    Ok(None)
+
+    /// The cost of a trial of the model that the run asked under this name; `None` if its price is not known.
+    pub(super) fn charged<D: Detail>(
+        &mut self,
+        model: &str,
+        trial: TrialRef<'_, D>,
+    ) -> Option<Charged> {
+        let price = if let Some(known) = self.by_model.get(model) {
+            *known
+        } else {
+            let price = price(&self.prices, self.manifest, model);
+            self.by_model.insert(model.to_owned(), price);
+            price
+        };
+        price.map(|price| Charged::new(price, self.prices.batch, trial))
+    }
 }
 
 /// The cost of a trial, in US dollars.
 #[derive(Debug, Clone, Copy)]
-struct Charged {
+pub(super) struct Charged {
     /// `None` without a reply, or if the server did not state its tokens.
-    reply: Option<f64>,
+    pub(super) reply: Option<f64>,
     /// The cost of attempts without a usable reply; `None` if there are none.
-    lost: Option<f64>,
+    pub(super) lost: Option<f64>,
 }
 
 impl Charged {
@@ -85,16 +99,11 @@ pub(super) fn cost<'t, D: Detail + 't>(
     trials: impl Iterator<Item = TrialRef<'t, D>>,
     manifest: &RunManifest,
 ) -> Result<Option<String>> {
-    let prices = Prices::of_settings(&manifest.settings)?;
+    let mut run = PricedRun::new(manifest)?;
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
     let (mut lost_dollars, mut attempts) = (0.0, 0_u32);
-    let mut by_model = HashMap::new();
     for trial in trials.filter(|trial| trial.has_reply() || !trial.lost().is_none()) {
-        let model = trial.model();
-        let price = by_model
-            .entry(model)
-            .or_insert_with(|| price(&prices, manifest, model));
-        let charged = price.map(|price| Charged::new(price, prices.batch, trial));
+        let charged = run.charged(trial.model(), trial);
         match charged.and_then(|charged| charged.reply) {
             Some(cost) => {
                 dollars += cost;
@@ -119,6 +128,6 @@ pub(super) fn cost<'t, D: Detail + 't>(
         0 => String::new(),
         n => format!("; {n} replies without a known price or usage"),
     };
-    let (source, all) = (prices.source(), money(dollars + lost_dollars));
+    let (source, all) = (run.prices.source(), money(dollars + lost_dollars));
     Ok((counted > 0 || attempts > 0).then(|| format!("{all} at {source}{lost}{note}")))
 }

@@ -300,25 +300,38 @@ fn models_that_were_asked_other_questions_are_compared_by_the_shared_ones() {
 #[test]
 fn each_side_of_a_baseline_costs_what_its_run_paid() {
     let scene = Scene::new();
-    for (run, dollars) in [("old", 10), ("new", 30)] {
+    for (run, levels, dollars) in [
+        ("old", "L1,L3", 10),
+        ("new", "L1,L3", 30),
+        ("bright", "L1", 20),
+        ("dark", "L3", 40),
+    ] {
         let prices = format!(
             "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = {{ input = {dollars}, output = {dollars} }}\n"
         );
         scene.bench.file("prices.toml", prices);
-        scene.run("--prices prices.toml", run);
+        scene.run(&format!("--prices prices.toml --levels {levels}"), run);
     }
-    scene
-        .bench
-        .complete(&words("report new --baseline old --out out"));
-    let rows = scene.csv("out/baseline.csv");
-    let cost = |row: &[String], name: &str| {
-        let place = rows[0].iter().position(|head| head == name).unwrap();
-        row[place].parse::<f64>().unwrap()
+    let has_ratio = |line: &str, wanted: fn(&str) -> f64| {
+        scene.bench.complete(&words(line));
+        let rows = scene.csv("out/baseline.csv");
+        let place = |name: &str| rows[0].iter().position(|head| head == name).unwrap();
+        let cost = |row: &[String], name: &str| row[place(name)].parse::<f64>().unwrap();
+        assert!(rows.len() > 2, "{rows:?}");
+        for row in &rows[1..] {
+            let (old, new) = (cost(row, "cost_old"), cost(row, "cost_new"));
+            let ratio = wanted(&row[place("condition")]);
+            assert!(old > 0.0 && (new / old - ratio).abs() < 1e-9, "{row:?}");
+        }
     };
-    for row in &rows[1..] {
-        let (old, new) = (cost(row, "cost_old"), cost(row, "cost_new"));
-        assert!(old > 0.0 && (new / old - 3.0).abs() < 1e-9, "{row:?}");
-    }
+    has_ratio("report new --baseline old --out out", |_| 3.0);
+    has_ratio("report bright dark --baseline old --out out", |condition| {
+        if condition.starts_with("L1") {
+            2.0
+        } else {
+            4.0
+        }
+    });
 }
 
 #[test]
