@@ -4,6 +4,7 @@ use super::sentence::{Numbers, Sentence, Tone};
 use darkqa_score::baseline::BaselineRow;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparison::MIN_PAIRS;
+use darkqa_score::estimate::largest;
 use darkqa_score::paired::POWER;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::judged;
@@ -68,7 +69,7 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
 
 /// The sentence about the conditions of a model that have one verdict; `None` if there are none.
 fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<Sentence> {
-    let largest = largest(rows)?;
+    let largest = largest(rows, |row| row.paired.difference)?;
     let mut numbers = Numbers::of(unit);
     let verdict = largest.significance;
     let word = if verdict == Significance::Worse {
@@ -99,7 +100,7 @@ fn nothing_shown(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
     let possible: Vec<&BaselineRow> = possible
         .filter(|row| row.significance.is_possible())
         .collect();
-    let Some(largest) = largest(&possible) else {
+    let Some(largest) = largest(&possible, |row| row.paired.difference) else {
         let text = format!("No verdict against {old} is possible.");
         let detail = too_few(rows, &mut numbers);
         return numbers.sentence("baseline", Tone::Note, text, detail);
@@ -138,18 +139,6 @@ fn detectable(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
         format!("{least} points somewhere, {most} everywhere")
     };
     format!("; a true loss is detected with {power} % probability from {range}")
-}
-
-/// The row with the largest difference in either direction; of several, the first.
-fn largest<'r>(rows: &[&'r BaselineRow]) -> Option<&'r BaselineRow> {
-    let size = |row: &BaselineRow| row.paired.difference.value.abs();
-    rows.iter().copied().reduce(|largest, next| {
-        if size(next) > size(largest) {
-            next
-        } else {
-            largest
-        }
-    })
 }
 
 /// The first conditions by name, and how many there are besides.

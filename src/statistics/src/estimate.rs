@@ -30,6 +30,19 @@ pub struct Estimate {
     pub n: usize,
 }
 
+/// The item whose estimate is furthest from 0 in either direction; of several, the first. `None` of none.
+#[must_use]
+pub fn largest<'i, T>(items: &[&'i T], estimate: impl Fn(&T) -> Estimate) -> Option<&'i T> {
+    let size = |item: &T| estimate(item).value.abs();
+    items.iter().copied().reduce(|largest, next| {
+        if size(next) > size(largest) {
+            next
+        } else {
+            largest
+        }
+    })
+}
+
 impl Estimate {
     /// Share of `right` among `n` independent trials, with Wilson's score interval (Wilson 1927, J. Am. Stat. Assoc.
     /// 22:209). `None` without trials.

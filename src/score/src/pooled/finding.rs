@@ -2,7 +2,7 @@
 
 use crate::choice::ReadingMode;
 use crate::claim::{Claim, ParsedFinding};
-use crate::estimate::Estimate;
+use crate::estimate::{Estimate, largest};
 use crate::pooled_kind::PooledKind;
 use crate::significance::{Significance, SwapMethod};
 use darkqa_ground::types::degradation::Kind;
@@ -73,14 +73,7 @@ impl PooledFinding {
     /// The finding with the largest difference in either direction; of several, the first. `None` of none.
     #[must_use]
     pub fn largest<'f>(levels: &[&'f Self]) -> Option<&'f Self> {
-        let size = |finding: &Self| finding.strict.difference.value.abs();
-        levels.iter().copied().reduce(|largest, next| {
-            if size(next) > size(largest) {
-                next
-            } else {
-                largest
-            }
-        })
+        largest(levels, |finding| finding.strict.difference)
     }
 
     /// The statement that sentences may make.
