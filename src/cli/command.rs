@@ -282,17 +282,18 @@ pub(super) fn command() -> clap::Command {
     first_heading_first(root)
 }
 
+/// The command and those in it, with the short form of each flag that has one.
 pub(super) fn with_short_forms(command: clap::Command) -> clap::Command {
-    let with_short = |arg: Arg| {
-        let forms = SHORT_FORMS.iter();
-        let mut form = forms.filter(|(long, _)| arg.get_long() == Some(long));
-        match form.next() {
-            Some((_, short)) => arg.short(*short),
-            None => arg,
-        }
-    };
     command
-        .mut_args(with_short)
+        .mut_args(|arg| {
+            match SHORT_FORMS
+                .iter()
+                .find(|(long, _)| arg.get_long() == Some(long))
+            {
+                Some((_, short)) => arg.short(*short),
+                None => arg,
+            }
+        })
         .mut_subcommands(with_short_forms)
 }
 
@@ -315,11 +316,14 @@ fn on_evaluation(command: clap::Command, shared: &[Arg]) -> clap::Command {
 /// The command with the flags under [`FIRST_HEADING`] first: help lists headings in the order of their flags, and a flag that is changed
 /// moves to the end.
 fn first_heading_first(command: clap::Command) -> clap::Command {
-    let others = command.get_arguments();
-    let others = others.filter(|arg| arg.get_help_heading() != Some(FIRST_HEADING));
-    let others: Vec<Id> = others.map(|arg| arg.get_id().clone()).collect();
-    let others = others.into_iter();
-    others.fold(command, |command, id| command.mut_arg(id, |arg| arg))
+    let others: Vec<Id> = command
+        .get_arguments()
+        .filter(|arg| arg.get_help_heading() != Some(FIRST_HEADING))
+        .map(|arg| arg.get_id().clone())
+        .collect();
+    others
+        .into_iter()
+        .fold(command, |command, id| command.mut_arg(id, |arg| arg))
 }
 
 fn marked(command: clap::Command) -> clap::Command {

@@ -154,10 +154,7 @@ fn completed(arg: &Arg) -> Arg {
         Some(long) => completed.long(lasting(long)),
         None => completed,
     };
-    let completed = match arg.get_short() {
-        Some(short) => completed.short(short),
-        None => completed,
-    };
+    let completed = completed.short(arg.get_short());
     if !arg.get_action().takes_values() {
         return completed;
     }

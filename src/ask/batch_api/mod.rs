@@ -33,7 +33,7 @@ const SLOWEST: u64 = 50_000;
 /// The most pages of a list that are read; chosen: 10,000 files or batches.
 const MOST_PAGES: usize = 100;
 
-/// The result of a call; `attempts`, `reach` and what depends on them are of no use in its error.
+/// The result of a call. Callers use the message, status, wait, effect and quota of its error alone.
 pub(crate) type ApiResult<T> = Result<T, AskError>;
 
 /// A server with files and batches.

@@ -257,7 +257,7 @@ struct EnhancedOrigin {
     frame: String,
     /// The digest of the image that was enhanced.
     source: String,
-    /// What reading the file did besides taking its codes; no fields if nothing.
+    /// Adjustments of the image while its file was read; without fields if there were none.
     #[serde(flatten)]
     read: InputNote,
     /// The digest of the model with its sidecar, and the sizes it takes, by flag.
