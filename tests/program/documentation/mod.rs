@@ -3,9 +3,11 @@
 //! A block with the fence `sh` is run, one with `sh no-run` is only parsed: it needs large data, another machine or an installer.
 //! All blocks of a page are run by one shell in an empty folder, with a mock endpoint, which has batches, at `OPENAI_BASE_URL`, few and small rooms
 //! where no data are named, and the folder `models` at `$MODELS`. A comment `<!-- test: … -->` is a command that readers do not
-//! see. A block with the fence `text` shows what commands of its page print; `text no-run` shows what others print.
+//! see. A block with the fence `text` shows what commands of its page print, `text first-command` what the first command of the README
+//! prints, digit for digit; `text no-run` shows what others print.
 
 mod faq;
+mod first_command;
 mod page;
 mod shell;
 

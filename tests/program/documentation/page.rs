@@ -32,6 +32,8 @@ pub(crate) enum BlockKind {
     ParseOnly,
     /// `text`: lines that commands of the page print.
     Output,
+    /// `text first-command`: lines that the first command of the README prints, or the full report on its run.
+    FirstCommand,
     Other,
 }
 
@@ -179,6 +181,7 @@ impl BlockKind {
             "sh" => Self::Run,
             "sh no-run" => Self::ParseOnly,
             "text" => Self::Output,
+            "text first-command" => Self::FirstCommand,
             _ => Self::Other,
         }
     }
