@@ -144,6 +144,15 @@ fn names_and_widths_are_the_readers() {
     assert!(svg.find(">Short<") < svg.find(">m<"));
     let enhancers = fs::read_to_string(scene.bench.path("out/enhancers.svg")).unwrap();
     assert!(enhancers.contains(">Brighter</text>") && !enhancers.contains(">one<"));
+    // The sheet of a paper has its means over the other models.
+    let line = "figures run --out sheet --format svg --only paper";
+    scene.bench.complete(&words(line));
+    let mean = fs::read_to_string(scene.bench.path("sheet/paper.svg")).unwrap();
+    assert!(mean.contains("(b) mean of 2 models"), "{mean}");
+    let line = "figures run --out beside --format svg --only paper --reference script:m.jsonl";
+    scene.bench.complete(&words(line));
+    let beside = fs::read_to_string(scene.bench.path("beside/paper.svg")).unwrap();
+    assert!(beside.contains(&format!("(b) {LONG}, raw")), "{beside}");
     // Words of others' files are text in an SVG, never marks.
     let line = "figures run --out odd --format svg --only accuracy --label";
     let label = "script:m.jsonl=<b>&\"";

@@ -19,7 +19,7 @@ use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::{CHANCE, Subject, judged};
+use darkqa_score::subject::{CHANCE, Subject, pooled_models};
 
 pub(crate) use names::{KnownNames, Names};
 pub(crate) use overview::{OverviewPanels, overview};
@@ -184,12 +184,17 @@ impl<'a> Overview<'a> {
         lines.collect()
     }
 
-    /// The models over which a mean is taken: without people and the built-in models, if there are others.
+    /// The models over which means are taken: without people, and without built-in models and the upper reference if there are others.
     fn averaged_models(&self) -> Vec<&'a str> {
         let listing = &self.findings.grid.listing;
-        let judged = judged(listing.without_people(self.models.iter().copied()));
+        let black = self.names.black.as_deref();
         let models = self.models.iter().copied();
-        models.filter(|model| judged.contains(model)).collect()
+        let others = models.clone().filter(|model| Some(*model) != black);
+        let mut averaged = pooled_models(listing.without_people(others));
+        if averaged.is_empty() {
+            averaged = pooled_models(listing.without_people(models.clone()));
+        }
+        models.filter(|model| averaged.contains(model)).collect()
     }
 
     fn style(&self, model: &str) -> LineStyle {

@@ -7,7 +7,7 @@ use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::{CHANCE, pooled_models};
+use darkqa_score::subject::CHANCE;
 
 /// A chart with its caption, or the reason why there is none.
 pub(crate) type PanelChart = Result<(String, Chart), &'static str>;
@@ -39,7 +39,7 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
     });
     let variants: Vec<KindReading> = overview.tested_variants();
     let variants: Vec<&KindReading> = variants.iter().filter(|of| of_light(of)).collect();
-    let models = overview.pooled();
+    let models = overview.averaged_models();
     let by_model = variant.as_ref().ok_or("no dark image was asked");
     let by_model = by_model.map(|variant| overview.each_model(variant));
     let by_variant = match variants.len() {
@@ -73,14 +73,6 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
 }
 
 impl Overview<'_> {
-    /// The models over which the means of the sheet are.
-    fn pooled(&self) -> Vec<&str> {
-        let listing = &self.findings.grid.listing;
-        let pooled = pooled_models(listing.without_people(self.models.iter().copied()));
-        let models = self.models.iter().copied();
-        models.filter(|model| pooled.contains(model)).collect()
-    }
-
     fn one(title: String, lines: Vec<PlotLine>) -> Chart {
         Chart {
             measure: ACCURACY,
