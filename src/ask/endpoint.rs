@@ -32,6 +32,10 @@ const MAX_DELAY: Duration = Duration::from_secs(30);
 /// The longest time for the comparison of replicas before the first request; chosen.
 const COMPARING: Duration = Duration::from_secs(3);
 
+/// The time without an accepted request after which the user is told that the run waits; at most half of the patience. Chosen: pauses
+/// of vendors' limits per minute are mostly shorter.
+const LONG_REFUSAL: Duration = Duration::from_secs(20);
+
 /// A server: one replica, or several that serve the same models.
 ///
 /// With several, each request goes to the one that has the fewest in flight, and among nearly equal ones to the same for the same
@@ -48,6 +52,8 @@ pub struct Endpoint {
     closing: watch::Sender<bool>,
     /// Whether a request had a reply, or it was said that there is no connection.
     is_known: AtomicBool,
+    /// Whether the user was told that the endpoint has turned all requests away since its last reply.
+    is_refusal_told: AtomicBool,
 }
 
 impl Endpoint {
@@ -89,6 +95,7 @@ impl Endpoint {
             compared: Mutex::default(),
             closing: watch::Sender::new(false),
             is_known: AtomicBool::new(false),
+            is_refusal_told: AtomicBool::new(false),
         })
     }
 
@@ -216,6 +223,7 @@ impl Endpoint {
             let (failed, effect) = match sent {
                 Ok(reply) => {
                     self.is_known.store(true, Ordering::Relaxed);
+                    self.is_refusal_told.store(false, Ordering::Relaxed);
                     return Ok(Reply {
                         attempts,
                         lost,
@@ -247,6 +255,9 @@ impl Endpoint {
                 warn!(
                     "{problem}; trying again. Is a server running there? --base-url names the address"
                 );
+            }
+            if matches!(failed.again, Again::WhenTaken) {
+                self.tell_refusal(request.model, problem);
             }
             debug!(endpoint = %base, ?delay, problem, "trying again");
             self.rest(delay).await;
@@ -390,6 +401,21 @@ impl Endpoint {
     fn refused_for(&self, model: ModelNumber) -> Duration {
         let times = self.taking(model).map(|replica| replica.gate.refused_for());
         times.min().unwrap_or_default()
+    }
+
+    /// Warns once if no request has been accepted for a while: the run goes on, and would otherwise wait without a word.
+    fn tell_refusal(&self, model: ModelNumber, problem: &str) {
+        let patience = self.sending.patience;
+        let refused = self.refused_for(model);
+        if refused >= LONG_REFUSAL.min(patience / 2)
+            && !self.is_refusal_told.swap(true, Ordering::Relaxed)
+        {
+            warn!(
+                "{problem}; waiting: no request was accepted for {:.0} s, and the run stops after {:.0} s (--retries patience)",
+                refused.as_secs_f64(),
+                patience.as_secs_f64()
+            );
+        }
     }
 
     /// The failure of a request that was turned away for too long: every other one is, too.

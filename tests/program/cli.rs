@@ -1,9 +1,11 @@
 //! The command line as a contract: its help, and one clear line for each wrong word.
 
 use std::collections::BTreeSet;
+use std::fs;
 
+use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::onnx;
-use crate::support::run::{Bench, called, words};
+use crate::support::run::{Bench, called, model_args, words};
 use crate::support::table::check_rows;
 use serde_json::json;
 
@@ -224,6 +226,34 @@ fn an_address_without_a_server_is_said_at_the_first_try() {
             && line.ends_with("Is a server running there? --base-url names the address")
     });
     assert_eq!(warned.count(), 1, "{called:?}");
+}
+
+/// A server that turns requests away is waited for, half an hour by default: the user learns why nothing happens.
+#[test]
+fn a_server_that_takes_nothing_is_said_while_the_run_waits() {
+    let away = || Answer::error(429, "x", "slow down").header("retry-after", "0.1");
+    let mut answers: Vec<Answer> = (0..8).map(|_| away()).collect();
+    answers.push(Answer::text("A"));
+    let mock = MockEndpoint::start(answers);
+    let bench = Bench::with_questions(1);
+    let line = "--data set.jsonl --levels L0 --out run --retries patience=";
+    let waited = |patience: &str| {
+        let called = bench.call(&model_args(&mock.base_url(), &format!("{line}{patience}")));
+        let lines = called
+            .stderr
+            .lines()
+            .filter(|line| line.contains("waiting: "));
+        (called.code, lines.map(str::to_owned).collect::<Vec<_>>())
+    };
+    let (code, told) = waited("1");
+    assert_eq!((code, told.len()), (Some(0), 1), "{told:?}");
+    assert!(
+        told[0].contains("slow down") && told[0].ends_with("stops after 1 s (--retries patience)"),
+        "{told:?}"
+    );
+    // Without a refusal nothing is told.
+    fs::remove_dir_all(bench.path("run")).unwrap();
+    assert_eq!(waited("1"), (Some(0), Vec::new()));
 }
 
 #[test]
