@@ -91,10 +91,12 @@ fn of_set(set: PhotographedSet) -> Option<Alert> {
     notice.map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
-/// Too few clusters for good intervals, questions about one frame alone, and frames without the scenes that their names suggest.
+/// Too few clusters for good intervals (none, without replies, needs no remark), questions about one frame alone, and frames without the scenes that their names suggest.
 fn of_clusters(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -> Vec<Alert> {
     let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
-    let few = if clusters < MIN_SCENES {
+    let few = if clusters == 0 {
+        None
+    } else if clusters < MIN_SCENES {
         Some(format!(
             "Only {} ({MIN_SCENES} are needed): intervals and tests are rough.",
             counted(clusters, &unit.to_string())
