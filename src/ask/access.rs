@@ -51,7 +51,7 @@ impl Access {
     #[must_use]
     pub fn new(base: BaseUrl) -> Self {
         Self {
-            vendor: Vendor::of(base.host()),
+            vendor: Vendor::at_host(base.host()),
             base,
             key: None,
             key_header: KeyHeader::Auto,

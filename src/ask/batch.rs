@@ -89,7 +89,7 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
         })
     };
     if let Some(error) = error {
-        let complaint = Complaint::of_error(error);
+        let complaint = Complaint::from_error(error);
         let kind = if complaint.has_code(&["batch_expired", "batch_cancelled"]) {
             FailureKind::Timeout
         } else {
@@ -111,7 +111,7 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
             UnreadableReply::Other(found) => fail(FailureKind::Response, &found.what),
         }),
         Some(code) => {
-            let complaint = Complaint::of_body(&text);
+            let complaint = Complaint::from_body(&text);
             let kind = match code {
                 429 => FailureKind::RateLimit,
                 // Some servers write 0 if they could not send the request on.

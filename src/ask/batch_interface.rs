@@ -24,7 +24,7 @@ impl BatchInterface {
     /// The Batch API at an address, as messages show it.
     pub(crate) fn at(base: &str) -> Self {
         let base = base.parse::<BaseUrl>().ok();
-        let vendor = base.and_then(|base| Vendor::of(base.host()));
+        let vendor = base.and_then(|base| Vendor::at_host(base.host()));
         Self { vendor }
     }
 

@@ -41,16 +41,16 @@ const DAILY: [&str; 6] = ["(rpd)", "(tpd)", "perday", "per day", "per-day", "dai
 impl Complaint {
     /// The error at the top level of a body, if there is one: `error` as an object or text, or the flat shapes of vLLM, FastAPI
     /// and problem+json.
-    pub(super) fn of(body: &Value) -> Option<Self> {
+    pub(super) fn from_json(body: &Value) -> Option<Self> {
         // Gemini sends a list with one error.
         if let Value::Array(items) = body {
-            return items.first().and_then(Self::of);
+            return items.first().and_then(Self::from_json);
         }
         let found = Self::in_error(body).or_else(|| {
             ["message", "detail", "title"]
                 .iter()
                 .any(|field| body.get(field).is_some_and(is_filled))
-                .then(|| Self::of_error(body))
+                .then(|| Self::from_error(body))
         });
         found.map(|found| Self {
             // Hugging Face states it beside the error.
@@ -62,11 +62,11 @@ impl Complaint {
     /// The error in the field `error`; flat shapes are not read.
     pub(super) fn in_error(body: &Value) -> Option<Self> {
         let error = body.get("error").filter(|error| is_filled(error));
-        error.map(Self::of_error)
+        error.map(Self::from_error)
     }
 
     /// The error in the value of a field `error`.
-    pub(super) fn of_error(error: &Value) -> Self {
+    pub(super) fn from_error(error: &Value) -> Self {
         Self::nested(error, MOST_NESTED)
     }
 
@@ -140,12 +140,15 @@ impl Complaint {
     }
 
     /// The error in the body of a refused request: JSON, an HTML page or plain text.
-    pub(super) fn of_body(body: &str) -> Self {
+    pub(super) fn from_body(body: &str) -> Self {
         let parsed = parse(body).ok();
-        parsed.as_ref().and_then(Self::of).unwrap_or_else(|| Self {
-            message: page_title(body).unwrap_or_else(|| shortened(body.trim().to_owned())),
-            ..Self::default()
-        })
+        parsed
+            .as_ref()
+            .and_then(Self::from_json)
+            .unwrap_or_else(|| Self {
+                message: page_title(body).unwrap_or_else(|| shortened(body.trim().to_owned())),
+                ..Self::default()
+            })
     }
 
     /// Whether the code or kind is one of these.
@@ -382,7 +385,7 @@ mod tests {
             (" upstream\n", "upstream", None),
             ("", "", None),
         ] {
-            let complaint = Complaint::of_body(body);
+            let complaint = Complaint::from_body(body);
             assert_eq!(complaint.message, message, "{body}");
             assert_eq!(complaint.code.as_deref(), code, "{body}");
         }
@@ -430,7 +433,7 @@ mod tests {
                 None,
             ),
         ] {
-            let complaint = Complaint::of_body(body);
+            let complaint = Complaint::from_body(body);
             assert_eq!(complaint.message, message, "{body}");
             assert_eq!(complaint.code.as_deref(), code, "{body}");
             assert_eq!(complaint.param.as_deref(), param, "{body}");
@@ -460,7 +463,7 @@ mod tests {
             ),
             (r#"{"error":{"message":"slow down"}}"#.to_owned(), None, false),
         ] {
-            let complaint = Complaint::of_body(&body);
+            let complaint = Complaint::from_body(&body);
             let wait = complaint.wait.map(|wait| wait.as_secs_f64());
             assert_eq!(wait, seconds, "{body}");
             assert_eq!(complaint.is_daily(), is_daily, "{body}");
@@ -477,7 +480,7 @@ mod tests {
             r"[]",
         ] {
             assert_eq!(
-                Complaint::of(&serde_json::from_str(body).unwrap()),
+                Complaint::from_json(&serde_json::from_str(body).unwrap()),
                 None,
                 "{body}"
             );

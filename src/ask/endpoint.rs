@@ -62,14 +62,14 @@ impl Endpoint {
     /// # Errors
     /// If a key would be sent unencrypted to another machine, or if two keys are set.
     pub fn open(access: Access, sending: Sending) -> Result<Self> {
-        Self::of(vec![access], sending)
+        Self::from_addresses(vec![access], sending)
     }
 
     /// An endpoint of replicas at these addresses; nothing is sent yet. The user's limits hold for all of them together.
     ///
     /// # Errors
     /// As [`Endpoint::open`], or if there is no address.
-    pub fn of(addresses: Vec<Access>, sending: Sending) -> Result<Self> {
+    pub fn from_addresses(addresses: Vec<Access>, sending: Sending) -> Result<Self> {
         let count = addresses.len();
         let each = if count > 1 {
             Sending {

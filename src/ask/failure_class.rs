@@ -59,14 +59,14 @@ impl AskError {
         sent: SentFields<'_>,
     ) -> Self {
         if let Some(wanted) = other_wire(complaint, wire).filter(|_| (400..500).contains(&status)) {
-            return Self::of_wire(wanted);
+            return Self::from_wire(wanted);
         }
         let no_credit = complaint.has_code(&NO_CREDIT)
             || (matches!(status, 400 | 402 | 403 | 429)
                 && complaint.mentions_any(&NO_CREDIT_WORDS));
         // OpenAI forbids probabilities by a status that else is about the key.
         if status == 403
-            && let Some(failed) = Self::of_refused_field(complaint, wire, sent)
+            && let Some(failed) = Self::from_refused_field(complaint, wire, sent)
         {
             return failed;
         }
@@ -125,7 +125,7 @@ impl AskError {
             // 424 is the status of Text Generation Inference for a generation that failed, 498 Groq's for no capacity, 499 nginx's
             // for a connection that the client closed.
             409 | 424 | 498 | 499 | 500.. => Self::transient(FailureKind::Server),
-            _ => Self::of_field(complaint, &wire.fields(sent)),
+            _ => Self::from_field(complaint, &wire.fields(sent)),
         }
     }
 
@@ -146,7 +146,7 @@ impl AskError {
     }
 
     /// The failure of a request that the server takes through another wire alone.
-    fn of_wire(wanted: Wire) -> Self {
+    fn from_wire(wanted: Wire) -> Self {
         let hint = match wanted {
             Wire::Responses => "ask the model through the Responses API: --request wire=responses",
             _ => "ask for a stream: --request wire=chat-stream",
@@ -158,15 +158,15 @@ impl AskError {
     }
 
     /// The failure of a request that was refused for a field that the program can send in another way; `None` if it was not.
-    fn of_refused_field(complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
-        Some(Self::of_field(complaint, &wire.fields(sent)))
+    fn from_refused_field(complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
+        Some(Self::from_field(complaint, &wire.fields(sent)))
             .filter(|failed| failed.refused_field.is_some())
     }
 
     /// The failure of a request that may have been refused for one of its fields. If the server names the field, every other
     /// request with it fails too, and so does every request if the server refuses what is not sent any more. If only the text mentions it, the
     /// cause may be this request alone.
-    fn of_field(complaint: &Complaint, fields: &[RequestField<'_>]) -> Self {
+    fn from_field(complaint: &Complaint, fields: &[RequestField<'_>]) -> Self {
         let with = |state| fields.iter().filter(move |field| field.state == state);
         let mut withdrawn = with(FieldState::Withdrawn);
         let mut by_param = with(FieldState::Sent).filter(|field| field.is_param(complaint));

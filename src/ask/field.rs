@@ -95,7 +95,7 @@ impl RequestFields {
     }
 
     /// The fields of the switch for thinking, as a server may refuse them.
-    pub(super) fn of_switch<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
+    pub(super) fn switched<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
         let names = self.switch().into_iter().flat_map(Map::keys);
         names.map(|name| RequestField {
             name,

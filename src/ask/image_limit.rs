@@ -57,7 +57,7 @@ impl ImageLimit {
 
     /// The limit of an endpoint.
     #[must_use]
-    pub(crate) fn of(access: &Access) -> Self {
+    pub(crate) fn from_access(access: &Access) -> Self {
         let Some(vendor) = access.vendor else {
             return Self::UNKNOWN;
         };
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn limits_are_known_by_host() {
-        let of = |base: &str| ImageLimit::of(&Access::new(base.parse().unwrap()));
+        let of = |base: &str| ImageLimit::from_access(&Access::new(base.parse().unwrap()));
         assert_eq!(of("https://api.anthropic.com/v1").side, Some(8000));
         assert_eq!(of("https://r.openai.azure.com/openai/v1").origin, "Azure");
         assert_eq!(of("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn an_image_beyond_the_limit_is_an_error_with_a_remedy() {
-        let limit = ImageLimit::of(&Access::new(
+        let limit = ImageLimit::from_access(&Access::new(
             "https://api.anthropic.com/v1".parse().unwrap(),
         ));
         assert!(limit.check(&image(7_500_000, 8000)).is_ok());

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 /// # Errors
 /// Names the vendor of the key and the address, and never the key.
 pub(super) fn check_owner(key: &Secret, base: &BaseUrl, vendors: VendorTable) -> Result<()> {
-    match vendors.of_key(key.expose()) {
+    match vendors.by_key(key.expose()) {
         Some(owner) if !base.is_loopback() && !owner.is_of(base.host()) => Err(Error::usage(
             "--base-url",
             format_args!(

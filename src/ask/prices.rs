@@ -31,7 +31,7 @@ pub(crate) struct Price {
 impl Price {
     /// The price in dollars of these numbers of prompt and reply tokens.
     #[must_use]
-    pub(crate) fn of(&self, prompt: f64, reply: f64) -> f64 {
+    pub(crate) fn cost(&self, prompt: f64, reply: f64) -> f64 {
         (prompt * self.input + reply * self.output) / 1e6
     }
 
@@ -49,7 +49,7 @@ impl Price {
         let prompt = tokens(usage.prompt_tokens);
         let cached = tokens(usage.cached_tokens).min(prompt);
         let saved = self.input - self.cached_input.unwrap_or(self.input);
-        self.of(prompt, tokens(usage.completion_tokens)) - cached * saved / 1e6
+        self.cost(prompt, tokens(usage.completion_tokens)) - cached * saved / 1e6
     }
 }
 
@@ -123,7 +123,7 @@ impl Prices {
     ///
     /// # Errors
     /// If the table in the settings is broken.
-    pub(crate) fn of_settings(settings: &BTreeMap<String, Value>) -> Result<Self> {
+    pub(crate) fn from_settings(settings: &BTreeMap<String, Value>) -> Result<Self> {
         let Some(own) = settings.get(Self::SETTING) else {
             return Self::built_in();
         };
@@ -148,7 +148,7 @@ impl Prices {
     /// The price of a model: by its name, by the name after a provider's (`openai/gpt-4o`), or by the name without a version
     /// (`gpt-4o-2024-08-06`). `None` if the table has none of these.
     #[must_use]
-    pub(crate) fn of(&self, model: &str) -> Option<Price> {
+    pub(crate) fn find(&self, model: &str) -> Option<Price> {
         let bare = model.rsplit('/').next().unwrap_or(model);
         [model, bare].into_iter().find_map(|name| {
             let exact = self.models.get(name).copied();
@@ -185,7 +185,7 @@ mod tests {
     #[test]
     fn a_version_has_the_price_of_its_model() {
         let prices = Prices::built_in().unwrap();
-        let input = |model| prices.of(model).map(|price| price.input);
+        let input = |model| prices.find(model).map(|price| price.input);
         assert_eq!(input("gpt-4o"), Some(2.5));
         assert_eq!(input("gpt-4o-2024-08-06"), Some(2.5));
         assert_eq!(input("gpt-4-0613"), Some(30.0));
@@ -195,7 +195,7 @@ mod tests {
         for unknown in ["gpt-4o-audio", "gpt-3", "my-model", "gpt-4o-"] {
             assert_eq!(input(unknown), None, "{unknown}");
         }
-        let price = prices.of("gpt-4o").unwrap();
+        let price = prices.find("gpt-4o").unwrap();
         let usage = Usage {
             prompt_tokens: Some(1_000_000),
             completion_tokens: Some(100_000),
@@ -210,7 +210,7 @@ mod tests {
         };
         assert!((price.charged(cached(500_000)) - 2.875).abs() < 1e-12);
         assert!((price.charged(cached(u64::MAX)) - 2.25).abs() < 1e-12);
-        let opus = prices.of("claude-opus-4-8").unwrap();
+        let opus = prices.find("claude-opus-4-8").unwrap();
         assert!((opus.charged(usage) - opus.charged(cached(9))).abs() < 1e-12);
     }
 
@@ -222,7 +222,7 @@ mod tests {
             Prices::load(file.path())
         };
         let good = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\n\"m/x\" = { input = 1, output = 2, image-tokens = 900 }\n";
-        let price = load(good).unwrap().of("m/x").unwrap();
+        let price = load(good).unwrap().find("m/x").unwrap();
         assert_eq!((price.input, price.image_tokens), (1.0, Some(900)));
         for wrong in [
             "",

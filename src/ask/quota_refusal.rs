@@ -14,7 +14,7 @@ pub(crate) struct QuotaRefusal {
 
 impl QuotaRefusal {
     /// The refusal in an error; `None` if the error is about something else.
-    pub(super) fn of(complaint: &Complaint, scrub: &Scrub) -> Option<Self> {
+    pub(super) fn from_complaint(complaint: &Complaint, scrub: &Scrub) -> Option<Self> {
         let is_quota = complaint.has_code(&["token_limit_exceeded"])
             || complaint.mentions_any(&["enqueued token"]);
         is_quota.then(|| Self {
@@ -42,7 +42,7 @@ mod tests {
     fn the_limit_of_waiting_tokens_is_read_from_words() {
         let of = |code: Option<&str>, message: &str| {
             let error = serde_json::json!({"code": code, "message": message});
-            QuotaRefusal::of(&Complaint::of_error(&error), &Scrub::default())
+            QuotaRefusal::from_complaint(&Complaint::from_error(&error), &Scrub::default())
         };
         let words = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
                      once some in_progress batches have been completed.";

@@ -133,7 +133,7 @@ impl AccessArgs {
                 let problem = format_args!("{base} is named twice");
                 return Err(Error::usage("--base-url", problem));
             }
-            let vendor = vendors.of(base.host());
+            let vendor = vendors.at_host(base.host());
             vendor.map_or(Ok(()), |vendor| vendor.check_address(&base))?;
             let key = self.key(&base, vendor)?;
             match &key {
@@ -260,7 +260,7 @@ fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'stati
 
 /// The variables of the tools of a host's vendor; none if the built-in table does not have the host.
 pub(crate) fn own_variables(host: &str) -> Vec<&'static str> {
-    let vendors = Vendor::of(host).into_iter();
+    let vendors = Vendor::at_host(host).into_iter();
     let variables = vendors.flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()));
     variables.map(String::as_str).collect()
 }

@@ -104,13 +104,13 @@ static VENDORS: LazyLock<Vendors> = LazyLock::new(|| {
 
 impl Vendor {
     /// The vendor of a host; `None` if the host is not in the table.
-    pub(crate) fn of(host: &str) -> Option<&'static Self> {
+    pub(crate) fn at_host(host: &str) -> Option<&'static Self> {
         let mut vendors = VENDORS.vendor.iter();
         vendors.find(|vendor| vendor.is_of(host))
     }
 
     /// The vendor of the built-in table whose keys look like this one; `None` if keys of several do, or that is not known.
-    pub(super) fn of_key(key: &str) -> Option<&'static Self> {
+    pub(super) fn by_key(key: &str) -> Option<&'static Self> {
         let mut vendors = VENDORS.vendor.iter();
         vendors.find(|vendor| vendor.has_key(key))
     }
@@ -220,7 +220,7 @@ mod tests {
     use super::*;
 
     fn name(host: &str) -> Option<&'static str> {
-        Vendor::of(host).map(|vendor| &*vendor.name)
+        Vendor::at_host(host).map(|vendor| &*vendor.name)
     }
 
     #[test]
@@ -243,7 +243,7 @@ mod tests {
 
     #[test]
     fn a_key_tells_its_vendor() {
-        let of = |key: &str| Vendor::of_key(key).map(|vendor| &*vendor.name);
+        let of = |key: &str| Vendor::by_key(key).map(|vendor| &*vendor.name);
         assert_eq!(of("sk-ant-api03-x"), Some("Anthropic"));
         assert_eq!(of("sk-proj-x"), Some("OpenAI"));
         assert_eq!(of("sk-abcT3BlbkFJdef"), Some("OpenAI"));
@@ -255,7 +255,7 @@ mod tests {
 
     #[test]
     fn the_token_field_depends_on_the_host() {
-        let at = |host, field| Vendor::token_field_at(Vendor::of(host), field);
+        let at = |host, field| Vendor::token_field_at(Vendor::at_host(host), field);
         let auto = TokenField::Auto;
         assert_eq!(at("api.openai.com", auto), TokenField::MaxCompletionTokens);
         assert_eq!(at("localhost", auto), TokenField::MaxTokens);
@@ -267,7 +267,7 @@ mod tests {
     fn an_address_needs_the_path_that_its_vendor_has() {
         let check = |text: &str| {
             let base: BaseUrl = text.parse().unwrap();
-            Vendor::of(base.host()).map(|vendor| vendor.check_address(&base))
+            Vendor::at_host(base.host()).map(|vendor| vendor.check_address(&base))
         };
         let bare = "https://r.openai.azure.com/?api-version=2024-10-21";
         let error = check(bare).unwrap().unwrap_err().to_string();

@@ -62,17 +62,17 @@ impl VendorTable {
     }
 
     /// The vendor of a host: of the file, else of the built-in table; `None` if neither has it.
-    pub(super) fn of(self, host: &str) -> Option<&'static Vendor> {
+    pub(super) fn at_host(self, host: &str) -> Option<&'static Vendor> {
         let mut own = self.0.iter();
         own.find(|vendor| vendor.is_of(host))
-            .or_else(|| Vendor::of(host))
+            .or_else(|| Vendor::at_host(host))
     }
 
-    /// The vendor whose keys look like this one, in the same order as [`Self::of`].
-    pub(super) fn of_key(self, key: &str) -> Option<&'static Vendor> {
+    /// The vendor whose keys look like this one, in the same order as [`Self::at_host`].
+    pub(super) fn by_key(self, key: &str) -> Option<&'static Vendor> {
         let mut own = self.0.iter();
         own.find(|vendor| vendor.has_key(key))
-            .or_else(|| Vendor::of_key(key))
+            .or_else(|| Vendor::by_key(key))
     }
 }
 
@@ -92,13 +92,16 @@ mod tests {
             "[[vendor]]\nname = \"Mine\"\nhosts = [\"llm.example\", \"api.openai.com\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\n",
         );
         let table = table.unwrap();
-        let name = |host| table.of(host).map(|vendor| &*vendor.name);
+        let name = |host| table.at_host(host).map(|vendor| &*vendor.name);
         assert_eq!(name("eu.llm.example"), Some("Mine"));
         assert_eq!(name("api.openai.com"), Some("Mine"));
         assert_eq!(name("api.mistral.ai"), Some("Mistral"));
         assert_eq!(name("notllm.example"), None);
         assert_eq!(
-            VendorTable::default().of("api.openai.com").unwrap().name,
+            VendorTable::default()
+                .at_host("api.openai.com")
+                .unwrap()
+                .name,
             "OpenAI"
         );
     }

@@ -116,13 +116,13 @@ mod tests {
             (json!({"error": {"message": "Please reduce the length of the messages or completion.", "code": "context_length_exceeded"}}).to_string(), "--image max-side"),
             (json!([{"error": {"code": 400, "message": "Bad key", "details": [{"reason": "API_KEY_INVALID"}]}}]).to_string(), "--api-key-env"),
         ] {
-            let wording = Wording::find(&Complaint::of_body(&body), true);
+            let wording = Wording::find(&Complaint::from_body(&body), true);
             let hint = wording.unwrap_or_else(|| panic!("{body}")).hint();
             assert!(hint.contains(flag), "{body}: {hint}");
         }
-        let text = Complaint::of_body(r#"{"error":{"message":"m is not a multimodal model"}}"#);
+        let text = Complaint::from_body(r#"{"error":{"message":"m is not a multimodal model"}}"#);
         assert!(Wording::find(&text, false).is_none(), "no image was sent");
-        let other = Complaint::of_body(r#"{"error":{"message":"the image is too small"}}"#);
+        let other = Complaint::from_body(r#"{"error":{"message":"the image is too small"}}"#);
         assert!(Wording::find(&other, true).is_none());
     }
 }

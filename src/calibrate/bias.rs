@@ -182,7 +182,7 @@ impl FirstPass {
             }
             let noise = match &frames[..] {
                 [a, b] => {
-                    let sums = PairSums::of(reader.layout, [&a.samples, &b.samples], &none);
+                    let sums = PairSums::new(reader.layout, [&a.samples, &b.samples], &none);
                     Some(sums.noise())
                 }
                 _ => None,
@@ -248,15 +248,15 @@ fn group_work(
     let mut planes = vec![[0; 2]; layout.cfa.planes()];
     let mut residuals = Residuals::default();
     for frame in frames {
-        let sums = PlaneSums::of(layout, &frame.samples, hot);
+        let sums = PlaneSums::new(layout, &frame.samples, hot);
         for (plane, more) in planes.iter_mut().zip(sums.planes()) {
             plane[0] += more[0];
             plane[1] += more[1];
         }
-        residuals.add(&Residuals::of(layout, &frame.samples, &sums, hot, centres));
+        residuals.add(&Residuals::new(layout, &frame.samples, &sums, hot, centres));
     }
     let pair = match frames {
-        [a, b] => Some(PairSums::of(layout, [&a.samples, &b.samples], hot)),
+        [a, b] => Some(PairSums::new(layout, [&a.samples, &b.samples], hot)),
         _ => None,
     };
     GroupWork {

@@ -1,4 +1,4 @@
-//! Doubts about settings beside each other: [`of`].
+//! Doubts about settings beside each other: [`order_doubts`].
 
 use super::recording::{Recording, SettingFiles};
 use super::setting::SettingFit;
@@ -7,7 +7,7 @@ use super::setting::SettingFit;
 const OFF_TREND: f64 = 5.0;
 
 /// Doubts about settings in the order of the recording, whose order is that of the numbers in their names.
-pub(super) fn of(settings: &[SettingFit], recording: &Recording) -> Vec<String> {
+pub(super) fn order_doubts(settings: &[SettingFit], recording: &Recording) -> Vec<String> {
     let mut doubts = Vec::new();
     let numbers = recording.settings.iter().map(SettingFiles::number);
     let numbered: Vec<(&SettingFit, f64)> = settings

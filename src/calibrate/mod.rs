@@ -137,7 +137,7 @@ pub(crate) fn calibrate(
             }
             white
         }
-        None => white::of_frames(&reader, recording, folder, &mut inputs)?,
+        None => white::white_code(&reader, recording, folder, &mut inputs)?,
     };
     let mut fits = Vec::new();
     for files in &recording.settings {
@@ -150,7 +150,7 @@ pub(crate) fn calibrate(
         fits.push(setting::measure(files, &mut with)?);
         step();
     }
-    warnings.extend(consistency::of(&fits, recording));
+    warnings.extend(consistency::order_doubts(&fits, recording));
     fits.sort_by(|a, b| a.gain.value.total_cmp(&b.gain.value));
     let black = match settings.black {
         Some(black) => black,

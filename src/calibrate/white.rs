@@ -1,4 +1,4 @@
-//! The code of white, from overexposed frames: [`of_frames`].
+//! The code of white, from overexposed frames: [`white_code`].
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ const AT_WHITE: f64 = 0.5;
 ///
 /// # Errors
 /// If there are none, one is not overexposed, or they end at different codes.
-pub(super) fn of_frames(
+pub(super) fn white_code(
     reader: &FrameReader,
     recording: &Recording,
     folder: &std::path::Path,

@@ -283,9 +283,9 @@ pub(super) fn sources(
 ) -> Result<BTreeMap<FrameId, ImageSource>> {
     let list = folder.join(FRAMES);
     if list.exists() {
-        frames_of_list(&Root::of(folder, further)?, &list, missing)
+        frames_of_list(&Root::new(folder, further)?, &list, missing)
     } else {
-        images(&Root::of(folder, further)?)
+        images(&Root::new(folder, further)?)
     }
 }
 
@@ -335,7 +335,7 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
         }
     }
     root.warn_of_links_out(&links_out);
-    let names = ImageNames::of(all.clone());
+    let names = ImageNames::from_paths(all.clone());
     for path in &names.images {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         sources.insert(FrameId(name.into_owned()), ImageSource::image(path.clone()));

@@ -20,7 +20,7 @@ pub(crate) struct ImageNames {
 
 impl ImageNames {
     /// Sorts paths by the endings of their names. Folders and other files are left out.
-    pub(crate) fn of(paths: impl IntoIterator<Item = PathBuf>) -> Self {
+    pub(crate) fn from_paths(paths: impl IntoIterator<Item = PathBuf>) -> Self {
         let (mut images, mut unread) = (Vec::new(), Vec::new());
         for path in paths {
             if is_image(&path) {
@@ -83,7 +83,7 @@ mod tests {
         }
         let inner = folder.path().join("inner.png");
         fs::create_dir(&inner).unwrap();
-        let names = ImageNames::of(paths.into_iter().chain([inner]));
+        let names = ImageNames::from_paths(paths.into_iter().chain([inner]));
         let images = names.images.iter();
         let images: Vec<_> = images.map(|path| path.file_name().unwrap()).collect();
         assert_eq!(images, ["a.PNG", "b.webp", "c.tiff"]);
@@ -91,6 +91,9 @@ mod tests {
             names.unread().unwrap(),
             "2 files look like images and are not read, as d.HEIC; PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected, so convert them first"
         );
-        assert_eq!(ImageNames::of([folder.path().join("f.txt")]).unread(), None);
+        assert_eq!(
+            ImageNames::from_paths([folder.path().join("f.txt")]).unread(),
+            None
+        );
     }
 }

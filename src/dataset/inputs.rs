@@ -29,7 +29,7 @@ impl Inputs {
     pub(crate) fn open(inputs: &[PathBuf], further: &[PathBuf], rule: ReadingRule) -> Result<Self> {
         let sets: Vec<Dataset> = inputs
             .iter()
-            .map(|path| Ok(Dataset::of_images(path, further)?.with_rule(rule)))
+            .map(|path| Ok(Dataset::from_images(path, further)?.with_rule(rule)))
             .collect::<Result<_>>()?;
         let mut entries = Vec::new();
         let mut used_names: BTreeMap<String, String> = BTreeMap::new();

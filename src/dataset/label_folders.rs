@@ -70,7 +70,7 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
         if is_hidden(&name) {
             continue;
         }
-        let images = ImageNames::of(entries(&inner)?);
+        let images = ImageNames::from_paths(entries(&inner)?);
         images.warn_of_unread(&inner);
         if images.images.is_empty() {
             tracing::warn!("{}: no images in it, so it is not a class", inner.display());

@@ -131,9 +131,9 @@ impl Dataset {
     /// If the place is not a folder of frames.
     pub fn open_without_questions(place: &DataPlace, further: &[PathBuf]) -> Result<Self> {
         match place {
-            DataPlace::Rooms(rooms) => Ok(Self::of_rooms(*rooms)),
+            DataPlace::Rooms(rooms) => Ok(Self::from_rooms(*rooms)),
             DataPlace::Path(folder) | DataPlace::Known { path: folder, .. } => {
-                Self::of_frames(folder, further)
+                Self::from_frames(folder, further)
             }
             DataPlace::Files(_) => Err(Error::usage(
                 "--data",
@@ -143,7 +143,7 @@ impl Dataset {
     }
 
     /// The built-in rooms, without questions. No image is drawn yet.
-    fn of_rooms(rooms: Rooms) -> Self {
+    fn from_rooms(rooms: Rooms) -> Self {
         let sources = rooms
             .all()
             .map(|(id, room)| (id, ImageSource::Room(room)))
@@ -156,7 +156,7 @@ impl Dataset {
     }
 
     /// The data of a ready-made set.
-    fn of_set(set: ready_made::ReadySet) -> Self {
+    fn from_set(set: ready_made::ReadySet) -> Self {
         Self {
             title: set.title,
             reading: set.reading,
@@ -226,7 +226,7 @@ impl Dataset {
 
     /// The images of an image file or a folder of frames, without questions; `further` are folders that its paths may lead to. No image
     /// is read.
-    pub fn of_images(path: &Path, further: &[PathBuf]) -> Result<Self> {
+    pub fn from_images(path: &Path, further: &[PathBuf]) -> Result<Self> {
         let sources = if path.is_dir() {
             frames::sources(path, further, MissingFiles::Refused)?
         } else {
@@ -236,7 +236,7 @@ impl Dataset {
     }
 
     /// The frames of a folder and the labels of its maps, without questions. No image is read.
-    pub fn of_frames(folder: &Path, further: &[PathBuf]) -> Result<Self> {
+    pub fn from_frames(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::usage(
                 "DATA",
@@ -325,7 +325,7 @@ impl Dataset {
     pub fn open(place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => {
-                let rooms = Self::of_rooms(*rooms);
+                let rooms = Self::from_rooms(*rooms);
                 match questions {
                     Some(file) => {
                         let questions = ready_made::about_frames(file, set)?;
@@ -340,17 +340,17 @@ impl Dataset {
             DataPlace::Path(path) => {
                 refuse(questions, "a ready-made set brings its own questions")?;
                 let places = std::slice::from_ref(path);
-                Self::of_set(ready_made::open(places, &stem(path), set)?)
+                Self::from_set(ready_made::open(places, &stem(path), set)?)
             }
             DataPlace::Files(paths) => {
                 refuse(questions, "a ready-made set brings its own questions")?;
                 let first = paths.first().map_or(Path::new(""), PathBuf::as_path);
-                Self::of_set(ready_made::open(paths, &stem(first), set)?)
+                Self::from_set(ready_made::open(paths, &stem(first), set)?)
             }
             DataPlace::Known { name, path } => {
                 refuse(questions, "a ready-made set brings its own questions")?;
                 let preset = Some(name.clone());
-                Self::of_set(ready_made::open(
+                Self::from_set(ready_made::open(
                     std::slice::from_ref(path),
                     &stem(path),
                     &SetArgs {

@@ -57,7 +57,7 @@ impl Pairs {
         };
         for [normal, low] in FOLDERS {
             if let (Some(normal), Some(low)) = (subfolder(normal), subfolder(low)) {
-                return Self::of_folders(normal, low);
+                return Self::from_folders(normal, low);
             }
         }
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
@@ -78,7 +78,7 @@ impl Pairs {
     ///
     /// # Errors
     /// If there is no pair, or two images of one side have the same name.
-    pub(crate) fn of_folders(normal: &Path, low: &Path) -> Result<Self> {
+    pub(crate) fn from_folders(normal: &Path, low: &Path) -> Result<Self> {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         for (side, folder) in sides.iter_mut().zip([normal, low]) {
             for path in images(entries(folder)?, folder) {
@@ -145,7 +145,7 @@ fn role(stem: &str) -> (String, Option<PairSide>) {
 
 /// The images among the paths of a folder. Says how many others look like images and are not read.
 fn images(paths: Vec<PathBuf>, folder: &Path) -> Vec<PathBuf> {
-    let names = ImageNames::of(paths);
+    let names = ImageNames::from_paths(paths);
     names.warn_of_unread(folder);
     names.images
 }

@@ -32,11 +32,11 @@ impl Photographs {
     /// If the place cannot be read, or has no image.
     pub(crate) fn at(place: &DataPlace, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
-            DataPlace::Rooms(rooms) => Dataset::of_rooms(*rooms),
+            DataPlace::Rooms(rooms) => Dataset::from_rooms(*rooms),
             DataPlace::Path(path) if path.is_dir() => {
                 return Self::in_folder(path, set);
             }
-            DataPlace::Path(path) if is_image(path) => Dataset::of_images(path, &[])?,
+            DataPlace::Path(path) if is_image(path) => Dataset::from_images(path, &[])?,
             DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => {
                 let set = Dataset::open(place, None, set)?;
                 let count = set.questions().len();
@@ -68,10 +68,10 @@ impl Photographs {
             let dataset = frames::frames(folder, further, MissingFiles::new(set.bad))?;
             return Ok(Self { dataset, notes });
         }
-        let root = Root::of(folder, further)?;
+        let root = Root::new(folder, further)?;
         let mut scan = Scan::default();
         scan.add(&root, folder)?;
-        let names = ImageNames::of(scan.files);
+        let names = ImageNames::from_paths(scan.files);
         let mut sources = BTreeMap::new();
         for path in &names.images {
             let inner = path.strip_prefix(folder).unwrap_or(path);

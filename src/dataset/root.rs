@@ -55,7 +55,7 @@ impl Root {
     ///
     /// # Errors
     /// If one does not.
-    pub(crate) fn of(folder: &Path, further: &[PathBuf]) -> Result<Self> {
+    pub(crate) fn new(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         let folder = if folder.as_os_str().is_empty() {
             Path::new(".")
         } else {
@@ -252,7 +252,7 @@ mod tests {
     fn one_file_has_one_name_however_it_is_spelled() {
         let scene = scene();
         let set = scene.path().join("set");
-        let root = Root::of(&set, &[]).unwrap();
+        let root = Root::new(&set, &[]).unwrap();
         let inside = set.join("fr/a.png").display().to_string();
         for spelled in [
             "fr/a.png",
@@ -272,7 +272,7 @@ mod tests {
     fn what_lies_outside_is_refused_unless_the_user_names_its_folder() {
         let scene = scene();
         let set = scene.path().join("set");
-        let root = Root::of(&set, &[]).unwrap();
+        let root = Root::new(&set, &[]).unwrap();
         let secret = scene.path().join("secret.png").display().to_string();
         let missing = scene.path().join("nothing.png").display().to_string();
         for spelled in [
@@ -289,13 +289,13 @@ mod tests {
                 "{problem}"
             );
         }
-        let allowed = Root::of(&set, &[scene.path().to_owned()]).unwrap();
+        let allowed = Root::new(&set, &[scene.path().to_owned()]).unwrap();
         assert_eq!(
             allowed.image(&set, "../secret.png").unwrap().0.0,
             "../secret.png"
         );
         assert!(allowed.image(&set, "/etc/passwd").is_err());
-        let problem = Root::of(&set, &[scene.path().join("none")]).unwrap_err();
+        let problem = Root::new(&set, &[scene.path().join("none")]).unwrap_err();
         assert!(
             problem.to_string().starts_with("--data-root: "),
             "{problem}"
@@ -305,7 +305,7 @@ mod tests {
     #[test]
     fn names_that_are_no_paths_are_refused() {
         let scene = scene();
-        let root = Root::of(scene.path(), &[]).unwrap();
+        let root = Root::new(scene.path(), &[]).unwrap();
         for (spelled, says) in [
             ("", "empty"),
             ("a\0b", "zero byte"),
@@ -332,7 +332,7 @@ mod tests {
         fs::create_dir_all(scene.path().join("far/deep")).unwrap();
         link(scene.path().join("far/deep"), set.join("far")).unwrap();
         fs::write(scene.path().join("far/b.png"), "").unwrap();
-        let root = Root::of(&set, &[]).unwrap();
+        let root = Root::new(&set, &[]).unwrap();
         assert!(
             root.image(&set, "out.png")
                 .unwrap_err()
@@ -348,7 +348,7 @@ mod tests {
         link(set.clone(), scene.path().join("alias")).unwrap();
         let alias = scene.path().join("alias");
         assert!(
-            Root::of(&alias, &[])
+            Root::new(&alias, &[])
                 .unwrap()
                 .image(&alias, "fr/a.png")
                 .is_ok()

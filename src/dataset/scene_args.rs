@@ -72,7 +72,7 @@ impl PairFolders {
     /// If there are none.
     fn open(&self) -> Result<Pairs> {
         match self {
-            Self::Two(normal, low) => Pairs::of_folders(normal, low),
+            Self::Two(normal, low) => Pairs::from_folders(normal, low),
             Self::One(folder) => Pairs::open(folder),
         }
     }

@@ -39,7 +39,7 @@ impl Answering<'_> {
         match (model, self.manifest) {
             (Some(model), _) => model.price(&money.prices),
             (None, Some(manifest)) => run_reports::price(&money.prices, manifest, name),
-            (None, None) => money.prices.of(name),
+            (None, None) => money.prices.find(name),
         }
     }
 }
@@ -89,14 +89,14 @@ impl Budget {
             models: &all,
             manifest: None,
         };
-        Self::of_run(money, models, answering, stored)
+        Self::for_run(money, models, answering, stored)
     }
 
     /// A budget of the models that are asked now. It includes the cost of the stored records of all models of the run.
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
-    pub(crate) fn of_run(
+    pub(crate) fn for_run(
         money: &MoneySettings,
         models: &[ModelUnderTest],
         answering: Answering<'_>,
@@ -257,7 +257,7 @@ impl Budget {
 
     /// Expected cost of a request to a model, in US dollars; `None` if it has no known price.
     pub(crate) fn expected_cost(&self, model: usize, prompt: f64, reply: f64) -> Option<f64> {
-        Some(self.models[model].price?.of(prompt, reply))
+        Some(self.models[model].price?.cost(prompt, reply))
     }
 }
 

@@ -64,7 +64,7 @@ pub(crate) enum DarkImages {
 
 impl DarkImages {
     /// For a set in this light, asked with these levels and enhancers.
-    pub(crate) fn of(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
+    pub(crate) fn new(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
         let as_they_are = light.levels == [AxisLevel::L0]
             && !enhancers.is_empty()
             && enhancers.on().includes(None);
@@ -79,7 +79,7 @@ impl DarkImages {
 /// Warns if the frames of an experiment are dark already, and it does more than to ask about them as they are and enhanced.
 pub(crate) fn warn<E: Experiment>(experiment: &E) {
     let settings = experiment.settings();
-    let dark = DarkImages::of(settings.set_light, &settings.light, &settings.enhancers);
+    let dark = DarkImages::new(settings.set_light, &settings.light, &settings.enhancers);
     if dark == DarkImages::Expected {
         return;
     }

@@ -54,7 +54,7 @@ pub(crate) fn estimate<E: Experiment>(
         Some(plan) => SampledImages::make(experiment, plan, pipeline)?,
         None => SampledImages::default(),
     };
-    let images = PlannedImages::of(experiment, plans, &sample);
+    let images = PlannedImages::new(experiment, plans, &sample);
     let latencies = stored.iter().filter_map(StoredTrial::latency_ms);
     let latencies: Vec<u64> = latencies.collect();
     // Endpoints are asked side by side: the slowest decides.
@@ -251,7 +251,7 @@ impl Tokens {
 
     /// The cost if each reply has this many tokens in all; `None` if no price or number of tokens is known.
     fn dollars(&self, price: Option<Price>, reply: f64) -> Option<f64> {
-        Some(price?.of(self.text + self.image?, reply))
+        Some(price?.cost(self.text + self.image?, reply))
     }
 
     fn add(&mut self, text: f64, reply: f64) {

@@ -112,7 +112,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         for phase in 0..E::PHASES.len() {
             let mut plan = Plan::new(experiment.plan(phase, || store::read_records(&self.folder))?);
             let models = experiment.models(phase).len();
-            measured.push(MeasuredTokens::of_stored(
+            measured.push(MeasuredTokens::from_stored(
                 models,
                 &plan,
                 experiment.sources(),
@@ -163,7 +163,7 @@ impl<'a, E: Experiment> Job<'a, E> {
                 enhancers.open()?;
             }
         }
-        let manifest = manifest::of(experiment, stored)?;
+        let manifest = manifest::run_manifest(experiment, stored)?;
         folder::make(&folder, settings)?;
         if let Some(damage) = damage {
             restore_manifest(experiment, &folder, &manifest, &damage)?;

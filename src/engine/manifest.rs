@@ -1,4 +1,4 @@
-//! The manifest of a run that starts or continues: [`of`].
+//! The manifest of a run that starts or continues: [`run_manifest`].
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ use darkqa_score::record::Detail as _;
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
-pub(crate) fn of<E: Experiment>(
+pub(crate) fn run_manifest<E: Experiment>(
     experiment: &E,
     stored: Option<RunManifest>,
 ) -> Result<RunManifest> {

@@ -41,7 +41,7 @@ impl MeasuredTokens {
     }
 
     /// What stored replies to trials of a plan about these sources were charged.
-    pub(crate) fn of_stored<I: Item>(
+    pub(crate) fn from_stored<I: Item>(
         models: usize,
         plan: &Plan<I>,
         sources: &[Source],

@@ -82,7 +82,7 @@ impl ModelUnderTest {
     /// The price of its tokens; `None` if it is built in or the price is unknown.
     pub(crate) fn price(&self, prices: &Prices) -> Option<Price> {
         let remote = self.model.is_remote();
-        let of_table = || prices.of(self.model.name());
+        let of_table = || prices.find(self.model.name());
         remote.then(|| self.price.or_else(of_table)).flatten()
     }
 
@@ -198,7 +198,7 @@ pub(crate) fn asked_in<'a>(
 
 /// The opened endpoint.
 pub(crate) fn endpoint(server: &Server) -> Result<Arc<Endpoint>> {
-    Endpoint::of(server.replicas.clone(), server.sending).map(Arc::new)
+    Endpoint::from_addresses(server.replicas.clone(), server.sending).map(Arc::new)
 }
 
 /// A model that can answer open questions, opened.

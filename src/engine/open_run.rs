@@ -127,7 +127,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             manifest: Some(&self.manifest),
         };
         let trials = self.store.trials()?;
-        let budget = Budget::of_run(&settings.money, &[], answering, &trials)?;
+        let budget = Budget::for_run(&settings.money, &[], answering, &trials)?;
         let spent = budget.charged();
         let over = (budget.spending().overrun() > 0.0).then(|| OverBudget {
             limit,
@@ -226,7 +226,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         let all = self.experiment.plan(phase, || self.store.records())?;
         plan.add_images(all, |source, condition| {
             let Source { name, frames, .. } = &sources[source];
-            let wanted = missing.of(name, condition);
+            let wanted = missing.wanted(name, condition);
             // Several images of one source are not measured.
             wanted.thumbnail || (wanted.fidelity && frames.len() == 1)
         });
@@ -283,7 +283,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             manifest: Some(&self.manifest),
         };
         let batches = Journal::open(self.store.folder(), &self.manifest)?.most_dollars();
-        let budget = Budget::of_run(&settings.money, models, answering, &stored)?;
+        let budget = Budget::for_run(&settings.money, models, answering, &stored)?;
         let in_flight_cost = InFlightCost::open(self.store.folder())?;
         let budget = budget.with_unrecorded(batches + in_flight_cost.killed());
         let counts = TrialCounts {
@@ -488,7 +488,7 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
     let limits = servers.map(|server| {
         let stated = server.sending.max_image;
         let stated = stated.map(|megabytes| ImageLimit::stated((megabytes * 1e6) as usize));
-        let known = server.replicas.iter().map(ImageLimit::of);
+        let known = server.replicas.iter().map(ImageLimit::from_access);
         stated.or_else(|| known.reduce(ImageLimit::stricter))
     });
     let limit = limits.flatten().reduce(ImageLimit::stricter)?;

@@ -81,7 +81,7 @@ fn add_group<E: Experiment>(
         let (text, reply) = (text_tokens(&trial.prompt), trial.item.reply_tokens());
         let sent = images.map(|images| text + images);
         cost.tokens = cost.tokens.zip(sent).map(|(sum, sent)| sum + sent + reply);
-        let dollars = price.zip(sent).map(|(price, sent)| price.of(sent, reply));
+        let dollars = price.zip(sent).map(|(price, sent)| price.cost(sent, reply));
         cost.dollars = cost.dollars.zip(dollars).map(|(sum, own)| sum + own);
     }
 }

@@ -38,7 +38,7 @@ pub(crate) struct PlannedImages {
 }
 
 impl PlannedImages {
-    pub(crate) fn of<E: Experiment>(
+    pub(crate) fn new<E: Experiment>(
         experiment: &E,
         plans: &[Plan<E::Item>],
         sample: &SampledImages,

@@ -162,7 +162,7 @@ mod tests {
     }
 
     fn prompt(number: usize) -> Prompt {
-        Prompt::of(format!("Which room is shown in image {number} of the set?").into())
+        Prompt::from_text(format!("Which room is shown in image {number} of the set?").into())
     }
 
     #[test]

@@ -325,10 +325,10 @@ impl RunPlace {
     /// The plan in the folder that is named; `None` if none is, or there is no plan.
     ///
     /// # Errors
-    /// As of [`RunPlan::of`].
+    /// As of [`RunPlan::read`].
     pub(crate) fn plan(&self) -> Result<Option<RunPlan>> {
         match self {
-            Self::Named(folder) | Self::Resume(folder) => RunPlan::of(folder),
+            Self::Named(folder) | Self::Resume(folder) => RunPlan::read(folder),
             Self::Automatic => Ok(None),
         }
     }

@@ -114,7 +114,7 @@ pub(super) struct Damaged;
 
 impl Entry {
     /// An entry without an image.
-    pub(crate) fn of_facts(facts: EntryFacts) -> Self {
+    pub(crate) fn from_facts(facts: EntryFacts) -> Self {
         Self {
             image: Vec::new(),
             size: [0, 0],
@@ -259,7 +259,10 @@ mod tests {
 
     #[test]
     fn an_entry_reads_back_and_no_changed_byte_does() {
-        let (key, other) = (Key::of(&["a"]).unwrap(), Key::of(&["b"]).unwrap());
+        let (key, other) = (
+            Key::from_recipe(&["a"]).unwrap(),
+            Key::from_recipe(&["b"]).unwrap(),
+        );
         let file = entry().file(&key);
         let read = Entry::read(&key, file.clone()).unwrap();
         assert_eq!((&read.image, read.size), (&entry().image, [16, 9]));
@@ -276,7 +279,7 @@ mod tests {
 
     #[test]
     fn the_end_of_a_file_tells_what_it_shows() {
-        let key = Key::of(&["a"]).unwrap();
+        let key = Key::from_recipe(&["a"]).unwrap();
         let file = entry().file(&key);
         let (facts, image) = facts_at_end(&file[200..], file.len() as u64).unwrap();
         assert_eq!((facts.milliseconds, image), (120, 256));

@@ -22,7 +22,7 @@ impl Key {
     ///
     /// # Errors
     /// If a number of the recipe is infinite or NaN.
-    pub(crate) fn of(recipe: &impl Serialize) -> Result<Self> {
+    pub(crate) fn from_recipe(recipe: &impl Serialize) -> Result<Self> {
         let (digest, recipe) = Digest::canonical_value(DOMAIN, recipe)?;
         Ok(Self { digest, recipe })
     }

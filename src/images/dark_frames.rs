@@ -17,7 +17,7 @@ pub(crate) struct DarkFrames<'a>(Vec<(&'a Source, Vec<Condition>)>);
 
 impl<'a> DarkFrames<'a> {
     /// Those for the enhancer of this name, with the conditions of the plan that it enhances.
-    pub(crate) fn of<I>(
+    pub(crate) fn new<I>(
         sources: &'a [Source],
         plan: &[SourcePlan<I>],
         name: &EnhancerName,

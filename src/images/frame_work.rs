@@ -64,7 +64,7 @@ impl<'a> FrameWork<'a> {
     }
 
     /// Work on a frame alone, without a check of its digest.
-    pub(crate) fn of(steps: ImageSteps<'a>, frame: FrameId) -> Self {
+    pub(crate) fn alone(steps: ImageSteps<'a>, frame: FrameId) -> Self {
         let key = NoiseKey::new(steps.recipe.seed, &frame);
         Self::new(steps, frame, key, None)
     }

@@ -64,7 +64,7 @@ impl MissingNotes {
     }
 
     /// The notes that are wanted about a frame in a condition. The clean frame is not compared with itself.
-    pub(crate) fn of(&self, frame: &FrameId, condition: &Condition) -> WantedNotes {
+    pub(crate) fn wanted(&self, frame: &FrameId, condition: &Condition) -> WantedNotes {
         let is_measured = || {
             let image = (Shared::from(frame.clone()), Shared::from(condition.clone()));
             self.measured.contains(&image)

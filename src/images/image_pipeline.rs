@@ -195,7 +195,7 @@ impl<'a> ImagePipeline<'a> {
             return Ok((Vec::new(), ImageNotes::default()));
         };
         let name = &source.name;
-        let wanted = missing.of(name, condition);
+        let wanted = missing.wanted(name, condition);
         match work {
             SourceWork::Frame(work) => {
                 let shown = work.size().map(|size| ShownObjects {

@@ -59,7 +59,7 @@ pub(crate) struct OutputFile {
 }
 
 impl OutputFile {
-    fn of(path: &Path, bytes: &[u8]) -> Self {
+    fn new(path: &Path, bytes: &[u8]) -> Self {
         let name = path.file_name().unwrap_or_default();
         Self {
             file: name.to_string_lossy().into_owned(),
@@ -119,7 +119,7 @@ impl<R: ImageOrigin> Sidecar<R> {
             darkqa_eval: env!("CARGO_PKG_VERSION").to_owned(),
             recipe,
             used_anyway: place.used_anyway.clone(),
-            output: Some(OutputFile::of(&place.image, bytes)),
+            output: Some(OutputFile::new(&place.image, bytes)),
         }
     }
 

@@ -91,7 +91,7 @@ impl Recipe {
     }
 
     /// The recipe for frames of walks.
-    pub(crate) fn of_walks(self, walk: &Walk) -> Self {
+    pub(crate) fn for_walks(self, walk: &Walk) -> Self {
         Self {
             scaling: walk.side,
             degraded_at: walk.degraded_at,

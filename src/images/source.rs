@@ -163,7 +163,7 @@ pub(crate) struct Source {
 
 impl Source {
     /// The source of questions about a frame of this name: this frame alone, or the several that it stands for. Each file is read once.
-    pub(crate) fn of_questions(dataset: &Dataset, name: &FrameId) -> Result<Self> {
+    pub(crate) fn from_questions(dataset: &Dataset, name: &FrameId) -> Result<Self> {
         let mut frames: Vec<SourceFrame> = Vec::new();
         let mut order = Vec::new();
         for id in dataset.shown(name) {
@@ -250,7 +250,7 @@ pub(crate) fn inspect_all(
     let first = first_asked(questions);
     let bar = progress.bar("reading images", first.len());
     let sources = first.into_par_iter().map(|question| {
-        let source = Source::of_questions(dataset, &question.frame).map_err(|e| {
+        let source = Source::from_questions(dataset, &question.frame).map_err(|e| {
             let problem = format_args!("{e}; --skip bad leaves such questions out");
             Error::data(
                 format_args!("question {:?}", excerpt(&question.id.0, 60)),

@@ -37,7 +37,7 @@ impl<'a> StoredFindings<'a> {
     }
 
     fn key(self, model: &Model, frames: Option<Vec<Vec<ImageKeyFacts<'_>>>>) -> Result<Key> {
-        Key::of(&FindingsRecipe {
+        Key::from_recipe(&FindingsRecipe {
             stated: model.stated()?,
             version: darkqa_enhance::VERSION,
             maker: self.maker,
@@ -127,7 +127,7 @@ impl FindingsPlace<'_> {
     /// Adds what was found, which took this time.
     pub(crate) fn write(&self, findings: &Findings, took: Duration) {
         let entry = |milliseconds, notes| {
-            Entry::of_facts(EntryFacts::new(self.shown.clone(), milliseconds, notes))
+            Entry::from_facts(EntryFacts::new(self.shown.clone(), milliseconds, notes))
         };
         let found = entry(took.as_millis() as u64, serde_json::json!(findings));
         self.store.put(&self.tried, &found);

@@ -86,7 +86,7 @@ impl<'a> StoredImages<'a> {
             (StoredKinds::Enhanced, None) => Content::Measures,
         };
         let key = |content: Content| {
-            Key::of(&StoredRecipe {
+            Key::from_recipe(&StoredRecipe {
                 content: (content != Content::Image).then_some(content),
                 image: recipe.facts(source, frame, condition)?,
                 program: self.maker.program(),
@@ -214,7 +214,7 @@ impl<'a> StoredPlace<'a> {
         of: (&FrameId, &Condition),
         objects: Option<ShownObjects<'_>>,
     ) -> Option<ThumbnailPlace<'a>> {
-        ThumbnailPlace::of((self.store, &self.image), &self.shown, of, objects)
+        ThumbnailPlace::new((self.store, &self.image), &self.shown, of, objects)
     }
 
     /// Adds what is known of an image that took this time to make: with the image, if images like it are kept, else without it.
@@ -226,7 +226,7 @@ impl<'a> StoredPlace<'a> {
         );
         if let Some(measures) = &self.measures {
             if notes.similarity.is_some() {
-                self.store.put(measures, &Entry::of_facts(facts));
+                self.store.put(measures, &Entry::from_facts(facts));
             }
             return;
         }

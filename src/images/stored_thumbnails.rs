@@ -30,13 +30,13 @@ struct ThumbnailRecipe<'a> {
 
 impl<'a> ThumbnailPlace<'a> {
     /// The place of the small copy of the image with this key; `None` if there can be none.
-    pub(crate) fn of(
+    pub(crate) fn new(
         (store, image): (&'a ImageStore, &Key),
         shown: &Shown,
         (frame, condition): (&FrameId, &Condition),
         objects: Option<ShownObjects<'_>>,
     ) -> Option<Self> {
-        let key = Key::of(&ThumbnailRecipe {
+        let key = Key::from_recipe(&ThumbnailRecipe {
             content: Content::Thumbnail,
             version: thumbnail::VERSION,
             image: image.digest(),

@@ -53,7 +53,7 @@ pub(crate) struct Prompt {
 
 impl Prompt {
     /// A prompt whose whole text is before the images.
-    pub(crate) fn of(text: Arc<str>) -> Self {
+    pub(crate) fn from_text(text: Arc<str>) -> Self {
         Self {
             before: text,
             behind: None,

@@ -106,7 +106,7 @@ impl Folder {
                 }
             }
         }
-        ImageNames::of(std::mem::take(&mut set.beside)).warn_of_unread(folder);
+        ImageNames::from_paths(std::mem::take(&mut set.beside)).warn_of_unread(folder);
         Ok(set)
     }
 

@@ -30,7 +30,7 @@ struct InterfaceLine {
 
 impl Interface {
     pub(super) fn open(folder: &Path, further: &[PathBuf]) -> Result<Self> {
-        let dataset = Dataset::of_frames(folder, further)?;
+        let dataset = Dataset::from_frames(folder, further)?;
         let Some(labels) = dataset.labels().cloned() else {
             return Err(Error::data(
                 folder.display(),

@@ -74,8 +74,8 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         return Err(Error::data(exists.display(), EXISTS));
     }
     let lines = match &args.frames {
-        Some(frames) => of_frames(frames, &args.folder)?,
-        None => of_rooms(&args.folder, progress)?,
+        Some(frames) => frame_lines(frames, &args.folder)?,
+        None => room_lines(&args.folder, progress)?,
     };
     let mut table = csv::Writer::from_writer(Vec::new());
     let wrong = |e: csv::Error| Error::data("questions.csv", e);
@@ -123,7 +123,7 @@ fn line(image: &str, question: &str, choices: &[String], truth: usize, category:
 }
 
 /// Writes pictures of built-in rooms, and returns lines about them: what the rules ask, with true answers.
-fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
+fn room_lines(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
     let rooms = ROOMS.parse().map_err(|e: String| Error::data("rooms", e))?;
     let (place, rules) = (DataPlace::Rooms(rooms), Rules::built_in()?);
     let (set, selection) = (SetArgs::default(), SelectionArgs::default());
@@ -166,8 +166,8 @@ fn of_rooms(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
 }
 
 /// Copies images of a folder, and returns lines about them that are true of any image: whether it has colours, and its form.
-fn of_frames(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
-    let dataset = Dataset::of_images(frames, &[])?;
+fn frame_lines(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
+    let dataset = Dataset::from_images(frames, &[])?;
     let copied = dataset.frames().take(PICTURES).map(|frame| {
         let path = dataset.image_file(frame).unwrap_or(frames);
         let name = path.file_name().unwrap_or_default();

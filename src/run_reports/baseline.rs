@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::alerts::of_runs;
+use super::alerts::run_alerts;
 use super::combine::{Combined, check_comparable, clusters};
 use super::cost::{Charged, PricedRun};
 use super::join::join;
@@ -82,7 +82,7 @@ impl Baseline {
         runs.push(old.clone());
         check_comparable(&runs)?;
         // The names of models and conditions tell nothing apart here: a new model is held against the old one of its name.
-        let alerts = of_runs(&join(runs, |_| true)?);
+        let alerts = run_alerts(&join(runs, |_| true)?);
         let mark = |model: &str| format!("{model} (baseline {name})");
         let (mut trials, mut old_trials) = (combined.trials.clone(), old.trials);
         old_trials.rename(|model| Some(mark(model)));

@@ -28,7 +28,7 @@ impl<'m> PricedRun<'m> {
     pub(super) fn new(manifest: &'m RunManifest) -> Result<Self> {
         Ok(Self {
             manifest,
-            prices: Prices::of_settings(&manifest.settings)?,
+            prices: Prices::from_settings(&manifest.settings)?,
             by_model: HashMap::new(),
         })
     }
@@ -90,7 +90,7 @@ pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Opt
         .get("model")
         .and_then(|models| models.get(model));
     let id = columns.and_then(|content| content.get("--model")?.as_str());
-    stated.or_else(|| prices.of(id.unwrap_or(model)))
+    stated.or_else(|| prices.find(id.unwrap_or(model)))
 }
 
 /// The cost of a run's replies at the prices that the run had, as text, attempts without a usable reply included; `None` if no model of the run has a known

@@ -1,4 +1,4 @@
-//! How the enhancers of runs were used, in words: [`rows`] and [`of_enhancers`].
+//! How the enhancers of runs were used, in words: [`rows`] and [`enhancer_alerts`].
 
 use std::collections::BTreeSet;
 
@@ -38,7 +38,7 @@ pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
 }
 
 /// What a reader must know of the enhancers before any number.
-pub(super) fn of_enhancers(runs: &[JoinedRun]) -> Vec<Alert> {
+pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut alerts: Vec<Alert> = Vec::new();
     for (_, name, note) in notes(runs) {
         let mut add = |text: String| {

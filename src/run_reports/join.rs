@@ -95,7 +95,7 @@ pub(super) fn join<D: Detail>(
     order.sort_by(|one, other| {
         (&names[*one], &runs[*one].folder).cmp(&(&names[*other], &runs[*other].folder))
     });
-    let lights = Lights::of(&runs, &names, &order);
+    let lights = Lights::new(&runs, &names, &order);
     for (index, run) in runs.iter_mut().enumerate().filter(|_| !lights.is_one()) {
         run.trials
             .change_conditions(|condition| lights.mark(condition, index));
@@ -103,7 +103,7 @@ pub(super) fn join<D: Detail>(
             lights.mark(&mut thumbnail.condition, index);
         }
     }
-    let models = Names::of(&runs, &names, &order, &compared);
+    let models = Names::new(&runs, &names, &order, &compared);
     let mut joined = Joined {
         runs: Vec::new(),
         trials: Trials::default(),
@@ -162,7 +162,7 @@ impl<D: Detail> Joined<D> {
     }
 
     /// The trials of a run.
-    pub(super) fn of(&self, run: &JoinedRun) -> impl Iterator<Item = TrialRef<'_, D>> {
+    pub(super) fn trials_of(&self, run: &JoinedRun) -> impl Iterator<Item = TrialRef<'_, D>> {
         run.trials.iter().map(|place| self.trials.at(place))
     }
 

@@ -35,12 +35,15 @@ pub(super) fn check(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
             None => marked = Some((&run.folder, by)),
         }
     }
-    of_one_name(runs)
+    check_one_name(runs)
 }
 
 /// Checks that judges of one name are the same: their marks are not told apart.
-fn of_one_name(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
-    let judges: Vec<Option<Settings>> = runs.iter().map(|run| of_judge(&run.manifest)).collect();
+fn check_one_name(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
+    let judges: Vec<Option<Settings>> = runs
+        .iter()
+        .map(|run| judge_settings(&run.manifest))
+        .collect();
     let names: Vec<String> = runs.iter().map(StoredRun::name).collect();
     let differences = differing(&judges);
     let Some(first) = differences.first() else {
@@ -56,7 +59,7 @@ fn of_one_name(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
 }
 
 /// What decides the marks of the judge of a run; `None` if no judge was asked, or the run does not say.
-fn of_judge(manifest: &RunManifest) -> Option<Settings> {
+fn judge_settings(manifest: &RunManifest) -> Option<Settings> {
     let judge = manifest.settings.get(JUDGE)?.as_str()?;
     // Runs of earlier versions have the judge among the models alone.
     let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));

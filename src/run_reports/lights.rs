@@ -18,7 +18,7 @@ pub(super) struct LightCurve {
 }
 
 impl LightCurve {
-    fn of(condition: &Condition) -> Self {
+    fn new(condition: &Condition) -> Self {
         Self {
             variant: condition.kind_reading(),
             enhancer: condition.enhancer.clone(),
@@ -90,11 +90,11 @@ pub(super) struct Lights {
 
 impl Lights {
     /// The groups of runs; `names` are those of the runs, and `order` their numbers in the order of their names.
-    pub(super) fn of<D: Detail>(runs: &[StoredRun<D>], names: &[String], order: &[usize]) -> Self {
+    pub(super) fn new<D: Detail>(runs: &[StoredRun<D>], names: &[String], order: &[usize]) -> Self {
         if runs.len() < 2 {
             return Self::default();
         }
-        let seen = Seen::of(runs);
+        let seen = Seen::new(runs);
         let manifests: Vec<&RunManifest> = runs.iter().map(|run| &run.manifest).collect();
         let partitions = seen.partitions(&manifests, order);
         let mut lights = Self {
@@ -141,7 +141,7 @@ impl Lights {
     /// Names the group of a run in a condition, if the images of its curve differ.
     pub(super) fn mark(&self, condition: &mut Condition, run: usize) {
         if !self.is_one() {
-            condition.group = self.groups.get(&(LightCurve::of(condition), run)).cloned();
+            condition.group = self.groups.get(&(LightCurve::new(condition), run)).cloned();
         }
     }
 }
@@ -214,7 +214,7 @@ impl Seen {
         all
     }
 
-    fn of<D: Detail>(runs: &[StoredRun<D>]) -> Self {
+    fn new<D: Detail>(runs: &[StoredRun<D>]) -> Self {
         let mut curves = HashMap::<&Condition, BTreeSet<usize>>::new();
         let mut images = HashMap::<(&Condition, &str), Vec<(usize, Digest)>>::new();
         let mut undigested = Vec::new();
@@ -252,14 +252,14 @@ impl Seen {
         };
         for (condition, runs) in curves {
             seen.curves
-                .entry(LightCurve::of(condition))
+                .entry(LightCurve::new(condition))
                 .or_default()
                 .extend(runs);
         }
         for ((condition, one, other), found) in pairs {
             let pair = seen
                 .pairs
-                .entry((LightCurve::of(condition), one, other))
+                .entry((LightCurve::new(condition), one, other))
                 .or_default();
             pair.shared += found.shared;
             pair.differing += found.differing;

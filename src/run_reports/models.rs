@@ -75,7 +75,7 @@ impl ModelApart {
 impl Names {
     /// The names of the models in these runs; conditions are marked by their light. `order` holds the numbers of the runs in the
     /// order of their names, `names`. Only trials that are `compared` count.
-    pub(super) fn of<D: Detail>(
+    pub(super) fn new<D: Detail>(
         runs: &[StoredRun<D>],
         names: &[String],
         order: &[usize],

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::alerts::{of_joining, of_runs};
+use super::alerts::{joining_alerts, run_alerts};
 use super::combine::typed;
 use super::enhancers;
 use super::join::join;
@@ -265,8 +265,8 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         }
     }
     let joined = join(runs, is_answer)?;
-    let mut alerts = of_runs(&joined);
-    alerts.extend(of_joining(&joined));
+    let mut alerts = run_alerts(&joined);
+    alerts.extend(joining_alerts(&joined));
     if joined.runs.len() == 1 {
         // The text and the page of one run say more about what is missing.
         alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
@@ -335,7 +335,7 @@ fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
 
 /// The marks of the judge of a run.
 fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<OpenDetail>> {
-    let mut marks = MarkIndex::of(&run.questions);
+    let mut marks = MarkIndex::new(&run.questions);
     for record in &run.records {
         let is_of_judge = Some(&*record.model) == judge && record.failure.is_none();
         if let (Step::Mark, Some(answer)) = (record.detail.step, &record.detail.judged)

@@ -23,7 +23,7 @@ pub(super) struct LenientChange {
 
 impl LenientChange {
     /// No replies yet, of a run with this manifest.
-    pub(super) fn of(manifest: &RunManifest) -> Self {
+    pub(super) fn new(manifest: &RunManifest) -> Self {
         let from = manifest.reply_reading.as_deref();
         Self {
             from: from.unwrap_or(FIRST_REPLY_READING).to_owned(),

@@ -133,8 +133,8 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
         }
     }
     let outcome = match (choice.is_empty(), open.is_empty()) {
-        (_, true) => of_choices(args, choice, &again)?,
-        (true, false) => of_open(args, open, &again)?,
+        (_, true) => report_choices(args, choice, &again)?,
+        (true, false) => report_open(args, open, &again)?,
         (false, false) => {
             return Err(Error::usage(
                 "RUN",
@@ -164,7 +164,7 @@ pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
     (folders.collect(), named_again(&again))
 }
 
-fn of_choices(
+fn report_choices(
     args: &ReportArgs,
     mut runs: Vec<StoredRun<ChoiceDetail>>,
     again: &[Alert],
@@ -317,7 +317,7 @@ fn write_files(
     Ok(Outcome::wrote(out, Status::Complete, text))
 }
 
-fn of_open(
+fn report_open(
     args: &ReportArgs,
     mut runs: Vec<StoredRun<OpenDetail>>,
     again: &[Alert],
@@ -376,7 +376,7 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     }
     let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
     let mut changed = 0;
-    let mut lenient = LenientChange::of(&run.manifest);
+    let mut lenient = LenientChange::new(&run.manifest);
     for trial in run.trials.iter() {
         let record = run.record(trial)?;
         let now = record::reread(record.clone())?;

@@ -139,7 +139,7 @@ pub(super) fn some(run: &RunManifest, fields: &[&str]) -> Settings {
 
 /// Everything in a manifest that decides images besides their size and encoding, for a comparison of these runs.
 pub(super) fn light(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
-    let variants = of_column(run, VARIANT);
+    let variants = column_settings(run, VARIANT);
     let parts = [pixels(run), noise(run, runs), variants, enhancers(run)];
     parts.into_iter().flatten().collect()
 }
@@ -164,31 +164,31 @@ pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     });
     let mut settings: Settings = written.collect();
     // A default that is written out is another word for the same noise.
-    settings.extend(of_column(run, "reading"));
+    settings.extend(column_settings(run, "reading"));
     settings
 }
 
 /// The content of the light readings, and of the kinds that the paper does not have.
 pub(super) fn readings_and_variants(run: &RunManifest) -> Settings {
-    let mut settings = of_column(run, "reading");
-    settings.extend(of_column(run, VARIANT));
+    let mut settings = column_settings(run, "reading");
+    settings.extend(column_settings(run, VARIANT));
     settings
 }
 
 /// The content of the enhancers.
 pub(super) fn enhancers(run: &RunManifest) -> Settings {
-    of_column(run, "enhancer")
+    column_settings(run, "enhancer")
 }
 
 /// The settings of a kind that the paper does not have; empty for the others.
 pub(super) fn variant(run: &RunManifest, kind: Kind) -> Settings {
-    let mut settings = of_column(run, VARIANT);
+    let mut settings = column_settings(run, VARIANT);
     settings.retain(|flag, _| flag.ends_with(&format!("{OF}{kind}")));
     settings
 }
 
 /// The settings behind the values of a column of a run.
-fn of_column(run: &RunManifest, column: &str) -> Settings {
+fn column_settings(run: &RunManifest, column: &str) -> Settings {
     let mut settings = Settings::new();
     for (name, content) in run.columns.get(column).into_iter().flatten() {
         settings.extend(leaves(content).map(|(flag, value)| (format!("{flag}{OF}{name}"), value)));

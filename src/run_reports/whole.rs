@@ -18,12 +18,12 @@ use crate::types::{ChoiceDetail, OpenDetail, Truths};
 /// If the run has no record, or a record is broken.
 pub(crate) fn whole(run: AnyRun) -> Result<WholeReport> {
     match run {
-        AnyRun::Choice(run) => of_choices(run),
-        AnyRun::Open(run) => of_open(run),
+        AnyRun::Choice(run) => choice_report(run),
+        AnyRun::Open(run) => open_report(run),
     }
 }
 
-fn of_choices(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
+fn choice_report(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
     let combined = combine(vec![shown(run)?])?;
     if combined.truths() == Truths::Unknown {
         return own_answers::whole(&combined);
@@ -44,6 +44,6 @@ fn of_choices(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
     })
 }
 
-fn of_open(run: StoredRun<OpenDetail>) -> Result<WholeReport> {
+fn open_report(run: StoredRun<OpenDetail>) -> Result<WholeReport> {
     open::Scores::new(open::combine(vec![shown(run)?])?)?.whole()
 }

@@ -15,7 +15,9 @@ pub(crate) enum BatchSystem {
 }
 
 impl BatchSystem {
-    pub(crate) fn of(variable: &impl Fn(&str) -> Option<String>) -> Result<Option<Self>> {
+    pub(crate) fn from_environment(
+        variable: &impl Fn(&str) -> Option<String>,
+    ) -> Result<Option<Self>> {
         let value = |name: &str| -> Result<Option<u32>> {
             let parse = |text: String| {
                 text.trim()

@@ -20,7 +20,7 @@ pub(crate) struct MarkIndex<M> {
 
 impl<M> MarkIndex<M> {
     /// The index for these questions, without marks.
-    pub(crate) fn of<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> Self {
+    pub(crate) fn new<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> Self {
         let questions = questions.into_iter();
         let words = questions.map(|question| (question.id.clone(), question.judged_words()));
         Self {

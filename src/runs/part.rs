@@ -129,7 +129,7 @@ mod tests {
         shards.map(|shard| own_sources(sources, shard)).collect()
     }
 
-    fn of_costs(costs: &[u64]) -> Vec<Divided> {
+    fn divided_costs(costs: &[u64]) -> Vec<Divided> {
         let sources = costs.iter().map(|cost| Divided {
             scene: String::new(),
             cost: *cost,
@@ -171,16 +171,19 @@ mod tests {
     #[test]
     fn parts_cost_about_the_same() {
         // One source is as dear as all others together.
-        assert_eq!(divided(&of_costs(&[4, 1, 1, 1, 1]), 2), [0..1, 1..5]);
-        assert_eq!(divided(&of_costs(&[1, 1, 1, 1, 4]), 2), [0..4, 4..5]);
-        assert_eq!(divided(&of_costs(&[2, 2, 1, 1, 1, 1]), 2), [0..2, 2..6]);
+        assert_eq!(divided(&divided_costs(&[4, 1, 1, 1, 1]), 2), [0..1, 1..5]);
+        assert_eq!(divided(&divided_costs(&[1, 1, 1, 1, 4]), 2), [0..4, 4..5]);
+        assert_eq!(
+            divided(&divided_costs(&[2, 2, 1, 1, 1, 1]), 2),
+            [0..2, 2..6]
+        );
         // A dear source leaves no part empty.
-        assert_eq!(divided(&of_costs(&[100, 1, 1]), 3), [0..1, 1..2, 2..3]);
-        assert_eq!(divided(&of_costs(&[1, 1, 100]), 3), [0..1, 1..2, 2..3]);
-        assert_eq!(divided(&of_costs(&[0, 0, 0]), 3), [0..1, 1..2, 2..3]);
+        assert_eq!(divided(&divided_costs(&[100, 1, 1]), 3), [0..1, 1..2, 2..3]);
+        assert_eq!(divided(&divided_costs(&[1, 1, 100]), 3), [0..1, 1..2, 2..3]);
+        assert_eq!(divided(&divided_costs(&[0, 0, 0]), 3), [0..1, 1..2, 2..3]);
         let costs: Vec<u64> = (0..50).map(|i| 1 + i * i % 17).collect();
         let sum: u64 = costs.iter().sum();
-        let parts = divided(&of_costs(&costs), 7);
+        let parts = divided(&divided_costs(&costs), 7);
         assert_eq!(parts.iter().map(Range::len).sum::<usize>(), 50);
         for part in parts {
             let own: u64 = costs[part].iter().sum();

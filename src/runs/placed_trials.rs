@@ -55,7 +55,7 @@ pub(crate) struct PartLogs<'a> {
 
 impl<'a> PartLogs<'a> {
     /// The records in these folders, which are numbered from 0. No file is opened yet.
-    pub(crate) fn of(folders: &[&'a Path]) -> Self {
+    pub(crate) fn new(folders: &[&'a Path]) -> Self {
         Self {
             folders: folders.to_vec(),
             open: HashMap::new(),
@@ -108,7 +108,7 @@ pub(crate) fn append<D: Detail>(
         .map(|trial| (trial.key(), trial.text()))
         .collect();
     let own = RecordLog::open(store.folder())?;
-    let mut logs = PartLogs::of(&parts.iter().map(|(folder, _)| *folder).collect::<Vec<_>>());
+    let mut logs = PartLogs::new(&parts.iter().map(|(folder, _)| *folder).collect::<Vec<_>>());
     let mut chunk = Vec::new();
     for (key, place) in trials {
         let of_part = parts[place.log()].1;

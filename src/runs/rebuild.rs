@@ -89,7 +89,7 @@ impl ImageRebuilder {
         let recipe = Recipe::new(&kinds, flags.images.image, flags.max_side, &files);
         let recipe = recipe.with_elsewhere(elsewhere)?;
         let (frames, recipe) = if let Some(walk) = flags.walk {
-            let recipe = recipe.of_walks(&walk);
+            let recipe = recipe.for_walks(&walk);
             let folder = WalkFolder::new(&walk, flags.decode.rule());
             (FrameFolder::Walks(folder, walk), recipe)
         } else {
@@ -155,7 +155,7 @@ impl ImageRebuilder {
 
     fn source(&self, name: &FrameId) -> Result<Source> {
         match &self.folder {
-            FrameFolder::Frames(dataset) => Source::of_questions(dataset, name),
+            FrameFolder::Frames(dataset) => Source::from_questions(dataset, name),
             FrameFolder::Walks(folder, walk) => folder.source(&name.0, walk),
         }
     }
@@ -182,7 +182,7 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
 fn frames(data: &DataArgs) -> Result<Dataset> {
     match &data.place() {
         DataPlace::Path(path) if path.join("frames.jsonl").is_file() => {
-            Dataset::of_frames(path, &data.set.root.data_root)
+            Dataset::from_frames(path, &data.set.root.data_root)
         }
         place @ (DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. }) => {
             Dataset::open(place, None, &data.set)

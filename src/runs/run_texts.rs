@@ -45,7 +45,7 @@ impl<D: Detail> RunTexts<D> {
     ///
     /// # Errors
     /// If its file cannot be opened.
-    pub(crate) fn of(folder: &Path) -> Result<Self> {
+    pub(crate) fn open(folder: &Path) -> Result<Self> {
         Ok(match RecordLog::open_if_there(folder)? {
             None => Self::Held(HeldTexts::new(Vec::new(), Vec::new()).into()),
             Some(log) => {

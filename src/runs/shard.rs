@@ -83,22 +83,22 @@ impl Shard {
         flag: Option<&str>,
         variable: impl Fn(&str) -> Option<String>,
     ) -> Result<Self> {
-        let system = BatchSystem::of(&variable)?;
+        let system = BatchSystem::from_environment(&variable)?;
         match (flag, system) {
             (Some("none"), _) | (None, None) => Ok(Self::WHOLE),
             (Some("auto"), system) => {
                 let system = system.ok_or_else(|| usage_error(NO_SYSTEM))?;
-                Self::of(system, None)
+                Self::from_batch_system(system, None)
             }
             (Some(text), system) => match text.split_once('/') {
                 Some(("auto", count)) => {
                     let system = system.ok_or_else(|| usage_error(NO_SYSTEM))?;
-                    Self::of(system, Some(number(count, text)?))
+                    Self::from_batch_system(system, Some(number(count, text)?))
                 }
                 _ => text.parse(),
             },
             (None, Some(system)) => {
-                let shard = Self::of(system, None)?;
+                let shard = Self::from_batch_system(system, None)?;
                 if shard.is_part() {
                     tracing::warn!(
                         "{system}: this process does shard {shard}; --shard none does everything"
@@ -110,7 +110,7 @@ impl Shard {
     }
 
     /// The shard of this process in a batch system.
-    fn of(system: BatchSystem, parts: Option<NonZeroU32>) -> Result<Self> {
+    fn from_batch_system(system: BatchSystem, parts: Option<NonZeroU32>) -> Result<Self> {
         let (index, count) = system.place(parts)?;
         Ok(Self { index, count })
     }

@@ -63,7 +63,7 @@ impl<D: Detail> StoredRun<D> {
         store::each_record(folder, |record, place| {
             trials.add(record, TextPlace::new(place.start));
         })?;
-        let mut run = Self::of_trials(folder, manifest, trials)?;
+        let mut run = Self::from_trials(folder, manifest, trials)?;
         if run.manifest.status == Status::Started {
             let failed = run.trials.iter().map(TrialRef::failed);
             run.manifest.counts = Counts::new(run.manifest.counts.trials, failed);
@@ -80,28 +80,28 @@ impl<D: Detail> StoredRun<D> {
         store::each_reread_record(folder, |record, place| {
             trials.add(record, TextPlace::new(place.start));
         })?;
-        Self::of_trials(folder, manifest, trials)
+        Self::from_trials(folder, manifest, trials)
     }
 
     /// The run of a folder from its manifest and trials. Of its records no more than reports need is held.
-    fn of_trials(folder: &Path, manifest: RunManifest, trials: Trials<D>) -> Result<Self> {
-        let texts = RunTexts::of(folder)?;
+    fn from_trials(folder: &Path, manifest: RunManifest, trials: Trials<D>) -> Result<Self> {
+        let texts = RunTexts::open(folder)?;
         let files = RunFiles::read_light(folder)?;
-        Self::of_parts(folder, manifest, (trials, texts), files)
+        Self::from_parts(folder, manifest, (trials, texts), files)
     }
 
     /// The run of a folder from its manifest, records that are held in memory, and the lines of its other files.
-    pub(crate) fn of_lines(
+    pub(crate) fn from_records(
         folder: &Path,
         manifest: RunManifest,
         (records, files): (Vec<Record<D>>, RunFiles),
     ) -> Result<Self> {
         let trials = records.iter().cloned().collect();
         let texts = RunTexts::Held(HeldTexts::new(records, files.questions.clone()).into());
-        Self::of_parts(folder, manifest, (trials, texts), files)
+        Self::from_parts(folder, manifest, (trials, texts), files)
     }
 
-    fn of_parts(
+    fn from_parts(
         folder: &Path,
         manifest: RunManifest,
         (mut trials, texts): (Trials<D>, RunTexts<D>),
@@ -207,7 +207,7 @@ impl ExperimentKind {
     ///
     /// # Errors
     /// If the folder holds no run, or one of another version.
-    pub(crate) fn of(folder: &Path) -> Result<Self> {
+    pub(crate) fn read(folder: &Path) -> Result<Self> {
         let schema = store::schema(folder)?.ok_or_else(|| no_run(folder))?;
         if schema == OpenDetail::SCHEMA {
             return Ok(Self::Open);
@@ -224,7 +224,7 @@ impl AnyRun {
     /// # Errors
     /// If the folder holds no run.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
-        Ok(match ExperimentKind::of(folder)? {
+        Ok(match ExperimentKind::read(folder)? {
             ExperimentKind::Choice => Self::Choice(StoredRun::open(folder)?),
             ExperimentKind::Open => Self::Open(StoredRun::open(folder)?),
         })
@@ -236,8 +236,8 @@ impl StoredRun<ChoiceDetail> {
     ///
     /// # Errors
     /// If the folder holds no run, or one of open questions. That error tells the user what to do `instead`.
-    pub(crate) fn of_choices(folder: &Path, instead: &str) -> Result<Self> {
-        match ExperimentKind::of(folder)? {
+    pub(crate) fn open_choices(folder: &Path, instead: &str) -> Result<Self> {
+        match ExperimentKind::read(folder)? {
             ExperimentKind::Choice => Self::open(folder),
             ExperimentKind::Open => Err(open_questions(folder, instead)),
         }
@@ -266,7 +266,7 @@ impl StoredRun<ChoiceDetail> {
 /// # Errors
 /// If the folder holds no run.
 pub(crate) fn manifest(folder: &Path) -> Result<RunManifest> {
-    let schema = match ExperimentKind::of(folder)? {
+    let schema = match ExperimentKind::read(folder)? {
         ExperimentKind::Choice => ChoiceDetail::SCHEMA,
         ExperimentKind::Open => OpenDetail::SCHEMA,
     };

@@ -131,7 +131,7 @@ fn stage(c: &mut Criterion) {
     });
     let folder = tempfile::tempdir().unwrap();
     write(folder.path());
-    let dataset = Dataset::of_frames(folder.path(), &[]).unwrap();
+    let dataset = Dataset::from_frames(folder.path(), &[]).unwrap();
     let name = dataset.frames().next().unwrap();
     group.bench_function("read and decode", |b| {
         b.iter(|| dataset.files(black_box(name)).unwrap().decode().unwrap());

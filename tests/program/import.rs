@@ -93,7 +93,7 @@ impl Scene {
     /// Imports, and reads what came of it.
     fn import(&self, kind: &str, flags: &[&str]) -> Dataset {
         self.run(kind, flags).ended(0);
-        Dataset::of_frames(&self.out(), &[]).unwrap()
+        Dataset::from_frames(&self.out(), &[]).unwrap()
     }
 
     /// Imports in vain, and returns what is said.
@@ -165,7 +165,7 @@ fn habitat_renders_of_hm3d() {
         message.contains("2 frames of 1 scene") && message.contains("\"bed, made\" 1"),
         "{message}"
     );
-    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
+    let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
     let names: Vec<&str> = set.frames().map(|id| id.0.as_str()).collect();
     assert_eq!(names, ["00800-x/000", "00800-x/003"]);
     let frame = frame(&set, "00800-x/003");
@@ -251,7 +251,7 @@ fn what_is_wrong_with_renders_is_said() {
         "{message}"
     );
     assert_eq!(
-        Dataset::of_frames(&scene.out(), &[])
+        Dataset::from_frames(&scene.out(), &[])
             .unwrap()
             .frames()
             .count(),
@@ -264,7 +264,7 @@ fn what_is_wrong_with_renders_is_said() {
     );
     scene.run("habitat", &["--force", "--count", "2"]).ended(0);
     assert_eq!(
-        Dataset::of_frames(&scene.out(), &[])
+        Dataset::from_frames(&scene.out(), &[])
             .unwrap()
             .frames()
             .count(),
@@ -495,7 +495,7 @@ fn folders_of_images_and_maps() {
             .arg(&again),
     )
     .ended(0);
-    let twice = frame(&Dataset::of_frames(&again, &[]).unwrap(), "home/a");
+    let twice = frame(&Dataset::from_frames(&again, &[]).unwrap(), "home/a");
     assert_eq!(
         (twice.depth, twice.semantic, twice.segments),
         (found.depth, found.semantic, found.segments)
@@ -538,7 +538,7 @@ fn class_maps_of_arrays_are_read_and_other_files_are_named() {
         said.contains("not read: 3 normals/*.exr, home/notes"),
         "{said}"
     );
-    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
+    let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
     let found = frame(&set, "home/0");
     assert_eq!(sides(found.semantic.as_ref()), (4, 0));
     assert_eq!(sides(found.depth.as_ref()), (2_000, 4_000));
@@ -595,7 +595,7 @@ fn hypersim_is_read_with_its_maps_in_hdf5() {
         said.contains("not read: 2 scene_cam_01_geometry_hdf5/*.hdf5, image.png"),
         "{said}"
     );
-    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
+    let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
     let found = frame(&set, "ai_001_002/cam_01-0003");
     assert_eq!(found.depth_kind, DepthKind::Euclid);
     assert_eq!(sides(found.depth.as_ref()), (2_000, 4_000));
@@ -685,7 +685,7 @@ fn folders_are_joined_and_scenes_of_one_name_told_apart() {
         called(&mut command).ended(0)
     };
     import("nyu40");
-    let set = Dataset::of_frames(&scene.out(), &[]).unwrap();
+    let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
     let names: Vec<&str> = set.frames().map(|frame| frame.0.as_str()).collect();
     assert_eq!(names, ["1-home/0", "2-home/0", "only-one/0", "only-two/0"]);
     assert_eq!(sides(frame(&set, "1-home/0").semantic.as_ref()), (4, 9));

@@ -325,7 +325,7 @@ fn rooms_on_disk_are_those_in_the_program() {
     let bench = Bench::new();
     let size = ["--frames", "4", "--size", "160x120"];
     bench.complete(&[&["rooms", "--out", "frames"][..], &size].concat());
-    let folder = Dataset::of_frames(&bench.path("frames"), &[]).unwrap();
+    let folder = Dataset::from_frames(&bench.path("frames"), &[]).unwrap();
     let rooms = Rooms {
         frames: 4,
         size: [160, 120],

@@ -229,7 +229,7 @@ impl BatchServer {
             return Ok(answer);
         }
         let status = answer.status.as_u16();
-        let complaint = Complaint::of_body(&String::from_utf8_lossy(&answer.body));
+        let complaint = Complaint::from_body(&String::from_utf8_lossy(&answer.body));
         let (base, scrub) = (&self.connection.base, &self.connection.scrub);
         let text = scrub.line(&complaint.message);
         let separator = if text.is_empty() { "" } else { ": " };
@@ -238,7 +238,7 @@ impl BatchServer {
         failed.failure.status = Some(status);
         failed.may_have_effect = status >= 500;
         failed.wait = asked_wait(&answer.headers, SystemTime::now()).max(complaint.wait);
-        failed.quota = QuotaRefusal::of(&complaint, scrub).map(Box::new);
+        failed.quota = QuotaRefusal::from_complaint(&complaint, scrub).map(Box::new);
         Err(failed)
     }
 

@@ -148,8 +148,8 @@ impl RemoteBatch {
                 .first()
                 .map_or_else(String::new, |e| problem(e, scrub)),
             quota: errors.iter().find_map(|error| {
-                let complaint = Complaint::of_error(error);
-                QuotaRefusal::of(&complaint, scrub)
+                let complaint = Complaint::from_error(error);
+                QuotaRefusal::from_complaint(&complaint, scrub)
             }),
             mark: mark.unwrap_or_default(),
         })
@@ -161,7 +161,7 @@ pub(super) const MARK: &str = "darkqa";
 
 /// An error of a batch, with the line of the input file that it is about.
 fn problem(error: &Value, scrub: &Scrub) -> String {
-    let complaint = Complaint::of_error(error);
+    let complaint = Complaint::from_error(error);
     let text = scrub.line(&complaint.message);
     let text = match &complaint.code {
         Some(code) => format!("{text} ({})", scrub.line(code)),

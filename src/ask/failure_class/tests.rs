@@ -24,7 +24,7 @@ fn classify(status: u16, body: &str) -> AskError {
         has_image: true,
         has_key: true,
     };
-    AskError::refused(status, &Complaint::of_body(body), Wire::Chat, sent)
+    AskError::refused(status, &Complaint::from_body(body), Wire::Chat, sent)
 }
 
 #[test]

@@ -21,7 +21,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
     // A completion may have its own field "message", so only `error` counts there.
     let complaint = match completion.get("choices") {
         Some(_) => Complaint::in_error(&completion),
-        None => Complaint::of(&completion),
+        None => Complaint::from_json(&completion),
     };
     if let Some(complaint) = complaint {
         return Err(UnreadableReply::Complaint(Box::new(complaint)));
@@ -30,7 +30,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
     let charged = |what| Unreadable::new(what).charged(usage);
     let choice = choice(&completion).map_err(charged)?;
     if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
-        return Err(UnreadableReply::Complaint(Box::new(Complaint::of_error(
+        return Err(UnreadableReply::Complaint(Box::new(Complaint::from_error(
             error,
         ))));
     }

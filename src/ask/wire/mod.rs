@@ -69,7 +69,7 @@ impl Wire {
             Self::Chat | Self::ChatStream => chat_fields::fields(sent),
             Self::Responses => responses_request::fields(sent),
         };
-        fields.extend(sent.fields.of_switch());
+        fields.extend(sent.fields.switched());
         // A field that is left out is not the cause.
         fields.retain(|field| !extra.omit.iter().any(|name| name == field.name));
         fields.extend(sent.own());
@@ -88,7 +88,7 @@ impl Wire {
     pub(super) fn complaint(self, body: &[u8]) -> Complaint {
         match self {
             Self::Chat | Self::ChatStream | Self::Responses => {
-                Complaint::of_body(&String::from_utf8_lossy(body))
+                Complaint::from_body(&String::from_utf8_lossy(body))
             }
         }
     }

@@ -76,7 +76,7 @@ mod tests {
             ("a streaming error occurred", None),
             ("", None),
         ] {
-            let complaint = Complaint::of_body(words);
+            let complaint = Complaint::from_body(words);
             assert_eq!(other_wire(&complaint, Chat), expected, "{words}");
             // What was sent already is not the remedy.
             if let Some(wire) = expected {

@@ -23,7 +23,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
     };
     let complaint = match response.get("output") {
         Some(_) => Complaint::in_error(&response),
-        None => Complaint::of(&response),
+        None => Complaint::from_json(&response),
     };
     if let Some(complaint) = complaint {
         return Err(UnreadableReply::Complaint(Box::new(complaint)));

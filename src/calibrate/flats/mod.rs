@@ -218,8 +218,8 @@ fn read(
     let layout = reader.layout;
     let work = |(_, pair): &(usize, &[PathBuf])| {
         let [a, b] = read_pair(reader, pair)?;
-        let sums = PairSums::of(layout, [&a.samples, &b.samples], hot);
-        let top = [&a, &b].map(|frame| TopCode::of(layout, &frame.samples, hot));
+        let sums = PairSums::new(layout, [&a.samples, &b.samples], hot);
+        let top = [&a, &b].map(|frame| TopCode::new(layout, &frame.samples, hot));
         let [first, second] = [0, 1].map(|frame| top[frame].largest_share());
         let facts = PairFacts {
             names: [&pair[0], &pair[1]].map(|path| path.display().to_string()),
@@ -272,9 +272,9 @@ fn dark(
         let frames: Vec<Frame> = frames.collect::<Result<_>>()?;
         let sums = frames
             .iter()
-            .map(|frame| PlaneSums::of(layout, &frame.samples, hot).planes());
+            .map(|frame| PlaneSums::new(layout, &frame.samples, hot).planes());
         let noise = match &frames[..] {
-            [a, b] => Some(PairSums::of(layout, [&a.samples, &b.samples], hot).noise()),
+            [a, b] => Some(PairSums::new(layout, [&a.samples, &b.samples], hot).noise()),
             _ => None,
         };
         let sums: Vec<Vec<[u64; 2]>> = sums.collect();

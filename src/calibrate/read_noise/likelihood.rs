@@ -21,7 +21,7 @@ const DERIVATIVE_STEP: f64 = 2e-3;
 pub(super) struct Folded(Vec<(f64, f64)>);
 
 impl Folded {
-    pub(super) fn of(residuals: &Residuals) -> Self {
+    pub(super) fn new(residuals: &Residuals) -> Self {
         let mut folded: Vec<(i64, u64)> = Vec::new();
         let all = residuals.counts().into_iter();
         let mut all: Vec<(i64, u64)> = all.map(|(steps, count)| (steps.abs(), count)).collect();
@@ -69,7 +69,7 @@ impl Likelihood {
             if !(SHAPES[0]..=SHAPES[1]).contains(&shape) {
                 return f64::INFINITY;
             }
-            -self.of(&self.residuals, [shape, log_scale]) / self.count
+            -self.log_likelihood(&self.residuals, [shape, log_scale]) / self.count
         };
         let from = |shape: f64| {
             let start = Start {
@@ -98,8 +98,8 @@ impl Likelihood {
     pub(super) fn score(&self, residuals: &Folded, [shape, log_scale]: [f64; 2]) -> [f64; 2] {
         let h = DERIVATIVE_STEP;
         let slope = |[x, y]: [f64; 2]| {
-            let up = self.of(residuals, [shape + x, log_scale + y]);
-            let down = self.of(residuals, [shape - x, log_scale - y]);
+            let up = self.log_likelihood(residuals, [shape + x, log_scale + y]);
+            let down = self.log_likelihood(residuals, [shape - x, log_scale - y]);
             (up - down) / (2.0 * h)
         };
         [slope([h, 0.0]), slope([0.0, h])]
@@ -120,7 +120,7 @@ impl Likelihood {
     }
 
     /// The log-likelihood of residuals. A code stands for all values within ½ of it.
-    fn of(&self, residuals: &Folded, [shape, log_scale]: [f64; 2]) -> f64 {
+    fn log_likelihood(&self, residuals: &Folded, [shape, log_scale]: [f64; 2]) -> f64 {
         let mut table = self.table.borrow_mut();
         table.set_shape(shape);
         let scale = libm::exp(log_scale);

@@ -36,12 +36,12 @@ impl ReadNoise {
         for group in groups {
             all.add(group);
         }
-        let likelihood = Likelihood::new(Folded::of(&all));
+        let likelihood = Likelihood::new(Folded::new(&all));
         let [shape, log_scale] = likelihood.greatest()?;
         let curvature = likelihood.curvature([shape, log_scale]);
         let inverse = inverse(curvature)
             .ok_or("the shape and the scale of the read noise cannot be separated")?;
-        let scores = groups.iter().map(Folded::of);
+        let scores = groups.iter().map(Folded::new);
         let scores = scores.map(|group| likelihood.score(&group, [shape, log_scale]));
         Ok(Self {
             shape,

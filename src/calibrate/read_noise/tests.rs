@@ -23,8 +23,8 @@ fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {
         })
         .collect();
     let hot = HotPixels::none(layout.plane_rows());
-    let sums = PlaneSums::of(layout, &samples, &hot);
-    Residuals::of(layout, &samples, &sums, &hot, Centres::RowsAndPlanes)
+    let sums = PlaneSums::new(layout, &samples, &hot);
+    Residuals::new(layout, &samples, &sums, &hot, Centres::RowsAndPlanes)
 }
 
 #[test]
@@ -97,8 +97,8 @@ fn frames_without_noise_are_refused() {
     };
     let hot = HotPixels::none(layout.plane_rows());
     let samples = vec![512; 256 * 256];
-    let sums = PlaneSums::of(layout, &samples, &hot);
-    let none = Residuals::of(layout, &samples, &sums, &hot, Centres::RowsAndPlanes);
+    let sums = PlaneSums::new(layout, &samples, &hot);
+    let none = Residuals::new(layout, &samples, &sums, &hot, Centres::RowsAndPlanes);
     let problem = ReadNoise::fit(&[none]).unwrap_err();
     assert!(problem.contains("without any noise"), "{problem}");
 }

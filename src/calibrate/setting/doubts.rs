@@ -18,7 +18,11 @@ const COARSE: f64 = 0.35;
 ///
 /// # Errors
 /// If K cannot be, or photon transfer is far from a straight line.
-pub(super) fn of(fit: &SettingFit, has_dark: bool, width: usize) -> Result<Vec<String>, String> {
+pub(super) fn setting_doubts(
+    fit: &SettingFit,
+    has_dark: bool,
+    width: usize,
+) -> Result<Vec<String>, String> {
     let gain = fit.gain.value;
     if !(GAINS[0]..=GAINS[1]).contains(&gain) {
         return Err(format!(

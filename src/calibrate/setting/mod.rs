@@ -57,7 +57,7 @@ pub(super) fn measure(files: &SettingFiles, with: &mut Measuring<'_>) -> Result<
     let flats = Flats::measure(with.reader, files, settings, base, with.inputs, &mut notes)?;
     let fit = fit(&files.name, &bias, &flats, base);
     let width = with.reader.layout.width;
-    notes.extend(doubts::of(&fit, flats.have_dark(), width).map_err(refused)?);
+    notes.extend(doubts::setting_doubts(&fit, flats.have_dark(), width).map_err(refused)?);
     let named = notes
         .into_iter()
         .map(|note| format!("{}: {note}", files.name));

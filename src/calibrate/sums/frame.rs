@@ -15,7 +15,7 @@ pub(in super::super) struct PlaneSums {
 }
 
 impl PlaneSums {
-    pub(in super::super) fn of(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
+    pub(in super::super) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
         let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
         let rows = parts.map_init(Vec::new, |part, plane_row| {
             gather(layout, samples, plane_row, part);
@@ -57,7 +57,7 @@ pub(in super::super) struct TopCode {
 }
 
 impl TopCode {
-    pub(in super::super) fn of(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
+    pub(in super::super) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
         let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
         let rows = parts.map_init(Vec::new, |part, plane_row| {
             gather(layout, samples, plane_row, part);
@@ -120,20 +120,20 @@ mod tests {
 
     #[test]
     fn planes_are_summed_apart() {
-        let sums = PlaneSums::of(LAYOUT, &SAMPLES, &HotPixels::none(4));
+        let sums = PlaneSums::new(LAYOUT, &SAMPLES, &HotPixels::none(4));
         assert_eq!(sums.planes(), [[3, 6], [3, 30], [3, 19], [3, 22]]);
         let hot = HotPixels::new(vec![vec![0, 2], vec![], vec![1], vec![]]);
-        let sums = PlaneSums::of(LAYOUT, &SAMPLES, &hot);
+        let sums = PlaneSums::new(LAYOUT, &SAMPLES, &hot);
         assert_eq!(sums.planes(), [[1, 2], [3, 30], [2, 14], [3, 22]]);
     }
 
     #[test]
     fn samples_at_the_greatest_code_are_counted() {
-        let top = TopCode::of(LAYOUT, &SAMPLES, &HotPixels::none(4));
+        let top = TopCode::new(LAYOUT, &SAMPLES, &HotPixels::none(4));
         assert_eq!(top.planes, [(3, 3, 1), (3, 10, 3), (3, 9, 1), (3, 8, 1)]);
         assert_eq!((top.greatest(), top.largest_share()), (10, (1.0, 10)));
         let hot = HotPixels::new(vec![vec![], vec![0, 1], vec![2], vec![]]);
-        let top = TopCode::of(LAYOUT, &SAMPLES, &hot);
+        let top = TopCode::new(LAYOUT, &SAMPLES, &hot);
         assert_eq!(top.planes, [(3, 3, 1), (1, 10, 1), (2, 5, 2), (3, 8, 1)]);
     }
 }

@@ -65,7 +65,7 @@ impl TileSums {
     /// A and B · ratio have equal light, so that their difference D has neither fall-off nor the response of the sites. With light S
     /// of B its variance is K · ratio · S + ratio² · K · S = 2 ratio · K · S̄, where S̄ is the mean light of both.
     pub(in super::super) fn variance(&self, ratio: f64) -> f64 {
-        self.scatter.of_difference(ratio) / self.free / (2.0 * ratio)
+        self.scatter.squared_difference(ratio) / self.free / (2.0 * ratio)
     }
 }
 
@@ -86,14 +86,14 @@ impl PairNoise {
 }
 
 impl PairSums {
-    pub(in super::super) fn of(layout: Layout, [a, b]: [&[u16]; 2], hot: &HotPixels) -> Self {
+    pub(in super::super) fn new(layout: Layout, [a, b]: [&[u16]; 2], hot: &HotPixels) -> Self {
         let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
         let rows = parts.map_init(
             || [Vec::new(), Vec::new()],
             |[part_a, part_b], plane_row| {
                 gather(layout, a, plane_row, part_a);
                 gather(layout, b, plane_row, part_b);
-                PairRow::of(part_a, part_b, hot.columns(plane_row))
+                PairRow::new(part_a, part_b, hot.columns(plane_row))
             },
         );
         Self {
@@ -216,7 +216,7 @@ impl Cell {
     /// Number, sum and sum of squares of A − B − `mean`.
     fn about(&self, mean: f64) -> [f64; 3] {
         let (n, sum) = (self.count as f64, self.difference() as f64);
-        let squares = self.products.of_difference() as f64;
+        let squares = self.products.squared_difference() as f64;
         let squares = squares - 2.0 * mean * sum + n * mean * mean;
         [n, sum - n * mean, squares]
     }
@@ -229,13 +229,13 @@ impl Cell {
 
 impl PairRow {
     /// Sums of the samples of both frames in a part of a row, without its hot columns.
-    fn of(a: &[u16], b: &[u16], hot: impl Iterator<Item = usize>) -> Self {
+    fn new(a: &[u16], b: &[u16], hot: impl Iterator<Item = usize>) -> Self {
         let mut row = Self::default();
         for (tile, cell) in row.tiles.iter_mut().enumerate() {
             let columns = Layout::tile(a.len(), tile);
             *cell = cell_of(&a[columns.clone()], &b[columns]);
         }
-        row.neighbours = RowNeighbours::of(a, b);
+        row.neighbours = RowNeighbours::new(a, b);
         let site = |column: usize| [a[column], b[column]];
         let mut last = None;
         for column in hot {

@@ -49,7 +49,7 @@ impl Default for Residuals {
 
 impl Residuals {
     /// The residuals of a frame. `sums` are those of the same frame without the same hot pixels.
-    pub(in super::super) fn of(
+    pub(in super::super) fn new(
         layout: Layout,
         samples: &[u16],
         sums: &PlaneSums,
@@ -204,8 +204,8 @@ mod tests {
     };
 
     fn residuals(samples: &[u16], hot: &HotPixels, centres: Centres<'_>) -> Vec<(i64, u64)> {
-        let sums = PlaneSums::of(LAYOUT, samples, hot);
-        Residuals::of(LAYOUT, samples, &sums, hot, centres).counts()
+        let sums = PlaneSums::new(LAYOUT, samples, hot);
+        Residuals::new(LAYOUT, samples, &sums, hot, centres).counts()
     }
 
     /// Offsets of planes and of rows leave nothing behind.

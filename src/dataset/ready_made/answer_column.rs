@@ -1,4 +1,4 @@
-//! The column that holds the answers, among several that may: [`of_options`], [`of_words`].
+//! The column that holds the answers, among several that may: [`option_column`], [`yes_or_no_column`].
 //!
 //! A gap in a column, or a broken answer, does not make it give way to another: columns are compared in the rows that both answer.
 
@@ -23,7 +23,7 @@ struct Candidate<'a> {
 
 /// The answer of a row in a column, if it is one.
 fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
-    match AnswerCell::of(&table.rows[item.row], column) {
+    match AnswerCell::from_row(&table.rows[item.row], column) {
         AnswerCell::One(answer) => Some(answer),
         AnswerCell::Absent | AnswerCell::Several(_) => None,
     }
@@ -33,7 +33,7 @@ fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
 ///
 /// # Errors
 /// If two columns say different things of a row; the error shows the row and the two commands.
-pub(super) fn of_options<'a>(
+pub(super) fn option_column<'a>(
     table: &Table,
     roles: &'a Roles,
     items: &[Item],
@@ -99,8 +99,8 @@ pub(super) fn unnamed(table: &Table, roles: &Roles, items: &[Item]) -> Option<St
 /// The column whose answers are yes or no. A column of other words beside it differs from it.
 ///
 /// # Errors
-/// As [`of_options`].
-pub(super) fn of_words<'a>(
+/// As [`option_column`].
+pub(super) fn yes_or_no_column<'a>(
     table: &Table,
     roles: &'a Roles,
     items: &[Item],

@@ -65,7 +65,7 @@ pub(super) struct FileFacts {
 }
 
 impl FileFacts {
-    pub(super) fn of(bytes: &[u8]) -> Self {
+    pub(super) fn from_bytes(bytes: &[u8]) -> Self {
         Self {
             digest: Digest::from_bytes(bytes),
             format: FileFormat::detect(bytes).ok(),
@@ -96,9 +96,9 @@ impl Cell {
     /// The cell without the bytes of files.
     pub(super) fn without_files(self, names: &mut FieldNames) -> Self {
         match self {
-            Self::Bytes(bytes) => Self::File(Box::new(FileFacts::of(&bytes))),
+            Self::Bytes(bytes) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
             Self::Text(text) if text.len() > LONGEST_KEPT => match (decoded(&text), list(&text)) {
-                (Some(bytes), _) => Self::File(Box::new(FileFacts::of(&bytes))),
+                (Some(bytes), _) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
                 (None, Some(items)) => {
                     let items = items.into_iter();
                     Self::List(
@@ -324,8 +324,11 @@ mod tests {
             text,
             Cell::Bytes(file.clone().into()).without_files(&mut FieldNames::default())
         );
-        assert_eq!(text, Cell::File(Box::new(FileFacts::of(&file))));
-        assert_ne!(text, Cell::File(Box::new(FileFacts::of(&file[1..]))));
+        assert_eq!(text, Cell::File(Box::new(FileFacts::from_bytes(&file))));
+        assert_ne!(
+            text,
+            Cell::File(Box::new(FileFacts::from_bytes(&file[1..])))
+        );
     }
 
     #[test]

@@ -13,7 +13,7 @@ pub(super) struct Column {
 
 impl Column {
     /// The cell of the column in a row.
-    pub(super) fn of<'a>(&self, row: &'a Row) -> &'a Cell {
+    pub(super) fn cell<'a>(&self, row: &'a Row) -> &'a Cell {
         let cell = row.cell(self.at);
         match &self.field {
             None => cell,
@@ -28,7 +28,7 @@ impl Column {
 
     /// The cell as text, if it holds one.
     pub(super) fn text(&self, row: &Row) -> Option<String> {
-        let cell = self.of(row);
+        let cell = self.cell(row);
         (!cell.is_absent()).then(|| cell.text()).flatten()
     }
 }

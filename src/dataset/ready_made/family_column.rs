@@ -18,7 +18,7 @@ pub(super) enum FamilyOf {
 impl FamilyOf {
     /// The first of some columns with more than one value among the questions that are asked; else the configuration, if they are of
     /// several; else the first column.
-    pub(super) fn of(table: &Table, families: &Families, answered: &[Answered]) -> Self {
+    pub(super) fn from_table(table: &Table, families: &Families, answered: &[Answered]) -> Self {
         let columns = match families {
             Families::Known(columns) => columns,
             Families::Said(column) => return column.clone().map_or(Self::None, Self::Column),

@@ -18,7 +18,7 @@ impl FolderInfo {
     const FILE: &str = "dataset.json";
 
     /// What the file in a folder says; nothing without it.
-    pub(super) fn of(folder: &Path) -> Result<Self> {
+    pub(super) fn in_folder(folder: &Path) -> Result<Self> {
         let path = folder.join(Self::FILE);
         if !path.is_file() {
             return Ok(Self::default());

@@ -165,14 +165,14 @@ impl<'a> Frames<'a> {
     }
 
     /// The images of a row, in order.
-    pub(super) fn of_row(&self, row: usize) -> impl Iterator<Item = Result<Found>> {
-        let images = self.kind.of(&self.table.rows[row], self.roles);
+    pub(super) fn in_row(&self, row: usize) -> impl Iterator<Item = Result<Found>> {
+        let images = self.kind.in_row(&self.table.rows[row], self.roles);
         images.into_iter().map(move |image| self.find(row, image))
     }
 
     /// Why an image of a row cannot be used; `None` if all are there. Files are not opened.
     pub(super) fn problem(&self, row: usize) -> Option<Error> {
-        self.of_row(row).find_map(|found| match found {
+        self.in_row(row).find_map(|found| match found {
             Err(problem) => Some(problem),
             Ok(Found::Cell { row, facts, .. }) if facts.format.is_none() => {
                 let problem = "the cell of its image holds bytes that are no image";
@@ -278,7 +278,7 @@ impl<'a> Frames<'a> {
 
     /// The frame of a question; of a question about several images the name of all of them together. The sources are kept.
     pub(super) fn frame(&mut self, answered: &Answered) -> Result<FrameId> {
-        let found: Vec<Found> = self.of_row(answered.row).collect::<Result<_>>()?;
+        let found: Vec<Found> = self.in_row(answered.row).collect::<Result<_>>()?;
         let shown: Vec<FrameId> = found.into_iter().map(|found| self.keep(found)).collect();
         if let [only] = &*shown {
             return Ok(only.clone());

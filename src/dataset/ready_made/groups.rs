@@ -44,11 +44,11 @@ impl GroupRule {
     ///
     /// # Errors
     /// If the map names a column that is not there, or a template cannot be read.
-    pub(super) fn of(table: &Table, map: &Map) -> Result<Option<Self>, String> {
+    pub(super) fn from_map(table: &Table, map: &Map) -> Result<Option<Self>, String> {
         let [name, size] = OWN;
         let own = |name| table.find(name).and_then(|_| column(table, name).ok());
         let is_own = || own(name).is_some() && (own(size).is_some() || is_own(table));
-        let text = match map.of(Role::Group).map(|entry| &*entry.columns) {
+        let text = match map.entry(Role::Group).map(|entry| &*entry.columns) {
             Some([text]) => text.clone(),
             None if is_own() => name.to_owned(),
             _ => return Ok(None),
@@ -72,7 +72,7 @@ impl Part {
     fn text(&self, row: &Row) -> Option<String> {
         match self {
             Self::Words(words) => Some(words.clone()),
-            Self::Cell(column) => match column.of(row) {
+            Self::Cell(column) => match column.cell(row) {
                 Cell::File(facts) => Some(facts.digest.to_string()[..12].to_owned()),
                 _ => column.text(row).map(|text| text.trim().to_owned()),
             },
@@ -159,7 +159,7 @@ pub(super) struct Groups {
 
 impl Groups {
     /// The groups by a rule. Rows that cannot be asked count as members, so that it is known what a group lacks; copies do not.
-    pub(super) fn of(table: &Table, rule: &GroupRule, is_copy: impl Fn(usize) -> bool) -> Self {
+    pub(super) fn new(table: &Table, rule: &GroupRule, is_copy: impl Fn(usize) -> bool) -> Self {
         let mut groups = Self {
             rule: rule.text.clone(),
             ..Self::default()

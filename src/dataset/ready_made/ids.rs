@@ -101,7 +101,7 @@ impl Frames<'_> {
     fn digests(&self, answered: &[Answered], by: ImagesBy) -> Result<Vec<Digest>> {
         let mut files: HashMap<FrameId, Digest> = HashMap::new();
         let digests = answered.iter().map(|question| {
-            let images = self.of_row(question.row).map(|found| match (found?, by) {
+            let images = self.in_row(question.row).map(|found| match (found?, by) {
                 (Found::Member(name) | Found::File(name, _), ImagesBy::Name) => {
                     Ok(Digest::from_bytes(name.0.as_bytes()))
                 }

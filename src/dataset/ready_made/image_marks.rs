@@ -22,7 +22,7 @@ pub(super) struct ImageMarks {
 }
 
 impl ImageMarks {
-    pub(super) fn of(images: usize) -> Self {
+    pub(super) fn new(images: usize) -> Self {
         Self {
             images,
             without_number: 0,
@@ -125,7 +125,7 @@ mod tests {
             ),
             (2, ["<image 1>", "<image>"], Err("some have none")),
         ] {
-            let mut marks = ImageMarks::of(images);
+            let mut marks = ImageMarks::new(images);
             let read: Result<Vec<String>, String> =
                 texts.iter().map(|text| marks.read(text)).collect();
             match (read, expected) {
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn marks_of_a_single_image_are_cut() {
-        let mut marks = ImageMarks::of(1);
+        let mut marks = ImageMarks::new(1);
         let read = marks.read("<image 1>\nWhat is <image> this?").unwrap();
         assert_eq!(read, "What is this?");
         assert_eq!(marks.read_option("<image 1>").unwrap(), "<image 1>");

@@ -49,7 +49,7 @@ fn named_frames(row: &Row, roles: &Roles) -> Vec<RowImage> {
 
 impl ImagesAre {
     /// The images of a row, in order.
-    pub(super) fn of(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
+    pub(super) fn in_row(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
         match self {
             Self::Files => images(row, roles),
             Self::Frames => named_frames(row, roles),
@@ -65,7 +65,7 @@ pub(super) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
             for column in columns {
                 let steps = field_steps(column.field.as_deref());
                 let mut own = Vec::new();
-                collect(column.of(row), column.at, &steps, &mut own);
+                collect(column.cell(row), column.at, &steps, &mut own);
                 let is_embedded = |image: &RowImage| matches!(image, RowImage::Embedded { .. });
                 if own.iter().any(is_embedded) {
                     return own;
@@ -78,7 +78,7 @@ pub(super) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
         Images::All(columns) => {
             for column in columns {
                 let steps = field_steps(column.field.as_deref());
-                collect(column.of(row), column.at, &steps, &mut found);
+                collect(column.cell(row), column.at, &steps, &mut found);
             }
         }
         Images::Template(template) => {
@@ -128,7 +128,7 @@ fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>
 /// Adds the images of a text: a file in base64, a list of such texts, a path, or the id of a row.
 fn text_image(text: &str, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
     if let Some(bytes) = decoded(text) {
-        let (steps, facts) = (steps.to_vec(), FileFacts::of(&bytes));
+        let (steps, facts) = (steps.to_vec(), FileFacts::from_bytes(&bytes));
         found.push(RowImage::Embedded {
             column,
             steps,
@@ -191,7 +191,7 @@ impl EmbeddedImage {
             Some(bytes) => bytes,
             None => value,
         };
-        if FileFacts::of(&value) != self.facts {
+        if FileFacts::from_bytes(&value) != self.facts {
             let problem = "the image has changed since the file was opened; start again";
             return Err(Error::data(place, problem));
         }

@@ -78,7 +78,7 @@ pub(super) fn items(
     let mut endings = Endings((!args.keep_instructions).then_some(cut));
     let (mut items, mut offered) = (Vec::new(), AllOffered::default());
     for (at, row) in table.rows.iter().enumerate() {
-        let count = kind.of(row, roles).len();
+        let count = kind.in_row(row, roles).len();
         let why = match (count, args.multi_image) {
             (0, _) => Some(Why::NoImage),
             (1, _) | (_, Some(SeveralImages::Send)) => None,
@@ -88,7 +88,7 @@ pub(super) fn items(
             left.add(why, || format!("{count} images"));
             continue;
         }
-        match parts(row, roles, ImageMarks::of(count), &mut endings) {
+        match parts(row, roles, ImageMarks::new(count), &mut endings) {
             Ok(Parts {
                 text,
                 whole,
@@ -136,7 +136,7 @@ fn parts(
     endings: &mut Endings<'_>,
 ) -> Result<Parts, NoParts> {
     let [hint, text] = words(row, roles, &mut marks).map_err(NoParts::BadRow)?;
-    let (text, whole, options) = match Options::of(row, roles) {
+    let (text, whole, options) = match Options::from_row(row, roles) {
         Options::Found(mut options) => {
             let texts = options.texts.iter();
             let texts = texts.map(|option| marks.read_option(option));
@@ -193,7 +193,7 @@ fn words(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2]
         Asked::Column(column) => {
             // A list or struct in a text of JSON, as tables hold conversations, is no question either.
             let text = column.text(row);
-            let text = text.filter(|_| column.of(row).parsed().is_none());
+            let text = text.filter(|_| column.cell(row).parsed().is_none());
             text.ok_or_else(|| no_text(column, row))?
         }
     };
@@ -208,11 +208,11 @@ fn words(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2]
 
 /// The problem of a cell of a question that holds no text.
 fn no_text(column: &Column, row: &Row) -> String {
-    let (cell, name) = (column.of(row), excerpt(&column.name, 60));
+    let (cell, name) = (column.cell(row), excerpt(&column.name, 60));
     if cell.is_absent() {
         return format!("the question is empty (column {name:?})");
     }
-    let inner = Turns::of(&column.name, cell).map_or_else(String::new, |turns| {
+    let inner = Turns::from_cell(&column.name, cell).map_or_else(String::new, |turns| {
         format!(
             "; {} reads its text",
             flag(Role::Question, &turns.question, None)
@@ -234,9 +234,9 @@ pub(super) enum AnswerCell {
 }
 
 impl AnswerCell {
-    pub(super) fn of(row: &Row, column: &Column) -> Self {
+    pub(super) fn from_row(row: &Row, column: &Column) -> Self {
         use super::cell::Cell;
-        let cell = column.of(row);
+        let cell = column.cell(row);
         let items = match cell {
             Cell::List(cells) => cells.iter().map(Cell::text).collect(),
             Cell::Text(text) => super::text_list::list(text),

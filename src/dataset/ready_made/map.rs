@@ -64,7 +64,7 @@ impl Map {
     }
 
     /// The entry of a role.
-    pub(super) fn of(&self, role: Role) -> Option<&Entry> {
+    pub(super) fn entry(&self, role: Role) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.role == role)
     }
 }
@@ -131,7 +131,7 @@ fn entry(text: &str) -> Result<Entry, String> {
             (column, How::Split(signs.to_owned()))
         }
         (Role::Answer, Some((column, how))) => {
-            let reading = Reading::of_name(how);
+            let reading = Reading::from_name(how);
             let reading = reading.ok_or_else(|| {
                 let names = Reading::ALL.map(Reading::name).join(", ");
                 format!("answer=COLUMN:HOW expected, with one of {names}")
@@ -168,27 +168,33 @@ mod tests {
         let text = "id=nr,question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1,family=";
         let map: Map = text.parse().unwrap();
         assert_eq!(map.to_string(), text);
-        let columns = |role| map.of(role).unwrap().columns.clone();
+        let columns = |role| map.entry(role).unwrap().columns.clone();
         assert_eq!(columns(Role::Image), ["pics/{bild}.png"]);
         assert_eq!(columns(Role::Family), Vec::<String>::new());
-        assert_eq!(map.of(Role::Options).unwrap().how, How::Split("|".into()));
         assert_eq!(
-            map.of(Role::Answer).unwrap().how,
+            map.entry(Role::Options).unwrap().how,
+            How::Split("|".into())
+        );
+        assert_eq!(
+            map.entry(Role::Answer).unwrap().how,
             How::Answer(Reading::Index1)
         );
-        assert_eq!(map.of(Role::Hint), None);
+        assert_eq!(map.entry(Role::Hint), None);
         let cells: Map = "options=first,second:x,third".parse().unwrap_or_default();
         assert_eq!(cells.entries, []);
         let cells: Map = "options=first,second,answer=truth".parse().unwrap();
         assert_eq!(
-            cells.of(Role::Options).unwrap().columns,
+            cells.entry(Role::Options).unwrap().columns,
             ["first", "second"]
         );
         let comma: Map = "options=all:split(,)".parse().unwrap();
-        assert_eq!(comma.of(Role::Options).unwrap().how, How::Split(",".into()));
+        assert_eq!(
+            comma.entry(Role::Options).unwrap().how,
+            How::Split(",".into())
+        );
         let both = Map::joined([&map, &"id=,answer=x".parse().unwrap()]);
-        assert_eq!(both.of(Role::Id).unwrap().columns, Vec::<String>::new());
-        assert_eq!(both.of(Role::Question).unwrap().columns, ["frage"]);
+        assert_eq!(both.entry(Role::Id).unwrap().columns, Vec::<String>::new());
+        assert_eq!(both.entry(Role::Question).unwrap().columns, ["frage"]);
     }
 
     #[test]

@@ -101,16 +101,16 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     } = found;
     let info = match &archive {
         Some(archive) => FolderInfo::in_archive(archive)?,
-        None => FolderInfo::of(&folder)?,
+        None => FolderInfo::in_folder(&folder)?,
     };
     let mut further = args.root.data_root.clone();
     further.extend(allowed);
-    let root = Root::of(&folder, &further)?;
+    let root = Root::new(&folder, &further)?;
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
     let mut table = rows(&files, joined, args)?;
     table.parse_cells(info.map.iter().chain(&args.map));
     let (group, no_group) = preset.map_or((None, None), |preset| preset.group(&table));
-    let frame = of_frame(&table).filter(|_| is_own(&table) && table.find("image").is_none());
+    let frame = frame_map(&table).filter(|_| is_own(&table) && table.find("image").is_none());
     let map = Map::joined(frame.iter().chain(&group).chain(&info.map).chain(&args.map));
     let wrong = |table: &Table, problem: String| {
         let hint = preset::recognised(&table.columns, args.preset.as_deref());
@@ -136,7 +136,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     let mut notes = notes;
     notes.append(&mut table.notes.clone());
     notes.extend(preset.map(preset::Preset::source));
-    notes.extend(no_group.filter(|_| map.of(Role::Group).is_none()));
+    notes.extend(no_group.filter(|_| map.entry(Role::Group).is_none()));
     let hint = preset::recognised(&table.columns, args.preset.as_deref());
     let opened = Opened {
         place,
@@ -240,7 +240,7 @@ pub(super) struct ReadQuestions {
 }
 
 /// That the column `frame` names the image, if there is one.
-fn of_frame(table: &Table) -> Option<Map> {
+fn frame_map(table: &Table) -> Option<Map> {
     let frame = table.find("frame");
     frame.and_then(|_| "image=frame".parse().ok())
 }
@@ -252,14 +252,14 @@ fn of_frame(table: &Table) -> Option<Map> {
 pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions> {
     let mut table = Table::default();
     SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
-    let own = of_frame(&table);
+    let own = frame_map(&table);
     let folder = file.parent().unwrap_or(Path::new(""));
-    let info = FolderInfo::of(folder)?;
+    let info = FolderInfo::in_folder(folder)?;
     table.parse_cells(info.map.iter().chain(&args.map));
     let map = Map::joined(own.iter().chain(&info.map).chain(&args.map));
     let (roles, set) = read(&table, &map, args, None, ImagesAre::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
-    let root = Root::of(folder, &[])?;
+    let root = Root::new(folder, &[])?;
     let frames = Frames::new(
         &table,
         &root,
@@ -337,7 +337,7 @@ fn finish(
         .map_err(|problem| Error::data(opened.place.display(), problem))?;
         ids = frames.ids(&set.answered).map_err(with_skip)?;
     }
-    let family = FamilyOf::of(opened.table, &opened.roles.families, &set.answered);
+    let family = FamilyOf::from_table(opened.table, &opened.roles.families, &set.answered);
     let groups = (&family, &set.groups);
     let questions = questions(
         opened,
@@ -418,8 +418,8 @@ fn read(
     if table.rows.is_empty() {
         return Err("no questions in it".to_owned());
     }
-    let roles = Roles::of(table, map)?;
-    let rule = GroupRule::of(table, map)?;
+    let roles = Roles::new(table, map)?;
+    let rule = GroupRule::from_map(table, map)?;
     let (mut left, mut cut) = (LeftOut::default(), Cut::new());
     let mut kept = items(table, &roles, kind, args, &mut left, &mut cut)?;
     let is_copy = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
@@ -432,7 +432,7 @@ fn read(
         return Err("no row is left to ask".to_owned());
     }
     let how = map
-        .of(Role::Answer)
+        .entry(Role::Answer)
         .map_or(&How::ByRule, |entry| &entry.how);
     let truths = truths(table, &roles, how, kept, &mut left)?;
     left.check(table.rows.len(), args)
@@ -441,7 +441,7 @@ fn read(
         return Err("no row is left to ask".to_owned());
     }
     let set = ReadSet {
-        groups: rule.map_or_else(Groups::default, |rule| Groups::of(table, &rule, is_copy)),
+        groups: rule.map_or_else(Groups::default, |rule| Groups::new(table, &rule, is_copy)),
         answered: truths.answered,
         said: truths.said,
         cut,
@@ -507,7 +507,7 @@ fn questions(
             text: answered.text,
             choices: answered.choices,
             group: groups.group(row),
-            evidence: evidence.map_or(serde_json::Value::Null, |column| column.of(cells).into()),
+            evidence: evidence.map_or(serde_json::Value::Null, |column| column.cell(cells).into()),
         });
     }
     Ok(questions)

@@ -26,23 +26,23 @@ pub(super) enum Options {
 
 impl Options {
     /// The options of a row in its columns.
-    pub(super) fn of(row: &Row, roles: &Roles) -> Self {
+    pub(super) fn from_row(row: &Row, roles: &Roles) -> Self {
         let mut found: Vec<(String, Offered)> = Vec::new();
         let cells = roles.cells.iter().enumerate();
-        let cells = cells.filter_map(|(place, cell)| Some((option(cell.of(row))?, place)));
+        let cells = cells.filter_map(|(place, cell)| Some((option(cell.cell(row))?, place)));
         let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
         if !texts.is_empty() {
             let offered = Offered::placed(&without_letters(texts), places);
             found.push((cell_names(&roles.cells), offered));
         }
         for column in &roles.options {
-            let cell = column.of(row);
+            let cell = column.cell(row);
             if cell.is_absent() {
                 continue;
             }
             let split = roles.split_options.as_deref();
             let offered = match by_letter(cell).filter(|_| split.is_none()) {
-                Some(fields) => of_fields(&fields).map_err(|problem| {
+                Some(fields) => options_in_fields(&fields).map_err(|problem| {
                     let shown = cell.shown(60);
                     format!(
                         "the options in the column {:?} {problem}: {shown}",
@@ -97,7 +97,7 @@ fn by_letter(cell: &Cell) -> Option<Fields> {
 }
 
 /// The options of an object whose fields are the letters from A on, of either case.
-fn of_fields(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
+fn options_in_fields(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
     let mut sorted: Vec<(char, &Cell)> = Vec::with_capacity(fields.len());
     for (name, cell) in fields {
         let mut chars = name.trim().chars();

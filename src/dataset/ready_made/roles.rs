@@ -87,16 +87,16 @@ impl Roles {
     ///
     /// # Errors
     /// If a column of the map is not there, no column is the question, or the columns hold several questions a row.
-    pub(super) fn of(table: &Table, map: &Map) -> Result<Self, String> {
+    pub(super) fn new(table: &Table, map: &Map) -> Result<Self, String> {
         let named = |role| Self::named(table, map, role);
         let question = named(Role::Question)?;
         refuse_wide(table, map)?;
-        let question = match (question.into_iter().next(), map.of(Role::Question)) {
+        let question = match (question.into_iter().next(), map.entry(Role::Question)) {
             (Some(column), _) => Asked::Column(column),
             (None, Some(_)) => Asked::InImage,
             (None, None) => return Err(no_question(table)),
         };
-        let how = map.of(Role::Options);
+        let how = map.entry(Role::Options);
         let mut options = named(Role::Options)?;
         let is_of_cells = how.is_some() && options.len() > 1;
         let cells = match how {
@@ -113,7 +113,7 @@ impl Roles {
             answers: named(Role::Answer)?,
             ids: named(Role::Id)?,
             hint: named(Role::Hint)?.into_iter().next(),
-            families: match map.of(Role::Family) {
+            families: match map.entry(Role::Family) {
                 Some(_) => Families::Said(named(Role::Family)?.into_iter().next()),
                 None => Families::Known(named(Role::Family)?),
             },
@@ -178,7 +178,7 @@ impl Roles {
 
     /// The columns of a role: those of the map, or those with one of its names, the best first.
     fn named(table: &Table, map: &Map, role: Role) -> Result<Vec<Column>, String> {
-        if let Some(entry) = map.of(role) {
+        if let Some(entry) = map.entry(role) {
             if entry.columns.len() > 1
                 && let Some(at) = table.find(&entry.whole)
             {
@@ -203,7 +203,7 @@ impl Roles {
     }
 
     fn images(table: &Table, map: &Map) -> Result<Images, String> {
-        let entry = map.of(Role::Image);
+        let entry = map.entry(Role::Image);
         if let Some([template]) = entry.map(|entry| &*entry.columns)
             && template.contains('{')
         {
@@ -357,7 +357,7 @@ fn cells(table: &Table) -> Vec<Column> {
 /// Refuses a table that has several questions a row.
 fn refuse_wide(table: &Table, map: &Map) -> Result<(), String> {
     let wide = numbered(table, &["question"]);
-    if wide.len() < 2 || map.of(Role::Question).is_some() {
+    if wide.len() < 2 || map.entry(Role::Question).is_some() {
         return Ok(());
     }
     let names: Vec<&str> = wide.iter().map(|column| column.name.as_str()).collect();

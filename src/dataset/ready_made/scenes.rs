@@ -31,7 +31,7 @@ impl<'a> Scenes<'a> {
     pub(super) fn new(table: &Table, map: &Map, column: Option<&'a Column>) -> Self {
         Self {
             column,
-            is_meant: map.of(Role::Scene).is_some() || is_own(table),
+            is_meant: map.entry(Role::Scene).is_some() || is_own(table),
             names: SceneNames::new(),
             frames: BTreeSet::new(),
             contradiction: None,

@@ -82,8 +82,8 @@ pub(super) fn truths(
         answered: Vec::new(),
         said: Vec::new(),
     };
-    of_options(table, roles, how, listed, left, &mut truths)?;
-    of_yes_or_no(table, roles, bare, left, &mut truths)?;
+    read_with_options(table, roles, how, listed, left, &mut truths)?;
+    read_without_options(table, roles, bare, left, &mut truths)?;
     truths.answered.sort_by_key(|answered| answered.row);
     Ok(truths)
 }
@@ -97,7 +97,7 @@ fn names_no_options(table: &Table, roles: &Roles, item: &Item) -> bool {
         .answers
         .iter()
         .filter_map(
-            |column| match AnswerCell::of(&table.rows[item.row], column) {
+            |column| match AnswerCell::from_row(&table.rows[item.row], column) {
                 AnswerCell::One(answer) => Some(answer),
                 AnswerCell::Absent | AnswerCell::Several(_) => None,
             },
@@ -137,7 +137,7 @@ pub(super) fn is_own(table: &Table) -> bool {
 
 /// Whether every answer is written as a text, and none as a number.
 fn are_texts(table: &Table, column: &Column) -> bool {
-    let mut cells = table.rows.iter().map(|row| column.of(row));
+    let mut cells = table.rows.iter().map(|row| column.cell(row));
     cells.all(|cell| matches!(cell, Cell::Text(_)))
 }
 
@@ -154,7 +154,7 @@ fn with_answers(
     let mut absent = Vec::new();
     let mut found = Vec::with_capacity(count);
     for item in items {
-        match AnswerCell::of(&table.rows[item.row], column) {
+        match AnswerCell::from_row(&table.rows[item.row], column) {
             AnswerCell::One(answer) => found.push((item, answer)),
             AnswerCell::Several(shown) => left.add(Why::SeveralTruths, || shown),
             AnswerCell::Absent => absent.push(item.row),
@@ -179,7 +179,7 @@ fn with_answers(
 }
 
 /// The questions with options.
-fn of_options(
+fn read_with_options(
     table: &Table,
     roles: &Roles,
     how: &How,
@@ -190,10 +190,10 @@ fn of_options(
     if items.is_empty() {
         return Ok(());
     }
-    let column = answer_column::of_options(table, roles, &items)?;
+    let column = answer_column::option_column(table, roles, &items)?;
     let other = answer_column::unnamed(table, roles, &items);
     let items = with_answers(table, column, items, left, other)?;
-    let read = ColumnReading::of(table, column, how, &items)?;
+    let read = ColumnReading::choose(table, column, how, &items)?;
     let name = read.reading.name();
     truths.said.push(format!("{} ({name})", column.name));
     truths.answered.reserve(items.len());
@@ -225,7 +225,7 @@ impl<'h> ColumnReading<'h> {
     ///
     /// # Errors
     /// If it fits no row, or two readings fit and differ.
-    fn of(
+    fn choose(
         table: &Table,
         column: &Column,
         how: &'h How,
@@ -338,7 +338,7 @@ fn ambiguous(
 }
 
 /// The questions without options: of yes and no, or open.
-fn of_yes_or_no(
+fn read_without_options(
     table: &Table,
     roles: &Roles,
     items: Vec<Item>,
@@ -348,7 +348,7 @@ fn of_yes_or_no(
     if items.is_empty() {
         return Ok(());
     }
-    let column = answer_column::of_words(table, roles, &items)?;
+    let column = answer_column::yes_or_no_column(table, roles, &items)?;
     let items = with_answers(table, column, items, left, None)?;
     let verbs = items
         .iter()

@@ -25,12 +25,12 @@ impl Turns {
     pub(super) fn find(table: &Table) -> Option<Self> {
         let row = table.rows.first()?;
         let columns = table.columns.iter().enumerate();
-        let mut turns = columns.filter_map(|(at, name)| Self::of(name, row.cell(at)));
+        let mut turns = columns.filter_map(|(at, name)| Self::from_cell(name, row.cell(at)));
         turns.next()
     }
 
     /// The turns in a cell of a column.
-    pub(super) fn of(column: &str, cell: &Cell) -> Option<Self> {
+    pub(super) fn from_cell(column: &str, cell: &Cell) -> Option<Self> {
         let cell = cell.parsed().map_or(Cow::Borrowed(cell), Cow::Owned);
         let Cell::List(turns) = &*cell else {
             return None;
@@ -75,8 +75,8 @@ mod tests {
 
     use super::*;
 
-    fn of(cell: Value) -> Option<(String, Option<String>)> {
-        let turns = Turns::of("chat", &Cell::from(cell))?;
+    fn turns(cell: Value) -> Option<(String, Option<String>)> {
+        let turns = Turns::from_cell("chat", &Cell::from(cell))?;
         Some((turns.question, turns.answer))
     }
 
@@ -84,20 +84,23 @@ mod tests {
     fn the_first_question_and_its_answer_are_found() {
         let llava = json!([{"from": "human", "value": "?"}, {"from": "gpt", "value": "A"}]);
         let paths = Some(("chat.0.value".to_owned(), Some("chat.1.value".to_owned())));
-        assert_eq!(of(llava.clone()), paths);
-        assert_eq!(of(json!(llava.to_string())), paths);
+        assert_eq!(turns(llava.clone()), paths);
+        assert_eq!(turns(json!(llava.to_string())), paths);
         let parts = json!([
             {"role": "system", "content": "Be brief."},
             {"role": "user", "content": [{"type": "image"}, {"type": "text", "text": "?"}]},
         ]);
-        assert_eq!(of(parts), Some(("chat.1.content.1.text".to_owned(), None)));
+        assert_eq!(
+            turns(parts),
+            Some(("chat.1.content.1.text".to_owned(), None))
+        );
         for other in [
             json!("[\"x\"]"),
             json!(["human"]),
             json!({"from": "human"}),
             json!([]),
         ] {
-            assert_eq!(of(other), None);
+            assert_eq!(turns(other), None);
         }
     }
 }

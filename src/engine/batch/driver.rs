@@ -233,7 +233,7 @@ impl<D: Detail> Driver<'_, D> {
 
     /// The server of a part.
     pub(super) fn server(&self, part: usize) -> Result<&BatchServer> {
-        self.servers.of(&self.part(part).facts)
+        self.servers.server(&self.part(part).facts)
     }
 
     /// Prints a line once.

@@ -62,7 +62,7 @@ impl<'a> FolderBatches<'a> {
                 ..access.clone()
             };
             let sending = Sending::default();
-            let endpoint = Endpoint::of(access.server(sending)?.replicas, sending)?;
+            let endpoint = Endpoint::from_addresses(access.server(sending)?.replicas, sending)?;
             servers = Servers::at(endpoint.base().to_string(), endpoint.batch_server()?);
         }
         Ok(Self {
@@ -81,7 +81,7 @@ impl<'a> FolderBatches<'a> {
             let (Stage::Created, Some(id)) = (&part.stage, &part.batch) else {
                 continue;
             };
-            let looked = match self.servers.of(&part.facts) {
+            let looked = match self.servers.server(&part.facts) {
                 Ok(server) => runtime
                     .block_on(server.batch(id))
                     .map_err(|e| e.to_string()),

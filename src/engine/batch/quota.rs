@@ -115,7 +115,7 @@ impl<D: Detail> Driver<'_, D> {
                 manifest: Some(self.manifest),
             };
             let trials = self.store.trials()?;
-            Budget::of_run(money, &[], answering, &trials)?.charged()
+            Budget::for_run(money, &[], answering, &trials)?.charged()
         };
         self.notes.charged.set(Some(charged));
         let killed = InFlightCost::open(self.store.folder())?.killed();

@@ -247,7 +247,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             models: &all,
             manifest: Some(&self.run.manifest),
         };
-        let budget = Budget::of_run(money, models, answering, &remaining.stored)?;
+        let budget = Budget::for_run(money, models, answering, &remaining.stored)?;
         if self.args.no_scout {
             BudgetNotes::new(models).say_unlimited(budget.spending());
         }
@@ -295,7 +295,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     fn drive(&mut self) -> Result<Option<Driven>> {
         let experiment = self.run.experiment;
         let models = every_model(experiment);
-        let servers = Servers::of_models(&models)?;
+        let servers = Servers::for_models(&models)?;
         let mut driver = Driver {
             store: &mut self.run.store,
             manifest: &self.run.manifest,

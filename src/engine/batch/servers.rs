@@ -29,7 +29,7 @@ impl Servers {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
-    pub(super) fn of_models(models: &[&ModelUnderTest]) -> Result<Self> {
+    pub(super) fn for_models(models: &[&ModelUnderTest]) -> Result<Self> {
         let mut servers = Vec::new();
         for model in models {
             let Some(server) = model.model.batch_server()? else {
@@ -68,7 +68,7 @@ impl Servers {
     ///
     /// # Errors
     /// If no flag names it.
-    pub(super) fn of(&self, facts: &PartFacts) -> Result<&BatchServer> {
+    pub(super) fn server(&self, facts: &PartFacts) -> Result<&BatchServer> {
         let PartFacts { base, name, .. } = facts;
         let at_base: Vec<&ModelServer> = self.0.iter().filter(|one| one.base == *base).collect();
         let own = at_base.iter().find(|one| facts.asks(&one.name, &one.id));

@@ -136,7 +136,7 @@ impl<D: Detail> Driver<'_, D> {
             Err(failure) if failure.is_unsupported() => return Err(self.unknown(part)),
             Err(failure) => return self.look_failed(part, &failure),
         };
-        match self.of_part(part, batches) {
+        match self.part_batch(part, batches) {
             Some(batch) => self.created(part, batch.id),
             None if self.is_missing(part, "batch") => {
                 self.refuse(part, "the batch is not at the server")
@@ -149,7 +149,7 @@ impl<D: Detail> Driver<'_, D> {
     async fn find_earlier(&mut self, part: usize) -> Result<Option<Step>> {
         let listed = self.server(part)?.batches().await;
         match listed {
-            Ok(batches) => match self.of_part(part, batches) {
+            Ok(batches) => match self.part_batch(part, batches) {
                 Some(batch) => self.created(part, batch.id).map(Some),
                 None => Ok(None),
             },
@@ -159,7 +159,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// The batch of a part: of its last attempt, else one of an earlier attempt that the server did not refuse.
-    fn of_part(&self, part: usize, batches: Vec<RemoteBatch>) -> Option<RemoteBatch> {
+    fn part_batch(&self, part: usize, batches: Vec<RemoteBatch>) -> Option<RemoteBatch> {
         let last = self.mark(part);
         let any = format!("{}/{}/", self.journal.run, self.part(part).stem());
         let is_ours = |batch: &RemoteBatch| {

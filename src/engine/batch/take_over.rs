@@ -47,7 +47,7 @@ impl<'a, D: Detail> Driver<'a, D> {
         let models = self.models_of(part);
         let mut refused = BTreeSet::new();
         let (mut is_adapted, mut unread) = (false, 0);
-        let server = self.servers.of(&self.part(part).facts)?;
+        let server = self.servers.server(&self.part(part).facts)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
         for path in paths.iter().filter(|path| path.exists()) {
             for_each_line(path, |line| {

@@ -75,7 +75,7 @@ pub(super) struct Entry {
 
 impl Entry {
     /// The model that a flag names, with the settings of the flags.
-    pub(super) fn of_flag(id: ModelName, view: View, asking: AskingArgs) -> Self {
+    pub(super) fn from_flag(id: ModelName, view: View, asking: AskingArgs) -> Self {
         Self {
             name: match &id {
                 ModelName::Script(path) => format!("script:{}", path.display()),
@@ -96,7 +96,7 @@ impl Entry {
     ///
     /// # Errors
     /// If a key is unknown or its value cannot be used; the error names the line.
-    pub(super) fn of_file(
+    pub(super) fn from_file(
         keys: &Keys,
         layers: &[&Keys],
         view: View,
@@ -115,7 +115,7 @@ impl Entry {
             .map_err(|problem| id.error(problem))?;
         let mut entry = Self {
             place: Some(id.place.clone()),
-            ..Self::of_flag(name, view, asking)
+            ..Self::from_flag(name, view, asking)
         };
         if keys.contains_key("endpoints") {
             // A key of the flags belongs to the address of the flags. One of [defaults] is of all models of the file.

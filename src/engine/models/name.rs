@@ -63,7 +63,7 @@ impl ModelName {
             .into_iter()
             .filter(|built_in| is_nearly(&word, built_in));
         match near.next() {
-            Some(built_in) if Prices::built_in()?.of(name).is_none() => {
+            Some(built_in) if Prices::built_in()?.find(name).is_none() => {
                 let hint = if built_in == "script" {
                     "script:FILE"
                 } else {

@@ -117,7 +117,7 @@ impl AskSettings {
         let view = if args.blind { View::Blind } else { View::Image };
         let file = args.models.as_deref().map(ModelsFile::read).transpose()?;
         let mut entries = match &file {
-            Some(file) => of_file(file, view, asking, context.typed)?,
+            Some(file) => entries_from_file(file, view, asking, context.typed)?,
             None => Vec::new(),
         };
         if let Some(file) = &file {
@@ -129,7 +129,7 @@ impl AskSettings {
             trust::check(file, &entries, asking, context.data, trust)?;
         }
         refuse_models_of_file(&entries, &args.blind_model)?;
-        let flag = |name: &ModelName, view| Entry::of_flag(name.clone(), view, asking.clone());
+        let flag = |name: &ModelName, view| Entry::from_flag(name.clone(), view, asking.clone());
         entries.extend(args.model.iter().map(|name| flag(name, view)));
         entries.extend(args.blind_model.iter().map(|name| flag(name, View::Blind)));
         for text in &args.set {
@@ -230,7 +230,7 @@ fn add_text_baselines(entries: &mut [Entry]) {
 }
 
 /// The models of a file: the flags of the call above its defaults, its tables above the flags.
-fn of_file(
+fn entries_from_file(
     file: &ModelsFile,
     view: View,
     asking: &AskingArgs,
@@ -256,7 +256,7 @@ fn of_file(
         let defaults = file.defaults.clone().into_iter();
         let defaults: Keys = defaults.filter(|(key, _)| holds(key, keys)).collect();
         overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
-        entries.push(Entry::of_file(
+        entries.push(Entry::from_file(
             keys,
             &[&defaults, keys],
             view,

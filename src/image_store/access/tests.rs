@@ -4,7 +4,7 @@ use super::*;
 use crate::image_store::{Content, EntryFacts, Shown};
 
 fn key(name: &str) -> Key {
-    Key::of(&[name]).unwrap()
+    Key::from_recipe(&[name]).unwrap()
 }
 
 fn entry(bytes: usize) -> Entry {
@@ -138,7 +138,7 @@ fn facts_alone_are_kept_beside_images_and_not_counted_as_images() {
     };
     let facts = EntryFacts::new(shown, 500, serde_json::json!("found"));
     assert!(!store.contains(&key("a")));
-    store.put(&key("a"), &Entry::of_facts(facts));
+    store.put(&key("a"), &Entry::from_facts(facts));
     assert!(store.contains(&key("a")));
     let read = store.get(&key("a"), Content::Probe, |_| true).unwrap();
     assert_eq!(read.facts.notes, serde_json::json!("found"));

@@ -98,7 +98,7 @@ impl<'a> ImagePipeline<'a> {
         sources: &[Source],
         plan: &[SourcePlan<I>],
     ) -> Result<()> {
-        let frames = DarkFrames::of(sources, plan, images.name());
+        let frames = DarkFrames::new(sources, plan, images.name());
         let steps = self.steps.without_store();
         for (place, (source, conditions)) in frames.frames().iter().enumerate() {
             let Some(frame) = source.middle() else {
@@ -128,7 +128,7 @@ impl<'a> ImagePipeline<'a> {
             return Ok(Known::Nothing(None));
         };
         let recipe = self.steps.recipe;
-        let frames = DarkFrames::of(sources, plan, model.name());
+        let frames = DarkFrames::new(sources, plan, model.name());
         if frames.is_empty() {
             // It enhances nothing in this plan, so nothing is tried.
             return Ok(Known::Nothing(None));
@@ -169,7 +169,7 @@ impl<'a> ImagePipeline<'a> {
         sources: &[Source],
         plan: &[SourcePlan<I>],
     ) -> Result<()> {
-        let dark = dark_frames(self.steps, &DarkFrames::of(sources, plan, enhancer.name()))?;
+        let dark = dark_frames(self.steps, &DarkFrames::new(sources, plan, enhancer.name()))?;
         if dark.is_empty() {
             return Ok(());
         }

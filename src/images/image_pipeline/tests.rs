@@ -19,9 +19,9 @@ fn frame() -> (tempfile::TempDir, Dataset, Source) {
     let pixels = Rgb::new(40, 60, samples).unwrap();
     let payload = Payload::encode(&pixels, PayloadFormat::Png).unwrap();
     std::fs::write(folder.path().join("a.png"), payload.file()).unwrap();
-    let dataset = Dataset::of_images(folder.path(), &[]).unwrap();
+    let dataset = Dataset::from_images(folder.path(), &[]).unwrap();
     let name = dataset.frames().next().unwrap().clone();
-    let source = Source::of_questions(&dataset, &name).unwrap();
+    let source = Source::from_questions(&dataset, &name).unwrap();
     (folder, dataset, source)
 }
 

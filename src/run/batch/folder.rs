@@ -71,7 +71,7 @@ pub(crate) fn cancel(args: &BatchFolderArgs, progress: &Progress) -> Result<Outc
 }
 
 fn carry_out(args: &BatchFolderArgs, task: FolderTask, progress: &Progress) -> Result<Outcome> {
-    match ExperimentKind::of(&args.run.run)? {
+    match ExperimentKind::read(&args.run.run)? {
         ExperimentKind::Choice => in_run::<ChoiceDetail>(args, task, progress, choice::write),
         ExperimentKind::Open => in_run::<OpenDetail>(args, task, progress, open::write),
     }

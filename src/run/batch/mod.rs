@@ -41,7 +41,7 @@ pub(crate) struct BatchImportArgs {
 /// # Errors
 /// If the folder holds no run or no batch, or a line is not valid. The replies of the lines before it stay imported.
 pub(crate) fn import(args: &BatchImportArgs) -> Result<Outcome> {
-    match ExperimentKind::of(&args.run)? {
+    match ExperimentKind::read(&args.run)? {
         ExperimentKind::Choice => import_into::<ChoiceDetail>(args, choice::write),
         ExperimentKind::Open => import_into::<OpenDetail>(args, open::write),
     }

@@ -59,20 +59,20 @@ impl RunParts {
         let manifest: RunManifest =
             serde_json::from_value(value).map_err(|e| broken("manifest.json", &e))?;
         let place = Path::new(name);
-        match ExperimentKind::of(folder)? {
+        match ExperimentKind::read(folder)? {
             ExperimentKind::Choice => {
                 let files = RunFiles::read(folder)?;
                 let frames: Vec<_> = files.questions.iter().map(|q| q.frame.clone()).collect();
                 let shown = |all: &[Thumbnail]| shown_thumbnails(all, &frames);
                 let lines = (store::read_records(folder)?, files);
                 let parts = parts(lines, thumbnails, shown, redactor)?;
-                let run = StoredRun::of_lines(place, manifest.clone(), parts.lines)?;
+                let run = StoredRun::from_records(place, manifest.clone(), parts.lines)?;
                 Self::new(manifest, parts.files, AnyRun::Choice(run), parts.thumbnails)
             }
             ExperimentKind::Open => {
                 let lines = (store::read_records(folder)?, RunFiles::read(folder)?);
                 let parts = parts(lines, thumbnails, <[Thumbnail]>::to_vec, redactor)?;
-                let run = StoredRun::of_lines(place, manifest.clone(), parts.lines)?;
+                let run = StoredRun::from_records(place, manifest.clone(), parts.lines)?;
                 Self::new(manifest, parts.files, AnyRun::Open(run), parts.thumbnails)
             }
         }

@@ -70,7 +70,7 @@ struct Asked {
 }
 
 impl Asked {
-    fn of<D: Detail>(trials: &Trials<D>) -> Self {
+    fn from_trials<D: Detail>(trials: &Trials<D>) -> Self {
         let mut asked = Self::default();
         for (model, condition) in trials.asked().into_iter().flatten() {
             match condition {
@@ -89,12 +89,12 @@ impl Asked {
 pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     let mut words = vec!["darkqa-eval".to_owned()];
     let asked = match run {
-        AnyRun::Choice(run) => Asked::of(&run.trials),
+        AnyRun::Choice(run) => Asked::from_trials(&run.trials),
         AnyRun::Open(run) => {
             // The manifest has the digest of the questions, not their place.
             let questions = ["openeqa", "--questions", "DIR/questions.json"];
             words.extend(questions.map(str::to_owned));
-            Asked::of(&run.trials)
+            Asked::from_trials(&run.trials)
         }
     };
     let setting = |name: &str| manifest.settings.get(name).and_then(Value::as_str);
@@ -121,7 +121,7 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
         }
     }
     match (&file, judge.and_then(|judge| remote.get(&judge.to_owned()))) {
-        (None, _) => words.extend(of_models(&remote)),
+        (None, _) => words.extend(common_flags(&remote)),
         (Some(_), Some(judge)) => {
             words.extend(flag_words(&judge_flag("--base-url"), &judge["--base-url"]));
         }
@@ -214,7 +214,7 @@ fn is_control(model: &str) -> bool {
 }
 
 /// The flags of models that all of them have with the same value.
-fn of_models(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
+fn common_flags(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
     let remote: Vec<&Value> = remote.values().copied().collect();
     let Some(first) = remote.first().and_then(|first| first.as_object()) else {
         return Vec::new();

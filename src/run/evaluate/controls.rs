@@ -26,7 +26,7 @@ impl AddedControls {
     ///
     /// # Errors
     /// If other-room is named by a flag, and there is no other scene.
-    pub(super) fn of(config: &Evaluation, has_other_scene: bool) -> Result<Self> {
+    pub(super) fn new(config: &Evaluation, has_other_scene: bool) -> Result<Self> {
         let ask = &config.job.ask;
         let other_room = ModelName::Observer(Some(Control::OtherRoom));
         if !has_other_scene && ask.shows_images_to(&other_room) {

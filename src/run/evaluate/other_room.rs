@@ -14,7 +14,7 @@ pub(super) struct OtherRooms(BTreeMap<FrameId, FrameId>);
 
 impl OtherRooms {
     /// The other frames; `None` if all frames are of one scene. A frame whose scene is not known (empty) is a scene by itself.
-    pub(super) fn of(questions: &[Question], scene: impl Fn(&FrameId) -> String) -> Option<Self> {
+    pub(super) fn new(questions: &[Question], scene: impl Fn(&FrameId) -> String) -> Option<Self> {
         let frames = first_asked(questions).into_iter();
         let frames: Vec<&FrameId> = frames.map(|question| &question.frame).collect();
         let scene_of = |frame: &&FrameId| {
@@ -45,7 +45,7 @@ impl OtherRooms {
     }
 
     /// The frame that is shown in place of a frame.
-    pub(super) fn of_frame(&self, frame: &FrameId) -> Option<&FrameId> {
+    pub(super) fn shown_for(&self, frame: &FrameId) -> Option<&FrameId> {
         self.0.get(frame)
     }
 }
@@ -68,9 +68,9 @@ mod tests {
         let questions: Vec<Question> = frames.chars().enumerate().map(question).collect();
         // Lower and upper case are frames of one scene; digits have none.
         let scene = |frame: &FrameId| frame.0.to_lowercase().replace(char::is_numeric, "");
-        let others = OtherRooms::of(&questions, scene)?;
+        let others = OtherRooms::new(&questions, scene)?;
         let shown = frames.chars().map(|frame| {
-            let shown = others.of_frame(&FrameId(frame.to_string())).unwrap();
+            let shown = others.shown_for(&FrameId(frame.to_string())).unwrap();
             shown.0.clone()
         });
         Some(shown.collect())

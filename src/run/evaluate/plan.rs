@@ -99,7 +99,7 @@ pub(super) fn trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceIte
         own.extend(prompts(setup, question, None)?);
     }
     for question in &setup.with_other_rooms {
-        if let Some(shown) = setup.other_rooms.of_frame(&question.frame) {
+        if let Some(shown) = setup.other_rooms.shown_for(&question.frame) {
             let others = &mut by_source[setup.places[shown]].others;
             others.extend(prompts(setup, question, Some(shown))?);
         }
@@ -131,7 +131,7 @@ fn prompts(
             let words = setup.config.prompts.render(view, &arranged.question)?;
             let prompt = match (view, setup.config.image_place) {
                 (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
-                _ => Prompt::of(words.into()),
+                _ => Prompt::from_text(words.into()),
             };
             let several = setup.dataset.several(&question.frame);
             Ok(match view {

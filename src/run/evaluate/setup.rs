@@ -70,8 +70,8 @@ impl<'a> ChoiceSetup<'a> {
         let (dataset, all) = asked_data(config, progress)?;
         let dataset = Arc::new(dataset);
         let file_places = file_places(config, &dataset, &all);
-        let other_rooms = OtherRooms::of(&all, |frame| dataset.scene(frame));
-        let controls = AddedControls::of(config, other_rooms.is_some())?;
+        let other_rooms = OtherRooms::new(&all, |frame| dataset.scene(frame));
+        let controls = AddedControls::new(config, other_rooms.is_some())?;
         let (questions, part) = part(
             all.clone(),
             job.shard,
@@ -163,7 +163,7 @@ impl<'a> ChoiceSetup<'a> {
     /// Adds the questions that are asked with the image of another frame, if that image is of this run or shard.
     fn add_other_rooms(&mut self, mut all: Vec<Question>) -> Result<()> {
         all.retain(|question| {
-            let shown = self.other_rooms.of_frame(&question.frame);
+            let shown = self.other_rooms.shown_for(&question.frame);
             shown.is_some_and(|shown| self.places.contains_key(shown))
         });
         for question in &all {
@@ -174,7 +174,7 @@ impl<'a> ChoiceSetup<'a> {
             if let Some(digest) = planned.and_then(|plan| plan.digest(&question.frame)) {
                 self.digests.insert(question.frame.clone(), digest);
             } else {
-                let source = Source::of_questions(&self.dataset, &question.frame)?;
+                let source = Source::from_questions(&self.dataset, &question.frame)?;
                 let digest = source.digest();
                 self.digests
                     .extend(digest.map(|digest| (source.name, digest)));

@@ -17,7 +17,7 @@ use crate::types::{Digest, OpenDetail, QuestionId, Record, TrialKey};
 /// The prompt that asks the judge to mark an answer.
 pub(super) fn prompt(question: &OpenQuestion, answer: &str) -> Prompt {
     let extra = question.extra.as_deref();
-    Prompt::of(judge_prompt(&question.text, &question.answer, extra, answer).into())
+    Prompt::from_text(judge_prompt(&question.text, &question.answer, extra, answer).into())
 }
 
 /// The key of a mark. The model and condition do not enter it, so the same answer to a question is judged once.

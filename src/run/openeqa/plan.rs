@@ -73,7 +73,7 @@ fn group(
 /// The prompt of a question for a model that sees the walk, or for a blind one.
 fn prompt(question: &OpenQuestion, view: View) -> Prompt {
     match view {
-        View::Blind => Prompt::of(blind(&question.text).into()),
+        View::Blind => Prompt::from_text(blind(&question.text).into()),
         View::Image => {
             let (before, behind) = vision(&question.text);
             Prompt {

@@ -68,7 +68,7 @@ impl<'a> OpenSetup<'a> {
             Vec::new()
         };
         let recipe = Recipe::new(&job.light.kinds, job.format, None, &files);
-        let recipe = recipe.of_walks(&config.walk);
+        let recipe = recipe.for_walks(&config.walk);
         let recipe = if shows_frames {
             recipe.with_elsewhere(&job.enhancers.enhanced)?
         } else {

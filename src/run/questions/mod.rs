@@ -173,7 +173,7 @@ impl<'a> QuestionMaking<'a> {
         let Some(folder) = &args.against else {
             return Ok(None);
         };
-        let other = Dataset::of_images(folder, &args.folders.root.data_root)?;
+        let other = Dataset::from_images(folder, &args.folders.root.data_root)?;
         let other = other.with_rule(args.folders.decode.rule());
         against::compare([dataset, &other], &self.palette, args.threads, progress).map(Some)
     }
@@ -198,7 +198,7 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let making = &QuestionMaking::read(args)?;
     let folder = folder(args)?;
-    let dataset = Dataset::of_frames(folder, &args.folders.root.data_root)?;
+    let dataset = Dataset::from_frames(folder, &args.folders.root.data_root)?;
     let dataset = dataset.with_rule(args.folders.decode.rule());
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
@@ -228,7 +228,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
     })?;
     write(
         &args.out,
-        &lines(generated.asked.iter().map(WrittenQuestion::of))?,
+        &lines(generated.asked.iter().map(WrittenQuestion::new))?,
     )?;
     if let Some(path) = &args.candidates {
         write(path, &lines(candidates)?)?;
@@ -393,7 +393,7 @@ struct WrittenQuestion<'a> {
 }
 
 impl<'a> WrittenQuestion<'a> {
-    fn of(asked: &'a GeneratedQuestion) -> Self {
+    fn new(asked: &'a GeneratedQuestion) -> Self {
         let question = &asked.question;
         Self {
             id: &question.id,

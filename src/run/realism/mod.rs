@@ -36,7 +36,7 @@ use darkqa_score::realism::gain::ReadingFit;
 /// If there is no pair, none can be compared, most are swapped, or a file cannot be written.
 pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
     let (found, place) = match (&args.pairs, &args.normal, &args.low) {
-        (None, Some(normal), Some(low)) => (Pairs::of_folders(normal, low)?, low.as_path()),
+        (None, Some(normal), Some(low)) => (Pairs::from_folders(normal, low)?, low.as_path()),
         (folder, ..) => {
             let folder = folder.as_deref().unwrap_or(Path::new("."));
             (Pairs::open(folder)?, folder)

@@ -96,7 +96,7 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         ("darkqa-observer", Model::Local(observer.model(None, prior))),
         ("darkqa-random", Model::Random(prior)),
     ];
-    let likenesses = Likenesses::of(&dataset, progress)?;
+    let likenesses = Likenesses::new(&dataset, progress)?;
     let state = Arc::new(ServerState {
         likenesses,
         models,

@@ -37,7 +37,7 @@ pub(super) struct Likenesses(Vec<(FrameId, Vec<f64>)>);
 
 impl Likenesses {
     /// The cell values of every frame of a data set.
-    pub(super) fn of(dataset: &Dataset, progress: &Progress) -> Result<Self> {
+    pub(super) fn new(dataset: &Dataset, progress: &Progress) -> Result<Self> {
         let names: Vec<&FrameId> = dataset.frames().collect();
         let bar = progress.bar("looking at frames", names.len());
         let seen = names.into_par_iter().map(|name| {

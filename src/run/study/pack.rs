@@ -50,7 +50,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
         trials,
         questions,
         ..
-    } = StoredRun::of_choices(&args.run, "openeqa --study DIR makes their page")?
+    } = StoredRun::open_choices(&args.run, "openeqa --study DIR makes their page")?
         .with_truths("what people answer is scored by them")?;
     let wrong = |problem: String| {
         let path = args.run.clone();

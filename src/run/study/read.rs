@@ -86,7 +86,7 @@ struct PlacedAnswer<'a> {
 /// If the folder holds no run, a line is not an answer, or the run asked nothing that is in the files.
 pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let instead = "openeqa --answers NAME=FILE reads what people answered";
-    let asked_run = StoredRun::of_choices(&args.run, instead)?
+    let asked_run = StoredRun::open_choices(&args.run, instead)?
         .with_truths("what people answer is scored by them")?;
     let asked = asked(&asked_run.trials);
     let mut counts = AnswerCounts::default();
@@ -114,7 +114,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
         let path = args.run.clone();
         return Err(Error::Run { path, problem });
     }
-    let people_manifest = of_people(&asked_run.manifest, args);
+    let people_manifest = people_manifest(&asked_run.manifest, args);
     let mut store = Store::open(&args.out, &people_manifest, AddressChange::Allowed)?;
     store.write_questions(&read_questions(&args.run)?)?;
     let mut people = People::new(store.records()?);
@@ -200,7 +200,7 @@ fn asked(trials: &Trials<ChoiceDetail>) -> HashMap<(&QuestionId, &Condition), Tr
 }
 
 /// The manifest of the people's run. Its images are those of the run that the questions came from.
-fn of_people(run: &RunManifest, args: &ReadArgs) -> RunManifest {
+fn people_manifest(run: &RunManifest, args: &ReadArgs) -> RunManifest {
     let identity = [
         ("--model", json!([args.name])),
         ("people asked about", json!(run.identity)),

@@ -225,7 +225,7 @@ fn write_files(
     let mut work = SynthesisWork {
         making,
         entry,
-        frame: FrameWork::of(steps, entry.id.clone()),
+        frame: FrameWork::alone(steps, entry.id.clone()),
     };
     match work.frame.note() {
         Ok(note) => tally.add(&entry.id, &note),

@@ -1,4 +1,4 @@
-//! The line about requests that were changed because a server refused a field: [`of_adaptations`].
+//! The line about requests that were changed because a server refused a field: [`adaptation_alerts`].
 
 use serde_json::Value;
 
@@ -8,7 +8,7 @@ use crate::runs::renamed::ADAPTED_FOR;
 use crate::text::alert::{Alert, AlertKind};
 
 /// One alert for each model whose requests were changed in a run.
-pub(super) fn of_adaptations(runs: &[JoinedRun]) -> Vec<Alert> {
+pub(super) fn adaptation_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut alerts = Vec::new();
     for run in runs {
         for (field, changes) in &run.manifest.settings {

@@ -1,4 +1,4 @@
-//! The line about models whose probabilities were asked for and not stated: [`of_confidence`].
+//! The line about models whose probabilities were asked for and not stated: [`confidence_alerts`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::types::{ChoiceDetail, TrialRef, Trials};
 
 /// One alert for each model that was asked with `--request probabilities` and has no reply with any.
-pub(super) fn of_confidence(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
+pub(super) fn confidence_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let columns = runs
         .iter()
         .filter_map(|run| run.manifest.columns.get("model"));

@@ -1,4 +1,4 @@
-//! The line about replies that do not keep the constraint that was asked for: [`of_constraints`].
+//! The line about replies that do not keep the constraint that was asked for: [`constraint_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::types::{ChoiceDetail, Trials};
 
 /// One alert for each model that was asked with `--request constrain` and has replies of another form. A reply that keeps it is stored as its
 /// letter alone.
-pub(super) fn of_constraints(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
+pub(super) fn constraint_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let columns = runs
         .iter()
         .filter_map(|run| run.manifest.columns.get("model"));

@@ -1,4 +1,4 @@
-//! Models whose replies do not depend on the image: [`of_images`].
+//! Models whose replies do not depend on the image: [`image_alerts`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -10,7 +10,7 @@ use darkqa_score::subject::without_run;
 
 /// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Photographs taken in the dark
 /// do not show that.
-pub(super) fn of_images(combined: &Combined) -> Vec<Alert> {
+pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
     if combined.set().light == SetLight::Dark {
         return Vec::new();
     }

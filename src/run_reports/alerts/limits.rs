@@ -1,4 +1,4 @@
-//! Replies with different token limits, because truncated ones were asked again: [`of_limits`].
+//! Replies with different token limits, because truncated ones were asked again: [`limit_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use darkqa_score::record::Detail;
 use darkqa_score::subject::without_run;
 
 /// One line for each model some of whose replies have a larger limit than the first ones, with the number of replies by limit.
-pub(super) fn of_limits<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+pub(super) fn limit_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, BTreeMap<Option<u32>, usize>>::new();
     for trial in joined.trials.iter().filter(|trial| trial.has_reply()) {
         let limits = counts.entry(trial.model()).or_default();

@@ -18,7 +18,7 @@ mod words;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::combine::Combined;
-use super::enhancers::of_enhancers;
+use super::enhancers::enhancer_alerts;
 use super::join::{Joined, JoinedRun};
 use crate::runs::over_budget::OverBudget;
 use crate::text::alert::{Alert, AlertKind};
@@ -36,24 +36,27 @@ use darkqa_score::suggested_scenes::SuggestedScenes;
 
 /// All alerts of a report on questions with choices, in the order of their kinds.
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
-    let mut alerts = of_runs(combined);
-    alerts.extend(of_joining(combined));
-    alerts.extend(replies::of_replies(&findings.health, "count as wrong"));
-    alerts.extend(replies::of_broken_off(combined));
-    alerts.extend(replies::of_people(combined));
-    alerts.extend(images::of_images(combined));
-    alerts.extend(readings::of_readings(combined));
-    alerts.extend(confidence::of_confidence(&combined.runs, &combined.trials));
-    alerts.extend(constraints::of_constraints(
+    let mut alerts = run_alerts(combined);
+    alerts.extend(joining_alerts(combined));
+    alerts.extend(replies::reply_alerts(&findings.health, "count as wrong"));
+    alerts.extend(replies::broken_off_alert(combined));
+    alerts.extend(replies::people_alerts(combined));
+    alerts.extend(images::image_alerts(combined));
+    alerts.extend(readings::reading_alerts(combined));
+    alerts.extend(confidence::confidence_alerts(
         &combined.runs,
         &combined.trials,
     ));
-    alerts.extend(questions::of_repeats(combined));
-    alerts.extend(questions::of_items(findings));
+    alerts.extend(constraints::constraint_alerts(
+        &combined.runs,
+        &combined.trials,
+    ));
+    alerts.extend(questions::repeat_alert(combined));
+    alerts.extend(questions::item_alerts(findings));
     let clusters = (findings.grid.clusters, findings.unit);
-    alerts.extend(of_clusters(combined, clusters));
-    alerts.extend(of_set(findings.set));
-    alerts.extend(of_many_models(findings));
+    alerts.extend(cluster_alerts(combined, clusters));
+    alerts.extend(set_alert(findings.set));
+    alerts.extend(many_models_alert(findings));
     let oddities = findings.pairs.iter().flat_map(PairDarkness::oddities);
     alerts.extend(oddities.map(|text| Alert::new(AlertKind::Pairs, text)));
     alerts.sort_by_key(|alert| alert.kind);
@@ -62,37 +65,37 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
 
 /// All alerts of a report on questions without true answers, in the order of their kinds.
 pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'_>) -> Vec<Alert> {
-    let mut alerts = of_runs(combined);
-    alerts.extend(of_joining(combined));
-    alerts.extend(replies::of_replies(&found.health, "do not agree"));
-    alerts.extend(replies::of_broken_off(combined));
-    alerts.extend(readings::of_readings(combined));
-    alerts.extend(constraints::of_constraints(
+    let mut alerts = run_alerts(combined);
+    alerts.extend(joining_alerts(combined));
+    alerts.extend(replies::reply_alerts(&found.health, "do not agree"));
+    alerts.extend(replies::broken_off_alert(combined));
+    alerts.extend(readings::reading_alerts(combined));
+    alerts.extend(constraints::constraint_alerts(
         &combined.runs,
         &combined.trials,
     ));
     let clusters = (found.grid.clusters, found.unit);
-    alerts.extend(of_clusters(combined, clusters));
-    alerts.extend(of_set(found.set));
+    alerts.extend(cluster_alerts(combined, clusters));
+    alerts.extend(set_alert(found.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
 }
 
 /// Models that are too many to be compared with each other.
-fn of_many_models(findings: &Findings<'_>) -> Option<Alert> {
+fn many_models_alert(findings: &Findings<'_>) -> Option<Alert> {
     let text = "Too many models to compare them with each other: no pair of them is tested, and none is called best. Reports of fewer \
                 models do both.";
     (!compares_models(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
 }
 
 /// That the photographs were taken in the dark.
-fn of_set(set: PhotographedSet) -> Option<Alert> {
+fn set_alert(set: PhotographedSet) -> Option<Alert> {
     let notice = set.notice();
     notice.map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
 /// Too few clusters for good intervals (none, without replies, needs no remark), questions about one frame alone, and frames without the scenes that their names suggest.
-fn of_clusters(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -> Vec<Alert> {
+fn cluster_alerts(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -> Vec<Alert> {
     let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
     let few = if clusters == 0 {
         None
@@ -141,27 +144,27 @@ fn unnamed_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<St
 }
 
 /// The alerts that follow from manifests and the questions asked, of runs of either kind.
-pub(super) fn of_runs<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
-    let mut alerts = of_progress(&joined.runs);
-    alerts.extend(of_costs(&joined.runs));
-    alerts.extend(servers::of_servers(joined));
-    alerts.extend(providers::of_providers(&joined.trials));
-    alerts.extend(limits::of_limits(joined));
-    alerts.extend(of_enhancers(&joined.runs));
-    alerts.extend(of_inputs(&joined.runs));
-    alerts.extend(adapted::of_adaptations(&joined.runs));
-    alerts.extend(noise::of_noise(joined));
-    alerts.extend(noise::of_rounding(joined));
+pub(super) fn run_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+    let mut alerts = progress_alerts(&joined.runs);
+    alerts.extend(cost_alerts(&joined.runs));
+    alerts.extend(servers::server_alerts(joined));
+    alerts.extend(providers::provider_alerts(&joined.trials));
+    alerts.extend(limits::limit_alerts(joined));
+    alerts.extend(enhancer_alerts(&joined.runs));
+    alerts.extend(input_alerts(&joined.runs));
+    alerts.extend(adapted::adaptation_alerts(&joined.runs));
+    alerts.extend(noise::noise_alerts(joined));
+    alerts.extend(noise::rounding_alert(joined));
     if joined.runs.len() > 1 {
-        alerts.extend(settings::of_settings(joined));
-        alerts.extend(questions::of_questions(joined));
+        alerts.extend(settings::setting_alerts(joined));
+        alerts.extend(questions::question_alerts(joined));
     }
     alerts.sort_by_key(|alert| alert.kind);
     alerts
 }
 
 /// One alert for each run that cost more than its limit.
-fn of_costs(runs: &[JoinedRun]) -> Vec<Alert> {
+fn cost_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let over = runs.iter().filter_map(|run| {
         let sentence = OverBudget::read(&run.manifest)?.sentence();
         let text = match runs {
@@ -174,7 +177,7 @@ fn of_costs(runs: &[JoinedRun]) -> Vec<Alert> {
 }
 
 /// What became of the runs when they were joined: models that stand apart, and runs that add nothing to the others.
-pub(super) fn of_joining<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let repeated = joined
         .runs
         .iter()
@@ -188,8 +191,8 @@ pub(super) fn of_joining<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         Alert::new(AlertKind::Runs, text)
     });
     let mut alerts: Vec<Alert> = repeated.collect();
-    alerts.extend(models::of_left_out(&joined.runs));
-    alerts.extend(models::of_models(joined));
+    alerts.extend(models::left_out_alerts(&joined.runs));
+    alerts.extend(models::model_alerts(joined));
     alerts
 }
 
@@ -207,7 +210,7 @@ pub(super) fn named_again(folders: &[(String, usize)]) -> Vec<Alert> {
 }
 
 /// What was done to the images of the runs when they were read.
-fn of_inputs(runs: &[JoinedRun]) -> Vec<Alert> {
+fn input_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut lines = BTreeMap::<String, Vec<&str>>::new();
     for run in runs {
         for line in run.manifest.inputs.iter().flat_map(InputSummary::lines) {
@@ -224,7 +227,7 @@ fn of_inputs(runs: &[JoinedRun]) -> Vec<Alert> {
     alerts.collect()
 }
 
-fn of_progress(runs: &[JoinedRun]) -> Vec<Alert> {
+fn progress_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let unfinished = runs
         .iter()
         .filter(|run| run.manifest.status != Status::Complete);

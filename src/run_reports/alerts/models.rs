@@ -1,4 +1,4 @@
-//! Models of one name that stand apart, and why: [`of_models`].
+//! Models of one name that stand apart, and why: [`model_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ const FIELDS: [(&str, &str); 3] = [
 const DIGEST: &str = "digest";
 
 /// A line for all models that stand apart for one reason in the same runs.
-pub(super) fn of_models<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+pub(super) fn model_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let runs = names(&joined.runs);
     let mut by_reason = BTreeMap::<(String, Vec<&str>), Vec<&ModelApart>>::new();
     for apart in &joined.models.apart {
@@ -36,7 +36,7 @@ pub(super) fn of_models<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 }
 
 /// The models of each run whose replies are not shown.
-pub(super) fn of_left_out(runs: &[JoinedRun]) -> Vec<Alert> {
+pub(super) fn left_out_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let left = runs.iter().filter(|run| !run.left_out.is_empty());
     let alerts = left.map(|run| {
         let names: Vec<&String> = run.left_out.iter().collect();

@@ -1,5 +1,5 @@
-//! What the levels of runs do to the signal-to-noise ratio of images with sensor noise, and to their codes: [`of_noise`],
-//! [`of_rounding`].
+//! What the levels of runs do to the signal-to-noise ratio of images with sensor noise, and to their codes: [`noise_alerts`],
+//! [`rounding_alert`].
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -16,11 +16,11 @@ use darkqa_score::record::Detail;
 const FEW_CODES: u16 = 1100;
 
 /// The light readings whose levels all have the same signal-to-noise ratio, where a run has several levels with noise.
-pub(super) fn of_noise<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut of_draws = BTreeMap::<&str, BTreeSet<&str>>::new();
     for run in &joined.runs {
         let mut levels = BTreeMap::<String, BTreeSet<Severity>>::new();
-        for condition in conditions(joined.of(run)) {
+        for condition in conditions(joined.trials_of(run)) {
             let Some(degradation) = condition.degradation() else {
                 continue;
             };
@@ -59,7 +59,7 @@ fn same_noise(reading: &Value) -> &'static str {
 }
 
 /// The levels at which an image has so few codes that their rounding decides.
-pub(super) fn of_rounding<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
+pub(super) fn rounding_alert<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
     let shown = conditions(joined.trials.iter()).into_iter();
     let shown = shown.filter_map(Condition::degradation);
     let darkest = shown.filter(|degradation| {

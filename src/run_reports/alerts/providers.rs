@@ -1,4 +1,4 @@
-//! The line about models that a router passed on to several providers: [`of_providers`].
+//! The line about models that a router passed on to several providers: [`provider_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::types::Trials;
 use darkqa_score::record::Detail;
 
 /// One alert for each model whose replies name several providers, with the number of replies of each.
-pub(super) fn of_providers<D: Detail>(trials: &Trials<D>) -> Vec<Alert> {
+pub(super) fn provider_alerts<D: Detail>(trials: &Trials<D>) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, BTreeMap<&str, usize>>::new();
     for trial in trials.iter() {
         if let Some(provider) = trial.provider() {

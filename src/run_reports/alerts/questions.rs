@@ -1,4 +1,4 @@
-//! Questions that differ between runs, and models that were not asked the same: [`of_questions`], [`of_repeats`], [`of_items`].
+//! Questions that differ between runs, and models that were not asked the same: [`question_alerts`], [`repeat_alert`], [`item_alerts`].
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -13,11 +13,13 @@ use darkqa_score::record::Detail;
 use darkqa_score::subject::is_control;
 
 /// What differs between the questions of the runs, and between the files that they are about.
-pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut asked = Vec::<BTreeMap<&QuestionId, Option<&RunQuestion>>>::new();
     for run in &joined.runs {
         // A control is shown frames of its own choice, in a shard others than the models.
-        let trials = joined.of(run).filter(|trial| !is_control(trial.model()));
+        let trials = joined
+            .trials_of(run)
+            .filter(|trial| !is_control(trial.model()));
         let ids: HashSet<&QuestionId> = trials.map(TrialRef::question).collect();
         let mut ids: BTreeMap<&QuestionId, Option<&RunQuestion>> =
             ids.into_iter().map(|id| (id, None)).collect();
@@ -91,10 +93,13 @@ pub(super) fn of_questions<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 }
 
 /// Runs that asked the same questions a different number of times.
-pub(super) fn of_repeats(combined: &Combined) -> Option<Alert> {
+pub(super) fn repeat_alert(combined: &Combined) -> Option<Alert> {
     let people = |run: &&JoinedRun| !is_of_people(&run.manifest);
     let times = combined.runs.iter().filter(people).map(|run| {
-        let times = combined.of(run).map(|trial| trial.repeat() + 1).max();
+        let times = combined
+            .trials_of(run)
+            .map(|trial| trial.repeat() + 1)
+            .max();
         (&run.name, times.unwrap_or(1))
     });
     let times: Vec<(&String, u32)> = times.collect();
@@ -115,7 +120,7 @@ pub(super) fn of_repeats(combined: &Combined) -> Option<Alert> {
 }
 
 /// Models that did not answer the same questions.
-pub(super) fn of_items(findings: &Findings<'_>) -> Vec<Alert> {
+pub(super) fn item_alerts(findings: &Findings<'_>) -> Vec<Alert> {
     let Some(common) = &findings.common else {
         return Vec::new();
     };

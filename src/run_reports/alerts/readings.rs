@@ -1,4 +1,4 @@
-//! Replies that were read by another version of the lenient reading: [`of_readings`].
+//! Replies that were read by another version of the lenient reading: [`reading_alerts`].
 
 use crate::run_reports::combine::Combined;
 use crate::run_reports::rereading::LenientChange;
@@ -6,13 +6,13 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::types::TrialRef;
 
 /// How the lenient reading of each run would change by the rules of this version.
-pub(super) fn of_readings(combined: &Combined) -> Vec<Alert> {
+pub(super) fn reading_alerts(combined: &Combined) -> Vec<Alert> {
     let alerts = combined.runs.iter().filter_map(|run| {
-        let change = LenientChange::of(&run.manifest);
+        let change = LenientChange::new(&run.manifest);
         if change.is_current() {
             return None;
         }
-        let places = combined.of(run).map(TrialRef::text);
+        let places = combined.trials_of(run).map(TrialRef::text);
         let records = places.map(|place| combined.texts[place.log()].record(place));
         let text = match change.through(records) {
             Ok(change) if change.has_changed() => {

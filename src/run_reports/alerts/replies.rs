@@ -1,4 +1,4 @@
-//! Replies that cannot be counted, or count as wrong: [`of_replies`], [`of_people`].
+//! Replies that cannot be counted, or count as wrong: [`reply_alerts`], [`people_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use crate::types::{TrialRef, UnreadReason};
 use darkqa_score::health::Health;
 
 /// Replies that could not be read, with what they count as, and trials without a reply.
-pub(super) fn of_replies(health: &[Health], unread_as: &str) -> Vec<Alert> {
+pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, [usize; 3]>::new();
     for health in health {
         let [replies, unread, failed] = counts.entry(&health.subject.model).or_default();
@@ -70,7 +70,7 @@ fn in_condition(health: &Health, unread_as: &str) -> String {
 }
 
 /// Generations that broke off, by the server's word for the reason.
-pub(super) fn of_broken_off(combined: &Combined) -> Option<Alert> {
+pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
     let mut counts = BTreeMap::<&str, usize>::new();
     for word in combined.trials.iter().filter_map(TrialRef::broken_off) {
         *counts.entry(word).or_default() += 1;
@@ -87,13 +87,15 @@ pub(super) fn of_broken_off(combined: &Combined) -> Option<Alert> {
 }
 
 /// Answers of people that are no choice of their question.
-pub(super) fn of_people(combined: &Combined) -> Vec<Alert> {
+pub(super) fn people_alerts(combined: &Combined) -> Vec<Alert> {
     let people = combined
         .runs
         .iter()
         .filter(|run| is_of_people(&run.manifest));
     let alerts = people.filter_map(|run| {
-        let unread = combined.of(run).filter_map(|trial| trial.strict()?.why);
+        let unread = combined
+            .trials_of(run)
+            .filter_map(|trial| trial.strict()?.why);
         // In runs of earlier versions, who could not tell gave an empty answer.
         let is_said =
             |why: &UnreadReason| matches!(why, UnreadReason::Empty | UnreadReason::CannotTell);
@@ -124,9 +126,9 @@ mod tests {
             failed: BTreeMap::new(),
         };
         let mut all: Vec<Health> = (0..19).map(|_| health("L0", 100)).collect();
-        assert_eq!(of_replies(&all, "count as wrong"), []);
+        assert_eq!(reply_alerts(&all, "count as wrong"), []);
         all.push(health("L5-noise", 80));
-        let alerts = of_replies(&all, "count as wrong");
+        let alerts = reply_alerts(&all, "count as wrong");
         assert_eq!(
             alerts[0].text,
             "20 of 100 replies of m at L5-noise (20.0 %) could not be read, and count as wrong. The lenient parsing reads 20 of them."

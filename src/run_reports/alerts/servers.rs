@@ -1,4 +1,4 @@
-//! Servers that differ between runs: [`of_servers`].
+//! Servers that differ between runs: [`server_alerts`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::text::alert::{Alert, AlertKind};
 use darkqa_score::record::Detail;
 
 /// The names that servers gave for a model, and the addresses, if there are several.
-pub(super) fn of_servers<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let names = names(&joined.runs);
     let mut served = BTreeMap::<&str, BTreeMap<usize, &BTreeSet<String>>>::new();
     for (index, run) in joined

@@ -1,4 +1,4 @@
-//! Settings that differ between runs: [`of_settings`].
+//! Settings that differ between runs: [`setting_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use darkqa_score::record::Detail;
 const ORDERS: [&str; 2] = ["--shuffle-options", "--circular"];
 
 /// What differs between the settings in the manifests.
-pub(super) fn of_settings<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
+pub(super) fn setting_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let names = names(&joined.runs);
     let manifests: Vec<&RunManifest> = joined.runs.iter().map(|run| &run.manifest).collect();
     let of = |read: &dyn Fn(&RunManifest) -> Settings| {
@@ -74,12 +74,12 @@ pub(super) fn of_settings<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         .map(|(kind, what, settings)| Alert::new(kind, sentence(what, &settings, &names)))
         .collect();
     let light = without_repeated(of(&|run| light(run, &manifests)));
-    alerts.extend(of_light(joined, &light, &names));
+    alerts.extend(light_alerts(joined, &light, &names));
     alerts
 }
 
 /// The settings of the light that differ, and the conditions that are kept apart for it.
-fn of_light<D: Detail>(joined: &Joined<D>, light: &[Setting], names: &[String]) -> Vec<Alert> {
+fn light_alerts<D: Detail>(joined: &Joined<D>, light: &[Setting], names: &[String]) -> Vec<Alert> {
     let mut alerts = Vec::new();
     let mut sentences = Vec::new();
     if !light.is_empty() {

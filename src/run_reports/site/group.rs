@@ -46,7 +46,7 @@ impl GroupKey {
     ///
     /// # Errors
     /// If a setting cannot be written.
-    pub(super) fn of_choices(combined: &Combined, variant: &KindReading) -> Result<Self> {
+    pub(super) fn from_choices(combined: &Combined, variant: &KindReading) -> Result<Self> {
         let manifest = &combined.runs[0].manifest;
         let mut levels = BTreeSet::new();
         let mut images = HashMap::<_, BTreeSet<Digest>>::new();
@@ -90,7 +90,7 @@ impl GroupKey {
     ///
     /// # Errors
     /// If a setting cannot be written.
-    pub(super) fn of_open(run: &StoredRun<OpenDetail>) -> Result<Self> {
+    pub(super) fn from_open(run: &StoredRun<OpenDetail>) -> Result<Self> {
         let mut images = HashMap::<_, BTreeSet<Digest>>::new();
         let mut levels = BTreeSet::new();
         for trial in run.trials.iter() {

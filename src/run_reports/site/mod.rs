@@ -131,7 +131,7 @@ fn add_choices(
         site.pages.push((link, page));
         return Ok(None);
     }
-    let key = GroupKey::of_choices(&combined, &variant)?;
+    let key = GroupKey::from_choices(&combined, &variant)?;
     drop(report);
     drop(findings);
     site.pages.push((link.clone(), page));
@@ -161,7 +161,7 @@ fn compared_trials(combined: &Combined, variant: &KindReading) -> Trials<ChoiceD
 
 fn add_open(run: StoredRun<OpenDetail>, link: RunLink, site: &mut Site) -> Result<OpenMember> {
     let run = shown(run)?;
-    let key = GroupKey::of_open(&run)?;
+    let key = GroupKey::from_open(&run)?;
     let scores = open::Scores::new(open::combine(vec![run])?)?;
     let rows = open_rows(scores.summary(), &link);
     site.pages.push((link, page_of(scores.products()?)?));

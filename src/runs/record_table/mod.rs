@@ -27,7 +27,7 @@ pub(crate) const RECORDS_PARQUET: &str = "records.parquet";
 /// # Errors
 /// If a record is broken, or the file cannot be written.
 pub(crate) fn update(folder: &Path, table: RecordTable) -> Result<()> {
-    match ExperimentKind::of(folder)? {
+    match ExperimentKind::read(folder)? {
         ExperimentKind::Choice => update_of::<ChoiceDetail>(folder, table),
         ExperimentKind::Open => update_of::<OpenDetail>(folder, table),
     }

@@ -63,7 +63,7 @@ impl Tabled for OpenDetail {
         let judge = setting(JUDGE).map(str::to_owned);
         let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let names = RecordedNames::from_manifest(manifest);
-        let mut marks = MarkIndex::of(questions);
+        let mut marks = MarkIndex::new(questions);
         each_record(folder, |record: Record<Self>, _| {
             let is_of_judge = Some(names.shown(&record.model)) == judge.as_deref();
             let detail = &record.detail;

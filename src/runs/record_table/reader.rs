@@ -27,7 +27,7 @@ impl StoredRun {
     /// If the folder holds no run, or one that this version cannot read.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref().to_owned();
-        let kind = ExperimentKind::of(&folder)?;
+        let kind = ExperimentKind::read(&folder)?;
         Ok(Self { folder, kind })
     }
 
@@ -38,8 +38,8 @@ impl StoredRun {
     /// If a line of the run is broken.
     pub fn records(&self) -> Result<Records> {
         match self.kind {
-            ExperimentKind::Choice => Records::of::<ChoiceDetail>(&self.folder),
-            ExperimentKind::Open => Records::of::<OpenDetail>(&self.folder),
+            ExperimentKind::Choice => Records::new::<ChoiceDetail>(&self.folder),
+            ExperimentKind::Open => Records::new::<OpenDetail>(&self.folder),
         }
     }
 }
@@ -66,7 +66,7 @@ pub struct RunRecord {
 }
 
 impl Records {
-    fn of<D: Tabled>(folder: &Path) -> Result<Self> {
+    fn new<D: Tabled>(folder: &Path) -> Result<Self> {
         let table = D::columns();
         let headings = table.iter().map(|column| Heading {
             name: column.name,

@@ -80,7 +80,7 @@ pub(super) struct LightTexts {
 }
 
 impl LightTexts {
-    fn of(condition: Option<&Condition>) -> Self {
+    fn new(condition: Option<&Condition>) -> Self {
         let columns = ConditionColumns::new(condition);
         Self {
             condition: columns.condition.map(ToString::to_string),
@@ -144,7 +144,7 @@ impl<D: Tabled> Rows<D> {
         let further = D::further(&self.context, &record)?;
         let known = self.lights.get(&record.condition).map(Arc::clone);
         let light = known.unwrap_or_else(|| {
-            let light = Arc::new(LightTexts::of(record.condition.as_ref()));
+            let light = Arc::new(LightTexts::new(record.condition.as_ref()));
             let condition = record.condition.clone();
             self.lights.insert(condition, Arc::clone(&light));
             light

@@ -26,7 +26,7 @@ impl Coverage {
     ///
     /// # Errors
     /// If a part does not say what it has, or is of a run with another number of sources.
-    pub(super) fn of<'a>(
+    pub(super) fn from_parts<'a>(
         parts: impl Iterator<Item = (Shard, &'a Path, &'a RunManifest)>,
     ) -> Result<Self> {
         let mut coverage = Self {
@@ -172,7 +172,8 @@ mod tests {
         });
         let parts: Vec<(Shard, RunManifest)> = parts.collect();
         let parts = parts.iter();
-        Coverage::of(parts.map(|(shard, manifest)| (*shard, Path::new("run"), manifest))).unwrap()
+        Coverage::from_parts(parts.map(|(shard, manifest)| (*shard, Path::new("run"), manifest)))
+            .unwrap()
     }
 
     #[test]

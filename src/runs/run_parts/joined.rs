@@ -40,7 +40,7 @@ impl<D: Detail> RunParts<D> {
         joined_manifest::check_same_run(&parts)?;
         let places = parts.iter();
         let places = places.map(|part| (part.shard, &*part.folder, &part.manifest));
-        let coverage = Coverage::of(places)?;
+        let coverage = Coverage::from_parts(places)?;
         let plan = missing::plan(&parts, &coverage)?;
         let is_missing = missing::check(&parts, &coverage, plan.as_ref(), missing)?;
         missing::warn_unfinished(&parts, plan.as_ref());

@@ -24,7 +24,7 @@ pub(super) fn plan(parts: &[StoredPart], coverage: &Coverage) -> Result<Option<R
     let Some(run) = parts.first().and_then(|part| part.folder.parent()) else {
         return Ok(None);
     };
-    let plan = RunPlan::of(run)?;
+    let plan = RunPlan::read(run)?;
     let Some(other) = plan
         .as_ref()
         .filter(|plan| plan.frames() != coverage.sources())

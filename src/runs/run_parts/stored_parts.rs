@@ -23,8 +23,8 @@ pub(crate) fn any_run(folder: &Path) -> Result<AnyRun> {
         return AnyRun::open(folder);
     };
     Ok(match one_kind(&parts)? {
-        ExperimentKind::Choice => AnyRun::Choice(of_parts(folder, &parts)?),
-        ExperimentKind::Open => AnyRun::Open(of_parts(folder, &parts)?),
+        ExperimentKind::Choice => AnyRun::Choice(run_from_parts(folder, &parts)?),
+        ExperimentKind::Open => AnyRun::Open(run_from_parts(folder, &parts)?),
     })
 }
 
@@ -34,10 +34,10 @@ pub(crate) fn any_run(folder: &Path) -> Result<AnyRun> {
 /// Also if the questions are open. That error tells the user what to do `instead`.
 pub(crate) fn choice_run(folder: &Path, instead: &str) -> Result<StoredRun<ChoiceDetail>> {
     let Some(parts) = parts_in(folder)? else {
-        return StoredRun::of_choices(folder, instead);
+        return StoredRun::open_choices(folder, instead);
     };
     match one_kind(&parts)? {
-        ExperimentKind::Choice => of_parts(folder, &parts),
+        ExperimentKind::Choice => run_from_parts(folder, &parts),
         ExperimentKind::Open => Err(open_questions(folder, instead)),
     }
 }
@@ -61,10 +61,10 @@ fn parts_in(folder: &Path) -> Result<Option<Vec<PathBuf>>> {
 }
 
 /// The run of these parts, which are in `folder`, as reports need it.
-fn of_parts<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<StoredRun<D>> {
+fn run_from_parts<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<StoredRun<D>> {
     let parts = RunParts::<D>::read(parts, MissingParts::Accepted)?;
     let folders = parts.folders();
-    let texts: Result<Vec<RunTexts<D>>> = folders.iter().map(|part| RunTexts::of(part)).collect();
+    let texts: Result<Vec<RunTexts<D>>> = folders.iter().map(|part| RunTexts::open(part)).collect();
     let wanted = MissingThumbnails::new(parts.questions.frames(), Vec::new());
     Ok(StoredRun {
         folder: folder.to_owned(),
@@ -103,7 +103,7 @@ pub(crate) fn runs_in(folder: &Path) -> Result<Vec<PathBuf>> {
 pub(crate) fn one_kind(folders: &[PathBuf]) -> Result<ExperimentKind> {
     let kinds: Result<Vec<ExperimentKind>> = folders
         .iter()
-        .map(|folder| ExperimentKind::of(folder))
+        .map(|folder| ExperimentKind::read(folder))
         .collect();
     let kinds = kinds?;
     let first = *kinds.first().ok_or_else(no_part)?;

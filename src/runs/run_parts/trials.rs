@@ -14,7 +14,7 @@ use darkqa_score::record::Detail;
 /// # Errors
 /// If a trial has another image in another part, or a record cannot be read.
 pub(super) fn each_once<D: Detail>(trials: &mut Trials<D>, folders: &[&Path]) -> Result<usize> {
-    let mut logs = PartLogs::of(folders);
+    let mut logs = PartLogs::new(folders);
     let mut twice = 0;
     trials.each_key_once(|first, later| {
         if first.text().log() == later.text().log() {

@@ -51,7 +51,7 @@ impl RunPlan {
     ///
     /// # Errors
     /// If it cannot be read, another version wrote it, or one of its files is not the one that it was written with.
-    pub(crate) fn of(run: &Path) -> Result<Option<Self>> {
+    pub(crate) fn read(run: &Path) -> Result<Option<Self>> {
         let folder = run.join(PLAN);
         let path = folder.join(PLAN_FILE);
         if !path.exists() {

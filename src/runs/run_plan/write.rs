@@ -37,7 +37,7 @@ impl NewPlan {
     /// If the run has parts whose plan has other questions or frames, or a file cannot be written.
     pub(crate) fn write(mut self, run: &Path, forecast: &Forecast) -> Result<PathBuf> {
         let place = run.join(PLAN);
-        let earlier = RunPlan::of(run)?;
+        let earlier = RunPlan::read(run)?;
         if let Some(earlier) = &earlier {
             if self.has_content_of(earlier) {
                 self.frames.clone_from(&earlier.frames);

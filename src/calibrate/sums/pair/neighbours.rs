@@ -39,11 +39,11 @@ type Site = [u16; 2];
 
 impl RowNeighbours {
     /// The neighbours in a part of a row.
-    pub(super) fn of(a: &[u16], b: &[u16]) -> Self {
+    pub(super) fn new(a: &[u16], b: &[u16]) -> Self {
         let mut sums = Self::default();
         let sites = a.iter().zip(b).map(|(a, b)| [*a, *b]);
         for (site, next) in sites.clone().zip(sites.skip(1)) {
-            let more = Self::of_two(site, next);
+            let more = Self::from_sites(site, next);
             sums.count += 1;
             sums.both = [0, 1].map(|frame| sums.both[frame] + more.both[frame]);
             sums.aa += more.aa;
@@ -53,7 +53,7 @@ impl RowNeighbours {
         sums
     }
 
-    fn of_two(site: Site, next: Site) -> Self {
+    fn from_sites(site: Site, next: Site) -> Self {
         let [[a, b], [next_a, next_b]] = [site, next].map(|site| site.map(u64::from));
         Self {
             count: 1,
@@ -66,7 +66,7 @@ impl RowNeighbours {
 
     /// Takes out two neighbours that were added.
     pub(super) fn remove(&mut self, site: Site, next: Site) {
-        let less = Self::of_two(site, next);
+        let less = Self::from_sites(site, next);
         self.count -= 1;
         self.both = [0, 1].map(|frame| self.both[frame] - less.both[frame]);
         self.aa -= less.aa;
@@ -118,8 +118,8 @@ impl NeighbourSums {
     pub(in crate::calibrate) fn correlation(&self, ratios: &[f64]) -> f64 {
         let [mut products, mut squares, mut sites, mut rows] = [0.0; 4];
         for (plane, ratio) in self.planes.iter().zip(ratios) {
-            products += plane.products.of_difference(*ratio);
-            squares += plane.squares.of_difference(*ratio);
+            products += plane.products.squared_difference(*ratio);
+            squares += plane.squares.squared_difference(*ratio);
             sites += plane.sites;
             rows += plane.rows;
         }

@@ -41,7 +41,7 @@ impl Products {
     }
 
     /// Sum of (A − B)², which is exact.
-    pub(super) fn of_difference(self) -> u64 {
+    pub(super) fn squared_difference(self) -> u64 {
         self.aa + self.bb - 2 * self.ab
     }
 
@@ -74,7 +74,7 @@ impl Scatter {
     }
 
     /// The sum of D² about its mean, where D = A − ratio · B; of products of neighbours the sum of D · D′.
-    pub(in crate::calibrate) fn of_difference(self, ratio: f64) -> f64 {
+    pub(in crate::calibrate) fn squared_difference(self, ratio: f64) -> f64 {
         self.aa - 2.0 * ratio * self.ab + ratio * ratio * self.bb
     }
 }

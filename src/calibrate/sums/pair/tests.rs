@@ -68,7 +68,7 @@ fn noise_is_that_of_the_definition() {
         let layout = Layout { cfa, ..BAYER };
         let (a, b) = (frame(layout, 1, 500, 9), frame(layout, 2, 510, 9));
         let hot = HotPixels::none(layout.plane_rows());
-        let found = PairSums::of(layout, [&a, &b], &hot).noise();
+        let found = PairSums::new(layout, [&a, &b], &hot).noise();
         let [within, row] = noise_by_sites(layout, &a, &b);
         assert!((found.within - within).abs() < 1e-9 * within, "{cfa}");
         assert!((found.row - row).abs() < 1e-9, "{cfa}");
@@ -82,18 +82,18 @@ fn noise_is_that_of_the_definition() {
 fn fixed_pattern_cancels_and_rows_are_row_noise() {
     let hot = HotPixels::none(BAYER.plane_rows());
     let (a, b) = (frame(BAYER, 3, 500, 9), frame(BAYER, 4, 500, 9));
-    let plain = PairSums::of(BAYER, [&a, &b], &hot).noise();
+    let plain = PairSums::new(BAYER, [&a, &b], &hot).noise();
     let pattern = frame(BAYER, 5, 1000, 400);
     let with =
         |frame: &[u16]| -> Vec<u16> { frame.iter().zip(&pattern).map(|(a, b)| a + b).collect() };
-    let fixed = PairSums::of(BAYER, [&with(&a), &with(&b)], &hot).noise();
+    let fixed = PairSums::new(BAYER, [&with(&a), &with(&b)], &hot).noise();
     assert_eq!(plain, fixed);
     let rows: Vec<u16> = b
         .chunks(BAYER.width)
         .zip(Numbers(6))
         .flat_map(|(row, number)| row.iter().map(move |code| code + (number % 20) as u16))
         .collect();
-    let shifted = PairSums::of(BAYER, [&a, &rows], &hot).noise();
+    let shifted = PairSums::new(BAYER, [&a, &rows], &hot).noise();
     assert!((shifted.within - plain.within).abs() < 1e-9);
     // Uniform over 20 codes: variance 33.25, in one frame of two.
     assert!((shifted.row - plain.row - 33.25 / 2.0).abs() < 5.0);
@@ -110,7 +110,7 @@ fn hot_pixels_are_in_no_sum() {
         })
         .collect();
     let hot = HotPixels::new(columns);
-    let clean = PairSums::of(BAYER, [&a, &b], &hot);
+    let clean = PairSums::new(BAYER, [&a, &b], &hot);
     let correlation = |sums: &PairSums| sums.neighbours().correlation(&[1.0; 4]);
     let (tiles, noise) = (clean.tiles(), clean.noise());
     for plane_row in [0, 5] {
@@ -119,12 +119,12 @@ fn hot_pixels_are_in_no_sum() {
             a[row * BAYER.width + 2 * column + parity] = 60_000;
         }
     }
-    let spoiled = PairSums::of(BAYER, [&a, &b], &hot);
+    let spoiled = PairSums::new(BAYER, [&a, &b], &hot);
     assert_eq!(spoiled.tiles(), tiles);
     assert_eq!(spoiled.noise(), noise);
     assert!((correlation(&spoiled) - correlation(&clean)).abs() < 1e-15);
     // The control: without the mask they are.
-    let unmasked = PairSums::of(BAYER, [&a, &b], &HotPixels::none(BAYER.plane_rows()));
+    let unmasked = PairSums::new(BAYER, [&a, &b], &HotPixels::none(BAYER.plane_rows()));
     assert!(unmasked.noise().within > 1000.0 * noise.within);
     assert_eq!(hot.count(), 6);
 }
@@ -139,7 +139,7 @@ fn smoothing_shows_as_correlation() {
     let hot = HotPixels::none(layout.plane_rows());
     let (a, b) = (frame(layout, 9, 500, 90), frame(layout, 10, 500, 90));
     let correlation = |a: &[u16], b: &[u16]| {
-        let sums = PairSums::of(layout, [a, b], &hot);
+        let sums = PairSums::new(layout, [a, b], &hot);
         sums.neighbours().correlation(&[1.0; 4])
     };
     let plain = correlation(&a, &b);
@@ -165,7 +165,7 @@ fn tiles_have_the_light_and_the_noise_of_their_place() {
             }
         }
     }
-    let tiles = PairSums::of(BAYER, [&lit[0], &lit[1]], &hot).tiles();
+    let tiles = PairSums::new(BAYER, [&lit[0], &lit[1]], &hot).tiles();
     assert_eq!(tiles.len(), 4 * TILES * TILES);
     for (index, tile) in tiles.iter().enumerate() {
         // Four rows of three sites, of which each row has a mean of its own.
@@ -186,7 +186,7 @@ fn tiles_have_the_light_and_the_noise_of_their_place() {
             .collect()
     };
     let shifted = [rows(&lit[0], 13), rows(&lit[1], 14)];
-    let shifted = PairSums::of(BAYER, [&shifted[0], &shifted[1]], &hot).tiles();
+    let shifted = PairSums::new(BAYER, [&shifted[0], &shifted[1]], &hot).tiles();
     for (tile, shifted) in tiles.iter().zip(&shifted) {
         assert!((tile.variance(1.0) - shifted.variance(1.0)).abs() < 1e-6);
     }
@@ -214,7 +214,7 @@ fn a_pattern_of_light_cancels_at_equal_light() {
             .collect()
     };
     let (a, b) = (lit(15, 1.0), lit(16, 1.05));
-    let sums = PairSums::of(layout, [&a, &b], &hot);
+    let sums = PairSums::new(layout, [&a, &b], &hot);
     let (tiles, neighbours) = (sums.tiles(), sums.neighbours());
     let ratio = 1.0 / 1.05;
     let [equal, unequal] = [ratio, 1.0].map(|ratio| mean_variance(&tiles, ratio));

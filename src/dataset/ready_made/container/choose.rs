@@ -69,7 +69,7 @@ pub(super) fn chosen(
         }
         let files = by_kind(tree, files)?.into_iter();
         let candidates = files.map(|path| Candidate {
-            split: splits::of_name(&path),
+            split: splits::split_in_name(&path),
             config: String::new(),
             path,
         });
@@ -80,7 +80,7 @@ pub(super) fn chosen(
                 .config_name
                 .as_deref()
                 .or(args.preset_config.as_deref());
-            of_card(tree, &configs, &files, wanted)?
+            files_by_card(tree, &configs, &files, wanted)?
         }
     };
     let candidates = splits::chosen(tree, candidates, args.split.as_deref())?;
@@ -88,7 +88,7 @@ pub(super) fn chosen(
 }
 
 /// The files of the configuration that is asked, or of all.
-fn of_card(
+fn files_by_card(
     tree: &Tree,
     configs: &[Config],
     files: &[PathBuf],
@@ -120,11 +120,11 @@ fn of_card(
     let several = chosen.len() > 1;
     let mut candidates = Vec::new();
     for config in chosen {
-        for (split, paths) in of_config(tree, config, files)? {
+        for (split, paths) in files_of_config(tree, config, files)? {
             for path in paths {
                 candidates.push(Candidate {
                     split: match &*split {
-                        "" => splits::of_name(&path),
+                        "" => splits::split_in_name(&path),
                         split => split.to_owned(),
                     },
                     config: if several {
@@ -141,7 +141,7 @@ fn of_card(
 }
 
 /// The files of a configuration by the split that the card names.
-fn of_config(
+fn files_of_config(
     tree: &Tree,
     config: &Config,
     files: &[PathBuf],

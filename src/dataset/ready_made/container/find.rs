@@ -37,7 +37,7 @@ pub(in crate::dataset::ready_made) enum Joined {
 
 /// Whether a folder holds a set of other tools.
 pub(in crate::dataset) fn holds_files(folder: &Path) -> bool {
-    let Ok(tree) = Tree::of_folder(folder) else {
+    let Ok(tree) = Tree::from_folder(folder) else {
         return true;
     };
     tree.files().is_ok_and(|(files, _)| is_set(&tree, &files))
@@ -53,12 +53,12 @@ pub(in crate::dataset::ready_made) fn find(
 ) -> Result<FoundFiles> {
     match places {
         [place] => at_place(place, args),
-        places => of_files(places, args),
+        places => named_files(places, args),
     }
 }
 
 /// Several files that the user names, in this order.
-fn of_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
+fn named_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
     refuse_choice("several files", args)?;
     let mut files = Vec::with_capacity(places.len());
     for place in places {
@@ -115,7 +115,7 @@ fn refuse_choice(text: &str, args: &SetArgs) -> Result<()> {
 
 fn at_place(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
     if place.is_dir() {
-        return of_tree(&Tree::of_folder(place)?, args);
+        return files_in_tree(&Tree::from_folder(place)?, args);
     }
     let text = place.to_string_lossy();
     if !place.is_file() && !text.contains(['*', '?', '[']) {
@@ -124,7 +124,7 @@ fn at_place(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
     }
     if place.is_file() && ending(place) == "zip" {
         let archive = Arc::new(Archive::open(place)?);
-        return of_tree(&Tree::Archive(archive), args);
+        return files_in_tree(&Tree::Archive(archive), args);
     }
     refuse_choice(&text, args)?;
     if place.is_file() {
@@ -137,11 +137,11 @@ fn at_place(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
             notes: shard_alone(place).into_iter().collect(),
         });
     }
-    of_pattern(place, &text)
+    matching_files(place, &text)
 }
 
 /// The files whose names fit a pattern.
-fn of_pattern(place: &Path, text: &str) -> Result<FoundFiles> {
+fn matching_files(place: &Path, text: &str) -> Result<FoundFiles> {
     let wrong = |problem: String| Error::usage("--data", format_args!("{text}: {problem}"));
     let paths = glob::glob(text).map_err(|e| wrong(format!("not a pattern: {e}")))?;
     let files: Vec<PathBuf> = paths
@@ -168,7 +168,7 @@ fn of_pattern(place: &Path, text: &str) -> Result<FoundFiles> {
 }
 
 /// The files of a tree.
-fn of_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
+fn files_in_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
     let (all, outside) = tree.files()?;
     let (chosen, card) = chosen(tree, all, args)?;
     let paths: Vec<PathBuf> = chosen.iter().map(|file| tree.whole(&file.path)).collect();

@@ -62,13 +62,13 @@ impl SetFile {
         } else {
             None
         };
-        Self::of(path, unpacked, config)
+        Self::new(path, unpacked, config)
     }
 
     /// A file of an archive.
-    pub(super) fn of_member(archive: &Archive, name: &Path, config: String) -> Result<Self> {
+    pub(super) fn from_member(archive: &Archive, name: &Path, config: String) -> Result<Self> {
         let unpacked = archive.unpacked(&name.to_string_lossy())?;
-        let file = Self::of(archive.path.join(name), Some(unpacked), config)?;
+        let file = Self::new(archive.path.join(name), Some(unpacked), config)?;
         let inner = Some(name.parent().unwrap_or(Path::new("")).to_owned());
         let label = FileLabel {
             inner,
@@ -77,7 +77,7 @@ impl SetFile {
         Ok(Self { label, ..file })
     }
 
-    fn of(path: PathBuf, unpacked: Option<NamedTempFile>, config: String) -> Result<Self> {
+    fn new(path: PathBuf, unpacked: Option<NamedTempFile>, config: String) -> Result<Self> {
         let bare = match &*ending(&path) {
             "gz" => path.with_extension(""),
             _ => path.clone(),

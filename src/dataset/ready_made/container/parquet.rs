@@ -38,7 +38,7 @@ fn open(path: &Path) -> Result<File> {
 pub(super) struct Footer(OnceLock<Arc<ParquetMetaData>>);
 
 impl Footer {
-    fn of(&self, path: &Path) -> Result<Arc<ParquetMetaData>> {
+    fn metadata(&self, path: &Path) -> Result<Arc<ParquetMetaData>> {
         if let Some(known) = self.0.get() {
             return Ok(Arc::clone(known));
         }
@@ -65,15 +65,15 @@ fn wrong(path: &Path, problem: &str) -> Error {
 
 /// The number of rows in a file, from its footer.
 pub(super) fn count(path: &Path) -> Result<u64> {
-    let rows = Footer::default().of(path)?.file_metadata().num_rows();
+    let rows = Footer::default().metadata(path)?.file_metadata().num_rows();
     Ok(u64::try_from(rows).unwrap_or(0))
 }
 
 /// Adds the rows of a file.
 pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()> {
-    check_codecs(path, &*footer.of(path)?)?;
+    check_codecs(path, &*footer.metadata(path)?)?;
     // The footer alone tells it, before a row is read.
-    let stated = footer.of(path)?.file_metadata().num_rows();
+    let stated = footer.metadata(path)?.file_metadata().num_rows();
     if usize::try_from(stated).is_ok_and(|rows| rows > MOST_ROWS) {
         return Err(Error::data(path.display(), too_many_rows()));
     }
@@ -287,7 +287,7 @@ pub(super) fn bytes(
     column: &str,
     steps: &[Step],
 ) -> Result<Vec<u8>> {
-    let footer = footer.of(path)?;
+    let footer = footer.metadata(path)?;
     let item = steps.iter().find_map(|step| match step {
         Step::Item(at) => Some(*at),
         Step::Field(_) => None,

@@ -1,4 +1,4 @@
-//! The split of each file of a set, and the one that is asked: [`of_name`], [`chosen`].
+//! The split of each file of a set, and the one that is asked: [`split_in_name`], [`chosen`].
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ const WORDS: [(&str, &str); 10] = [
 ];
 
 /// The split that a path below a folder names: the first of its words, between signs that are no letters; empty if it names none.
-pub(super) fn of_name(path: &Path) -> String {
+pub(super) fn split_in_name(path: &Path) -> String {
     let text = path.to_string_lossy().to_lowercase();
     let mut words = text.split(|c: char| !c.is_alphabetic());
     let split = words.find_map(|word| WORDS.iter().find(|(known, _)| *known == word));
@@ -107,7 +107,7 @@ mod tests {
             ("latest/contest.parquet", ""),
             ("Questions.csv", ""),
         ] {
-            assert_eq!(of_name(Path::new(path)), split, "{path}");
+            assert_eq!(split_in_name(Path::new(path)), split, "{path}");
         }
     }
 
@@ -122,7 +122,7 @@ mod tests {
             files.collect::<Vec<Candidate>>()
         };
         let folder = tempfile::tempdir().unwrap();
-        let tree = Tree::of_folder(folder.path()).unwrap();
+        let tree = Tree::from_folder(folder.path()).unwrap();
         let choose = |splits: &[&str], wanted| {
             let files = chosen(&tree, files(splits), wanted)?.into_iter();
             Ok::<_, Error>(files.map(|file| file.path).collect::<Vec<_>>())

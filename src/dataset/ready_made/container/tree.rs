@@ -28,7 +28,7 @@ impl Tree {
     ///
     /// # Errors
     /// If the cache names no snapshot.
-    pub(super) fn of_folder(place: &Path) -> Result<Self> {
+    pub(super) fn from_folder(place: &Path) -> Result<Self> {
         let name = place.canonicalize().unwrap_or_else(|_| place.to_owned());
         let is_cached = |path: &Path| {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -68,7 +68,7 @@ impl Tree {
             Self::Folder { folder, blobs } => {
                 let blobs = blobs.iter().filter(|blobs| blobs.is_dir()).cloned();
                 let mut scan = Scan {
-                    root: Root::of(folder, &blobs.collect::<Vec<_>>())?,
+                    root: Root::new(folder, &blobs.collect::<Vec<_>>())?,
                     files: Vec::new(),
                     outside: Vec::new(),
                 };
@@ -102,7 +102,7 @@ impl Tree {
     pub(super) fn open(&self, path: &Path, config: String) -> Result<SetFile> {
         match self {
             Self::Folder { folder, .. } => SetFile::open(folder.join(path), config),
-            Self::Archive(archive) => SetFile::of_member(archive, path, config),
+            Self::Archive(archive) => SetFile::from_member(archive, path, config),
         }
     }
 
@@ -158,7 +158,7 @@ mod tests {
         std::os::unix::fs::symlink(at("secret.csv"), at("set/b.csv")).unwrap();
         std::os::unix::fs::symlink(at("set/a.csv"), at("set/inner/c.csv")).unwrap();
         std::os::unix::fs::symlink(at("nothing.csv"), at("set/d.csv")).unwrap();
-        let (files, outside) = Tree::of_folder(&at("set")).unwrap().files().unwrap();
+        let (files, outside) = Tree::from_folder(&at("set")).unwrap().files().unwrap();
         assert_eq!(files, [Path::new("a.csv"), Path::new("inner/c.csv")]);
         assert_eq!(outside, [at("set/b.csv"), at("set/d.csv")]);
     }
@@ -171,7 +171,7 @@ mod tests {
         fs::create_dir_all(at("snapshots/1")).unwrap();
         std::os::unix::fs::symlink("../../blobs/f00", at("snapshots/1/a.csv")).unwrap();
         let found = || {
-            let tree = Tree::of_folder(&at("snapshots/1")).unwrap();
+            let tree = Tree::from_folder(&at("snapshots/1")).unwrap();
             tree.files().unwrap()
         };
         // What was not downloaded leads nowhere.

@@ -167,7 +167,7 @@ fn data(
     let enhancers = args.job.enhancers.clone().for_set(light);
     // Flags that cannot be followed are a finding already.
     let dark = LightSettings::resolve(&args.job.light, light).map_or(DarkImages::Odd, |levels| {
-        DarkImages::of(light, &levels, &enhancers)
+        DarkImages::new(light, &levels, &enhancers)
     });
     images::images(&dataset, dark, &asked, depth, progress, findings);
     if let Some(path) = &check.save_questions {
