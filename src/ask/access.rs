@@ -36,7 +36,7 @@ pub struct Access {
     pub key_header: KeyHeader,
     /// Further headers that name the account and are not secret: `OpenAI-Organization`, `OpenAI-Project`.
     pub account: Vec<(String, String)>,
-    /// What is known of the vendor; `None` for hosts that no table has.
+    /// Facts about the vendor; `None` for hosts that no table lists.
     pub vendor: Option<&'static Vendor>,
     /// Headers that the user adds.
     pub headers: OwnHeaders,

@@ -1,4 +1,4 @@
-//! What is known of a vendor's Batch API: [`BatchInterface`].
+//! A vendor's Batch API: [`BatchInterface`].
 
 use std::num::{NonZeroU64, NonZeroUsize};
 

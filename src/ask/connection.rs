@@ -215,7 +215,7 @@ impl Connection {
         })
     }
 
-    /// What the server says of a model: its longest context and the files that it was loaded from, where it says so (vLLM does);
+    /// The model's longest context and the files that it was loaded from, where the server reports them (vLLM does);
     /// `None` if it cannot be asked.
     pub(super) async fn model_facts(
         &self,

@@ -123,7 +123,7 @@ impl Endpoint {
         self.replicas[0].base()
     }
 
-    /// What is known of the vendor of the first replica; `None` if no table has its host.
+    /// Facts about the vendor of the first replica; `None` if no table lists its host.
     pub(super) fn vendor(&self) -> Option<&'static Vendor> {
         self.replicas[0].vendor()
     }

@@ -66,12 +66,12 @@ const TOKEN_LIMITS: [&str; 3] = ["max_tokens", "max_completion_tokens", "max_out
 /// Fields that limit the tokens of thinking: DashScope's and Google's, Anthropic's, and that of llama.cpp.
 const THINKING_BUDGETS: [&str; 3] = ["thinking_budget", "budget_tokens", "reasoning_budget"];
 
-/// What the user adds to the body of every request or leaves out, and what tells two models of one name apart.
+/// Fields that the user adds to every request body or leaves out, and the deployment that tells two models of one name apart.
 ///
 /// The JSON form is part of the key of each trial. What is not set is not written, so that the keys of runs without it stay.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ExtraFields {
-    /// What tells two offers of one model apart, such as the vendor or the quantisation.
+    /// A name that tells two deployments of one model apart, such as the vendor or the quantisation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deployment: Option<String>,
     /// The words of a system message before each question.

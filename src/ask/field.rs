@@ -42,7 +42,7 @@ pub(super) struct RequestFields {
     pub(super) stream_usage: bool,
     /// How many of the likeliest tokens are asked for; `None` if their probabilities are not.
     pub(super) top_logprobs: Option<u8>,
-    /// What is said about thinking; `None` if nothing is.
+    /// The switch for thinking; `None` if requests do not mention it.
     pub(super) thinking: Option<&'static ThinkingSwitch>,
 }
 
@@ -169,7 +169,7 @@ impl RequestFields {
         }
     }
 
-    /// What changed since the `first` request, in words.
+    /// Changes since the `first` request, in words.
     pub(super) fn changes(self, first: Self) -> Vec<String> {
         let wire = match self.wire {
             wire if wire == first.wire => None,

@@ -108,7 +108,7 @@ impl ImageLimit {
         }
     }
 
-    /// What may be wrong with a request with so many images of which `image` is the largest: as base64 they may be more than a
+    /// The reason why a request with `images` images, of which `image` is the largest, may be refused: as base64 they may exceed what a
     /// body may have. `None` if they fit.
     #[must_use]
     pub(crate) fn may_exceed(&self, images: usize, image: &ImageFacts) -> Option<String> {

@@ -1,4 +1,4 @@
-//! What looks like a secret where none may stand: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`].
+//! Recognises text that looks like a secret: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`].
 
 /// How keys of common vendors begin.
 const BEGINNINGS: [&str; 6] = ["sk-", "AIza", "gsk_", "xai-", "hf_", "Bearer "];

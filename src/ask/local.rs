@@ -15,7 +15,7 @@ use crate::types::{Digest, FailureKind, Observed, Question, Reply};
 pub(crate) struct LocalAnswer {
     /// Index of the choice; `None` if the function does not know.
     pub(crate) choice: Option<usize>,
-    /// What it saw, for the record; `None` without an image.
+    /// The observation, for the record; `None` without an image.
     pub(crate) observed: Option<Observed>,
 }
 

@@ -72,7 +72,7 @@ pub struct Parameters {
     #[arg(skip)]
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub probabilities: bool,
-    /// What the user adds to requests or leaves out.
+    /// Fields that the user adds to requests or leaves out.
     #[arg(skip)]
     #[serde(flatten)]
     pub extra: ExtraFields,

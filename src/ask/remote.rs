@@ -36,14 +36,14 @@ pub struct Remote {
     first: RequestFields,
     /// The fields that the server accepts, as far as is known.
     fields: Mutex<RequestFields>,
-    /// What came of the first question to the model. Until it has come to an end, the others wait: what the server refuses in all
+    /// The outcome of the first question to the model. Until it has come to an end, the others wait: what the server refuses in all
     /// requests is then found out by one.
     scout: tokio::sync::Mutex<Scout>,
     /// Whether the warning about an unconstrained reply was printed.
     warned_unconstrained: AtomicBool,
 }
 
-/// What came of the first question to a model.
+/// The outcome of the first question to a model.
 #[derive(Debug)]
 enum Scout {
     /// None has come to an end.

@@ -58,7 +58,7 @@ impl Replica {
         &self.access.base
     }
 
-    /// What is known of the vendor.
+    /// Facts about the vendor.
     pub(super) fn vendor(&self) -> Option<&'static Vendor> {
         self.access.vendor
     }

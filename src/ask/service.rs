@@ -55,7 +55,7 @@ impl State {
     }
 }
 
-/// What is known of one model at the replicas.
+/// The state of one model at the replicas.
 #[derive(Debug)]
 struct Served {
     /// The id by which it is asked, for messages.
@@ -97,7 +97,7 @@ pub(super) enum Choice {
     None,
 }
 
-/// What follows from a failure of a request at one replica.
+/// The consequence of a request's failure at one replica.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Effect {
     /// The failure is the request's own.

@@ -53,7 +53,7 @@ struct ServerRow {
     on: Option<ThinkingSwitch>,
 }
 
-/// What a request says about thinking.
+/// The part of a request that controls thinking.
 #[derive(Debug, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ThinkingSwitch {
@@ -65,7 +65,7 @@ pub(super) struct ThinkingSwitch {
 }
 
 impl Thinking {
-    /// What a request to this server says.
+    /// The switch that this server understands.
     ///
     /// # Errors
     /// [`Error::Usage`] if nothing is known of the server's switch.

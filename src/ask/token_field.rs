@@ -8,11 +8,11 @@ use crate::types::flag::flag_words;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 #[value(rename_all = "snake_case")]
 pub enum TokenField {
-    /// What is known of the endpoint, else max_tokens; the other one if the server asks for it
+    /// Known name of the endpoint, else max_tokens; the other one if the server asks for it
     Auto,
-    /// What every other server understands
+    /// Understood by every other server
     MaxTokens,
-    /// What reasoning models of OpenAI require
+    /// Required by reasoning models of OpenAI
     MaxCompletionTokens,
     /// No limit is sent
     #[value(name = "none")]

@@ -1,4 +1,4 @@
-//! What is known of a host that serves models: [`Vendor`], from `vendors.toml`.
+//! Facts about a host that serves models: [`Vendor`], from `vendors.toml`.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -47,7 +47,7 @@ pub struct Vendor {
     logprobs: Option<Logprobs>,
     /// The Batch API; `None` if nothing is known of it.
     pub(super) batch: Option<VendorBatch>,
-    /// What the vendor does with a constraint on replies; `None` if it keeps it, or that is not known.
+    /// The vendor's handling of a constraint on replies; `None` if it keeps the constraint, or if that is unknown.
     constrain: Option<Constraining>,
     /// A field of the body without which requests are not repeatable.
     pub(super) pin: Option<String>,
@@ -167,7 +167,7 @@ impl Vendor {
         self.constrain == Some(Constraining::Ignored)
     }
 
-    /// What the vendor does instead of stating probabilities of tokens, in words; `None` if it may state them.
+    /// The vendor's reaction to a request for probabilities of tokens, in words; `None` if it may state them.
     pub(super) fn without_probabilities(&self) -> Option<&'static str> {
         self.logprobs.map(|logprobs| match logprobs {
             Logprobs::Ignored => "takes the request for probabilities and ignores it",

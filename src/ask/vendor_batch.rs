@@ -1,4 +1,4 @@
-//! What the table of vendors says of a Batch API: [`VendorBatch`].
+//! The Batch API of a vendor, from the table of vendors: [`VendorBatch`].
 
 use std::num::{NonZeroU64, NonZeroUsize};
 

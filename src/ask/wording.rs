@@ -1,4 +1,4 @@
-//! What servers write into errors, with the cause and the remedy: [`Wording::find`], by `wordings.toml`.
+//! Wordings of servers' errors, with the cause and the remedy: [`Wording::find`], by `wordings.toml`.
 
 use std::sync::LazyLock;
 

@@ -22,7 +22,7 @@ pub(super) struct BiasFit {
     /// Number of frames.
     pub(super) frames: usize,
     pub(super) hot: HotPixels,
-    /// What is left of all frames, for the probability plot.
+    /// Residuals of all frames, for the probability plot.
     pub(super) residuals: Residuals,
     /// Read noise by likelihood, before `widened`.
     pub(super) read: ReadNoise,
@@ -159,7 +159,7 @@ fn mean_noise(noises: impl Iterator<Item = (PairNoise, f64)>) -> PairNoise {
     }
 }
 
-/// What the first reading gives.
+/// The result of the first reading.
 struct FirstPass {
     mean: MeanFrame,
     /// Noise of each pair, hot pixels included: they stand still, so that their offset cancels.

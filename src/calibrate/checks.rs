@@ -53,7 +53,7 @@ pub(super) fn correlation(correlation: f64) -> Result<(), String> {
     Ok(())
 }
 
-/// What the mean of the bias frames shows.
+/// Checks on the mean of the bias frames.
 #[derive(Debug)]
 pub(super) struct BiasCheck {
     pub(super) hot: HotPixels,

@@ -65,7 +65,7 @@ pub(super) struct FrameReader {
     first: FirstFrame,
 }
 
-/// What all other frames must share with the first.
+/// Properties that all other frames must share with the first.
 #[derive(Debug)]
 struct FirstFrame {
     place: String,

@@ -26,7 +26,7 @@ pub(crate) struct NoiseLine {
 pub(crate) enum SlopeSource {
     /// Fitted to the settings.
     Settings,
-    /// That of the preset `sony-a7s2`, because there are fewer than three settings.
+    /// The value of the preset `sony-a7s2`, because there are fewer than three settings.
     Preset,
     /// None: no setting has such noise.
     NoNoise,

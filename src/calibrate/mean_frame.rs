@@ -171,7 +171,7 @@ impl MeanFrame {
         squares / free - (noise.within + noise.row) / self.frames()
     }
 
-    /// That of the plane whose tiles differ most. Row noise of this variance shifts the rows of a tile together.
+    /// The unevenness of the plane whose tiles differ most. Row noise of this variance shifts the rows of a tile together.
     pub(super) fn unevenness(&self, hot: &HotPixels, noise: PairNoise) -> Unevenness {
         let [rows, columns] = self.layout.plane_size();
         let tile_of = |column: usize| {

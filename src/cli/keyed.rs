@@ -142,7 +142,7 @@ pub(super) fn visible(command: &Command) -> Command {
         .subcommands(commands.map(visible))
 }
 
-/// What completions show of a flag or a positional argument.
+/// The completion of a flag or a positional argument.
 fn completed(arg: &Arg) -> Arg {
     let help = arg.get_help().cloned().unwrap_or_default();
     let completed = Arg::new(arg.get_id().clone())

@@ -87,7 +87,7 @@ enum SegmentSource {
     Superpixel,
 }
 
-/// What is done about files of a list that do not exist.
+/// The treatment of listed files that do not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MissingFiles {
     /// The list is refused.

@@ -98,7 +98,7 @@ pub struct Dataset {
     questions: Vec<Question>,
     labels: Option<Labels>,
     rule: ReadingRule,
-    /// What was taken for what in a ready-made set, one fact a line; empty for other data.
+    /// The inferred column mapping of a ready-made set, one line per column; empty for other data.
     reading: Vec<String>,
     form: Form,
     rows: RowCounts,
@@ -389,7 +389,7 @@ impl Dataset {
         &self.title
     }
 
-    /// What was taken for what in a ready-made set, one fact a line; empty for other data.
+    /// The inferred column mapping of a ready-made set, one line per column; empty for other data.
     #[must_use]
     pub fn reading(&self) -> &[String] {
         &self.reading

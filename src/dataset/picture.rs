@@ -32,7 +32,7 @@ impl Picture {
         }
     }
 
-    /// What reading the picture does besides taking its codes.
+    /// Changes that reading the picture makes besides decoding its codes.
     #[must_use]
     pub fn note(&self) -> InputNote {
         match self {

@@ -94,10 +94,10 @@ pub(crate) struct DecodeArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// What is done about images whose file states other colours than sRGB (an ICC profile, cICP, gAMA)
+    /// Treatment of images whose file states other colours than sRGB (an ICC profile, cICP, gAMA)
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub colour: ColourRule,
-    /// What the samples of 16-bit PNG and TIFF images are; OpenEXR images are always linear light, 8-bit images never
+    /// Encoding of the samples of 16-bit PNG and TIFF images; OpenEXR images are always linear light, 8-bit images never
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub transfer: Transfer,
     /// Scale linear light by this many EV before everything else, -20 to 20; default: not at all

@@ -57,7 +57,7 @@ impl FrameFiles<'_> {
         ))
     }
 
-    /// What reading the image does besides taking its codes.
+    /// Changes that reading the image makes besides decoding its codes.
     #[must_use]
     pub fn note(&self) -> InputNote {
         self.picture.note()

@@ -17,7 +17,7 @@ const SAMPLED: usize = 24;
 /// Mean luma, of 255, below which a frame is dark. Chosen: a well-lit frame has about 100.
 const DARK: f64 = 40.0;
 
-/// What to do with images of which this is the median of the mean luma, of 255; `None` if they are not dark.
+/// Advice for images with this median of the mean luma, of 255; `None` if they are not dark.
 pub(crate) fn advice(median: f64) -> Option<String> {
     (median < DARK).then(|| {
         format!(
@@ -53,7 +53,7 @@ pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64
     (!sample.is_empty()).then_some((mean, sample.len()))
 }
 
-/// What it means that the images of a set are dark.
+/// Whether dark images are expected of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum DarkImages {
     /// They are said to be, or they are asked about as they are, raw and enhanced, and no others are.

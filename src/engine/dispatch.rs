@@ -131,7 +131,7 @@ struct ReplySink<'a, I: Item> {
     /// Number of trials with a reply, including those of earlier calls.
     answered: usize,
     truncation: TruncationCheck,
-    /// What the images of the replies were charged.
+    /// Tokens charged for the images of the replies.
     measured: MeasuredTokens,
     /// Of each model, whether its replies depend on the image.
     dependence: Vec<ImageDependence>,

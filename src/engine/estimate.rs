@@ -132,7 +132,7 @@ fn label(model: &ModelUnderTest, phase: &str) -> String {
     format!("{}{role}", model.name)
 }
 
-/// What is too large for an endpoint: the largest image, or the request with the most of them.
+/// The reason why a request is too large for an endpoint: the largest image, or the request with the most images.
 fn too_large(limit: ImageLimit, image: &ImageFacts, sources: &[Source]) -> Option<String> {
     let shown = sources.iter().map(|source| source.order.len());
     let most = shown.max().unwrap_or(0);

@@ -45,7 +45,7 @@ pub(crate) trait Experiment: Sync {
     /// Description of the shortest reply, for the estimate of cost.
     const REPLY: &'static str;
 
-    /// What one source is: a frame or a walk.
+    /// The noun for one source: frame or walk.
     const SOURCE: &'static str;
 
     /// The settings that every experiment has.
@@ -83,7 +83,7 @@ pub(crate) trait Experiment: Sync {
         Vec::new()
     }
 
-    /// What the whole run can detect; `None` if that is not known.
+    /// The effect that the whole run can detect; `None` if unknown.
     fn power(&self) -> Option<PowerForecast> {
         None
     }

@@ -110,7 +110,7 @@ fn listed(job: &JobSettings, stored: Option<&RunManifest>) -> Vec<ListedModel> {
     }
 }
 
-/// What was done to the frames when they were read; `None` if nothing was.
+/// Changes made to the frames when they were read; `None` without changes.
 fn inputs<E: Experiment>(experiment: &E) -> Option<InputSummary> {
     let summary = input_summary(experiment.sources());
     (!summary.is_plain()).then_some(summary)

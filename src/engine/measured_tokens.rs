@@ -18,7 +18,7 @@ const REPLIES: usize = 10;
 /// The share by which an estimate may differ from what was charged without a word; chosen.
 const TOLERANCE: f64 = 0.1;
 
-/// What images were charged, by model of a phase.
+/// Tokens charged for images, by model of a phase.
 #[derive(Debug, Clone)]
 pub(crate) struct MeasuredTokens {
     /// Charged tokens less those of the text, by the number of images; one number a reply, at most [`REPLIES`].
@@ -40,7 +40,7 @@ impl MeasuredTokens {
         }
     }
 
-    /// What stored replies to trials of a plan about these sources were charged.
+    /// Tokens charged for stored replies to trials of a plan about these sources.
     pub(crate) fn from_stored<I: Item>(
         models: usize,
         plan: &Plan<I>,

@@ -127,7 +127,7 @@ impl Observer {
     }
 }
 
-/// What is kept of an observation in the record of an answer.
+/// The part of an observation that is kept in the record of an answer.
 fn observed(observation: &Observation, choice: Option<usize>) -> Observed {
     let outlines = observation.outlines();
     Observed {

@@ -33,7 +33,7 @@ pub(crate) struct PlannedImages {
     pub(crate) largest_request: f64,
     /// Time to make all images on this machine, in seconds.
     pub(crate) seconds: f64,
-    /// What an image store would hold; `None` without one.
+    /// The images that an image store would hold; `None` without one.
     pub(crate) set: Option<ImageSet>,
 }
 

@@ -27,7 +27,7 @@ const REFERENCES: usize = 16;
 /// Factor between a bound and the charged tokens from which a prompt is kept for comparison; chosen.
 const CLOSE: f64 = 1.05;
 
-/// What decides the tokens of a prompt.
+/// Facts that determine the tokens of a prompt.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PromptFacts<'a> {
     pub(crate) prompt: &'a Prompt,

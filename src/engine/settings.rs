@@ -48,7 +48,7 @@ pub(crate) struct JobArgs {
     /// Parameters of the models.
     #[command(flatten)]
     pub parameters: Parameters,
-    /// What is added to requests or left out.
+    /// Fields added to requests or left out.
     #[command(flatten)]
     pub request: RequestArgs,
     /// Endpoint and its key.

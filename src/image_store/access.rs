@@ -47,7 +47,7 @@ struct State {
     health: Health,
 }
 
-/// What the store can still be used for.
+/// The remaining uses of the store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 enum Health {
     #[default]
@@ -97,7 +97,7 @@ impl ImageStore {
         self.kinds
     }
 
-    /// What was read and written so far, as a line for `--timings`.
+    /// Images read and written so far, as a line for `--timings`.
     pub(crate) fn summary(&self) -> String {
         let (counts, bytes) = self.with(|state| (state.counts, state.bytes));
         let (folder, gigabytes) = (self.named.display(), |bytes: u64| bytes as f64 / 1e9);

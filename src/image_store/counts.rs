@@ -1,4 +1,4 @@
-//! What a process got out of the store, and put into it: [`StoreCounts`].
+//! Counts of a process's reads from the store and writes to it: [`StoreCounts`].
 
 use std::fmt;
 

@@ -33,37 +33,37 @@ pub(crate) struct Entry {
     pub(crate) facts: EntryFacts,
 }
 
-/// What is stored beside an image, or alone.
+/// Facts stored beside an image, or alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct EntryFacts {
-    /// What it is about, for lists of the store.
+    /// The subject of the entry, for lists of the store.
     pub(crate) shown: Shown,
     /// Time that it took to make, in milliseconds.
     pub(crate) milliseconds: u64,
-    /// What was found out about the image when it was made, in a form of the user of the store.
+    /// Findings about the image when it was made, in a form of the store's user.
     #[serde(default)]
     pub(crate) notes: Value,
-    /// What its key is the digest of.
+    /// The input of the key's digest.
     #[serde(default)]
     recipe: Value,
 }
 
-/// What an entry holds.
+/// The content of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Content {
     /// An image, with what was found out about it.
     #[default]
     Image,
-    /// What was found out about an image that is not kept.
+    /// Measures of an image that is not kept.
     Measures,
-    /// What the probe of an enhancer found.
+    /// The findings of an enhancer's probe.
     Probe,
     /// A small copy of an image, for the report of a run.
     Thumbnail,
 }
 
-/// What an entry of the store is about, in words.
+/// The subject of an entry, in words.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub(crate) struct Shown {
     #[serde(default)]
@@ -71,7 +71,7 @@ pub(crate) struct Shown {
     /// Name of the enhancer; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) enhancer: Option<String>,
-    /// What was done to the frame, as `L3-noise`; empty for a probe.
+    /// The degradation of the frame, as `L3-noise`; empty for a probe.
     pub(crate) light: String,
     /// Format, as `png`; empty for a probe.
     pub(crate) format: String,
@@ -162,7 +162,7 @@ impl Entry {
     }
 }
 
-/// What the end of a file says, without a check of its digest: the facts, and the length of the image in bytes. `tail` is the end of the
+/// Reads the end of a file without checking its digest: the facts, and the length of the image in bytes. `tail` is the end of the
 /// file, `length` the length of the whole.
 pub(super) fn facts_at_end(tail: &[u8], length: u64) -> Option<(EntryFacts, u64)> {
     let start = tail.len().checked_sub(FOOTER)?;

@@ -1,4 +1,4 @@
-//! What an image is found by: [`Key`].
+//! The key of an image in the store: [`Key`].
 
 use serde::Serialize;
 use serde_json::Value;

@@ -7,7 +7,7 @@ use crate::types::flag;
 /// Which images are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum StoredKinds {
-    /// Those that an enhancer made, and of the others their PSNR and SSIM alone
+    /// Enhanced images; of the others PSNR and SSIM alone
     Enhanced,
     /// Degraded ones too, which are made faster than a network share is read: for slow processors and fast disks
     All,

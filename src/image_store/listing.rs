@@ -1,4 +1,4 @@
-//! What a store holds, in a table: [`listing`]; and emptying it: [`clear`].
+//! Lists the content of a store in a table: [`listing`]; and empties it: [`clear`].
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -1,4 +1,4 @@
-//! What leaves a store, and whether there is room: [`sweep`].
+//! Removes old entries from a store, and checks its free space: [`sweep`].
 
 use std::fs::{self, TryLockError};
 use std::io;
@@ -13,7 +13,7 @@ const UNUSED: Duration = Duration::from_hours(14 * 24);
 /// Time after which an unfinished file is one that a killed process left; chosen.
 const ABANDONED: Duration = Duration::from_hours(24);
 
-/// What a sweep found and did.
+/// The result of a sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Swept {
     /// Bytes in the store afterwards.

@@ -16,7 +16,7 @@ const DROPS: [Severity; 3] = [Severity::L3, Severity::L2, Severity::L4];
 pub(crate) struct DarkFrames<'a>(Vec<(&'a Source, Vec<Condition>)>);
 
 impl<'a> DarkFrames<'a> {
-    /// Those for the enhancer of this name, with the conditions of the plan that it enhances.
+    /// Frames for the enhancer of this name, with the conditions of the plan that it enhances.
     pub(crate) fn new<I>(
         sources: &'a [Source],
         plan: &[SourcePlan<I>],

@@ -51,7 +51,7 @@ pub(crate) struct DarkImage<'a> {
 /// A reason why an image cannot be used. Reasons with the same words are reported together.
 struct Fault {
     words: &'static str,
-    /// What is special about the file; empty if nothing is.
+    /// Peculiarities of the file; empty without any.
     detail: String,
 }
 
@@ -223,7 +223,7 @@ impl EnhancedImages {
     /// Whether an image is its dark image itself, byte for byte.
     ///
     /// # Errors
-    /// What is wrong with the image.
+    /// The fault of the image.
     fn fault(&self, path: &str, dark: &DarkImage<'_>) -> std::result::Result<bool, Fault> {
         if dark.condition.pair().is_some() {
             let words = "`synthesize` writes no photographs in the dark and none that match them (see --llie-on)";
@@ -282,7 +282,7 @@ impl EnhancedFile {
 /// Width and height of a PNG file of 8 bits a channel.
 ///
 /// # Errors
-/// What else the file is.
+/// A description of the file if it is no 8-bit PNG image.
 fn size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
     match FileFormat::detect(file.bytes())? {
         FileFormat::Png => {}

@@ -203,7 +203,7 @@ impl<'a> FrameWork<'a> {
         Ok(Arc::clone(self.clean_as_sent.insert(scaled)))
     }
 
-    /// What a degradation does to this frame.
+    /// Applies a degradation to this frame.
     pub(crate) fn applied(&mut self, how: &Degradation) -> Result<AppliedDegradation> {
         let recipe = self.steps.recipe;
         let view = if how.kind().has_motion() {
@@ -215,7 +215,7 @@ impl<'a> FrameWork<'a> {
         applied.map_err(|e| Error::data(format_args!("{} at {how}", self.frame), e))
     }
 
-    /// What the camera did in a condition; `None` for a kind that leaves it open.
+    /// The camera's exposure in a condition; `None` for a kind that leaves it open.
     pub(crate) fn exposure(&mut self, condition: &Condition) -> Result<Option<ExposureFacts>> {
         let how = condition.degradation();
         let how = how.filter(|how| how.kind().has_motion());

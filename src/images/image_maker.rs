@@ -1,10 +1,10 @@
-//! What decides images besides their recipes: [`Maker`].
+//! Settings that determine images besides their recipes: [`Maker`].
 
 use serde::Serialize;
 
 use darkqa_enhance::SizeArgs;
 
-/// What decides images besides their recipes: the program, the machine's kind, and how enhancers are run. The number of threads is not
+/// Settings that determine images besides their recipes: the program, the machine's kind, and how enhancers are run. The number of threads is not
 /// part of it: six models (Zero-DCE, RUAS, SCI, Retinexformer, DarkIR, `lift`) gave the same bytes with 1, 2 and 3.
 #[derive(Debug, Serialize)]
 pub(crate) struct Maker {

@@ -1,4 +1,4 @@
-//! What a run stores about its images for the report ([`ImageNotes`]), and what of it is still missing ([`MissingNotes`]).
+//! Notes about images that a run stores for the report ([`ImageNotes`]), and those still missing ([`MissingNotes`]).
 
 use std::collections::BTreeSet;
 

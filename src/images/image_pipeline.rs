@@ -43,7 +43,7 @@ pub(crate) struct ImagePipeline<'a> {
     resting: Vec<Arc<RestingEnhancer>>,
     /// Further sets of the enhancers, each for a worker of its own; empty if one image is enhanced at a time.
     sets: Vec<Vec<Enhancer>>,
-    /// What happens to an enhancer whose images cannot be enhanced images.
+    /// The treatment of an enhancer whose output cannot be an enhanced image.
     implausible: Implausible,
 }
 
@@ -387,7 +387,7 @@ fn one_frame_each<I>(sources: &[Source], plan: &[SourcePlan<I>], workers: usize)
     plan.len() >= 2 * workers && parts.all(|part| sources[part.source].frames.len() < 2)
 }
 
-/// What was made for the report, or a warning and `None`: an answer must not fail because of a picture for the report.
+/// The value made for the report, or a warning and `None`: an answer must not fail because of a picture for the report.
 fn or_warning<T>(name: &FrameId, condition: &Condition, made: Result<T>) -> Option<T> {
     made.inspect_err(|problem| {
         tracing::warn!("the report has no thumbnail of {name} at {condition}: {problem}");

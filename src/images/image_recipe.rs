@@ -24,7 +24,7 @@ pub(crate) struct ImageRecipe {
     frame: String,
     /// The digest of the image that this one was made from.
     source: String,
-    /// What reading the file did besides taking its codes; no fields if nothing.
+    /// Changes that reading the file made besides decoding its codes; no fields without changes.
     #[serde(flatten)]
     read: InputNote,
     condition: Condition,
@@ -33,7 +33,7 @@ pub(crate) struct ImageRecipe {
     /// The version of the kind of degradation that made the image.
     synthesis: u32,
     sensor: Option<SensorRecord>,
-    /// What the camera did; not in the file for kinds that leave it open.
+    /// The camera's exposure; not in the file for kinds that leave it open.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     exposure: Option<ExposureFacts>,
 }

@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::images::source::warn_of_inputs;
 use crate::types::{FrameId, InputNote, InputSummary};
 
-/// What was done to the images of a command so far.
+/// Changes to the images of a command so far.
 #[derive(Debug, Default)]
 pub(crate) struct InputTally(Mutex<InputSummary>);
 

@@ -13,7 +13,7 @@ pub(crate) struct SourcePhotograph {
     pub(crate) name: PhotoName,
     /// Digest of the file and of the rule by which it is read.
     pub(crate) digest: Digest,
-    /// What reading the file does besides taking its codes.
+    /// Changes that reading the file makes besides decoding its codes.
     pub(crate) note: InputNote,
     /// Exposure drop that the data state, in EV; `None` if they do not.
     pub(crate) stated: Option<f64>,

@@ -1,4 +1,4 @@
-//! What is known of all photographs in the dark before anything is asked: their [`names`], and how dark they are ([`tell`], [`measure`]).
+//! All photographs in the dark, before anything is asked: their [`names`], and how dark they are ([`tell`], [`measure`]).
 
 use std::collections::BTreeMap;
 

@@ -17,7 +17,7 @@ use crate::picture::png;
 use crate::picture::{ImageFile, ReadingRule};
 use crate::types::{Digest, Rgb};
 
-/// What an image was made from, as its JSON file holds it.
+/// The origin of an image, as its JSON file holds it.
 pub(crate) trait ImageOrigin: Clone + PartialEq + Serialize + DeserializeOwned {
     /// The values of `schema` that are read; the first is written.
     const SCHEMAS: &'static [&'static str];
@@ -68,7 +68,7 @@ impl OutputFile {
         }
     }
 
-    /// What is wrong with the bytes of the file; `None` if they are those that were written.
+    /// The fault of a file with these bytes; `None` if they are those that were written.
     pub(crate) fn fault(&self, bytes: &[u8]) -> Option<String> {
         if bytes.len() as u64 != self.bytes {
             let found = bytes.len();
@@ -129,7 +129,7 @@ impl<R: ImageOrigin> Sidecar<R> {
     }
 }
 
-/// What became of one output file.
+/// The outcome of one output file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum ImageOutcome {
     /// The image was made.
@@ -192,7 +192,7 @@ impl ImageCounts {
     }
 }
 
-/// What to do with what lies in the folder.
+/// The treatment of an existing file in the folder.
 enum Verdict {
     /// It is the image; nothing is to be done.
     Keep,

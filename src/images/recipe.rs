@@ -304,7 +304,7 @@ struct DegradationFacts<'a> {
     frame: Option<&'a FrameId>,
     /// Source whose frames share one state of the camera; `None` if each frame has its own.
     camera_of: Option<&'a FrameId>,
-    /// What the camera does for this frame: it decides the pixels of kinds with motion blur.
+    /// The camera's exposure for this frame: it determines the pixels of kinds with motion blur.
     exposure: Option<ExposureFacts>,
 }
 

@@ -18,7 +18,7 @@ pub(crate) struct RestingEnhancer {
     findings: Findings,
     usage: Usage,
     state: Mutex<State>,
-    /// What ends its runs, once it is open.
+    /// Ends its runs, once it is open.
     stopper: OnceLock<Stopper>,
     is_stopped: AtomicBool,
 }

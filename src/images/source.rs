@@ -61,7 +61,7 @@ pub(crate) struct SourceFrame {
     pub(crate) id: FrameId,
     /// Digest of the file and of the rule by which it is read.
     pub(crate) digest: Digest,
-    /// What reading the file does besides taking its codes.
+    /// Changes that reading the file makes besides decoding its codes.
     pub(crate) note: InputNote,
     /// Width and height, in pixels.
     pub(crate) size: (u32, u32),
@@ -207,7 +207,7 @@ impl Source {
     }
 }
 
-/// What was done to the frames of these sources when they were read.
+/// Changes made to the frames of these sources when they were read.
 pub(crate) fn input_summary(sources: &[Source]) -> InputSummary {
     let mut summary = InputSummary::default();
     for frame in sources.iter().flat_map(|source| &source.frames) {

@@ -1,4 +1,4 @@
-//! What the image store knows of enhancers: that a model was opened, and what its probe found ([`StoredFindings`]).
+//! Stored findings about enhancers: that a model was opened, and the result of its probe ([`StoredFindings`]).
 
 use std::time::Duration;
 
@@ -27,7 +27,7 @@ struct FindingsRecipe<'a> {
     stated: Digest,
     version: u32,
     maker: &'a Maker,
-    /// What decides the dark frames that the model is tried on, by frame; `None` for the note that it was opened.
+    /// Facts that determine the dark frames on which the model is tried, by frame; `None` for the note that it was opened.
     frames: Option<Vec<Vec<ImageKeyFacts<'a>>>>,
 }
 
@@ -114,7 +114,7 @@ pub(crate) struct FindingsPlace<'a> {
 }
 
 impl FindingsPlace<'_> {
-    /// What was found; `None` if the store does not know it.
+    /// The findings; `None` if the store has none.
     pub(crate) fn read(&self) -> Option<Findings> {
         let mut findings: Option<Findings> = None;
         self.store.get(&self.tried, Content::Probe, |entry| {

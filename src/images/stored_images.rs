@@ -26,7 +26,7 @@ pub(crate) struct StoredImages<'a> {
 /// All that decides the file of an image.
 #[derive(Serialize)]
 struct StoredRecipe<'a> {
-    /// What is kept in place of the image; `None` if it is kept itself.
+    /// The content that is kept in place of the image; `None` if the image itself is kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     content: Option<Content>,
     image: ImageKeyFacts<'a>,
@@ -40,7 +40,7 @@ impl<'a> StoredImages<'a> {
         Self { store, maker }
     }
 
-    /// What the store knows of enhancers.
+    /// The store's findings about enhancers.
     pub(crate) fn findings(self) -> StoredFindings<'a> {
         StoredFindings::new(self.store, self.maker)
     }
@@ -135,10 +135,10 @@ pub(crate) struct Similarity {
     pub(crate) ssim: Option<f64>,
 }
 
-/// What was found out about an image when it was made.
+/// Findings about an image when it was made.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct MadeNotes {
-    /// What the note of the enhancer got; `None` without one.
+    /// The image's part in the enhancer's note; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) enhanced: Option<ImageUse>,
     /// `None` if it was not measured.
@@ -146,7 +146,7 @@ pub(crate) struct MadeNotes {
     pub(crate) similarity: Option<Similarity>,
 }
 
-/// What must be known of an image besides its file.
+/// The facts needed about an image besides its file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Needed {
     /// Nothing.

@@ -107,6 +107,6 @@ pub(crate) struct PreparedGroup<I> {
     pub(crate) trials: Vec<Trial<I>>,
     /// Reason why the images could not be made; else `None`.
     pub(crate) problem: Option<Error>,
-    /// What the report needs to know of the images.
+    /// Notes about the images for the report.
     pub(crate) notes: ImageNotes,
 }

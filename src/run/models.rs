@@ -1,4 +1,4 @@
-//! What each model of a file comes to: [`models`].
+//! The resolved settings of each model of a file: [`models`].
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

@@ -28,7 +28,7 @@ pub(super) struct Baseline {
     rows: Vec<BaselineRow>,
     /// The name of the old run.
     old: String,
-    /// What differs between the new runs and the old one.
+    /// Differences between the new runs and the old one.
     alerts: Vec<Alert>,
 }
 

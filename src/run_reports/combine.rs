@@ -121,7 +121,7 @@ pub(super) fn typed(folder: &Path) -> String {
     shell_word(&shown.display().to_string()).into_owned()
 }
 
-/// What these questions say of their frames.
+/// The scenes and further images that these questions name for their frames.
 pub(super) fn ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> FrameTies {
     let mut ties = FrameTies::default();
     for question in questions {

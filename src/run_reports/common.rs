@@ -51,7 +51,7 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
     Ok(combined)
 }
 
-/// What identifies an item: question, order of choices and repeat.
+/// The identity of an item: question, order of choices and repeat.
 fn owned(item: &AskedItem) -> (QuestionId, Vec<String>, u32) {
     let (question, choices, repeat) = item.key();
     (question.clone(), choices.to_vec(), repeat)

@@ -37,7 +37,7 @@ pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
     named.collect()
 }
 
-/// What a reader must know of the enhancers before any number.
+/// Alerts about the enhancers.
 pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut alerts: Vec<Alert> = Vec::new();
     for (_, name, note) in notes(runs) {
@@ -130,7 +130,7 @@ fn unread(note: &EnhancerNote) -> Option<String> {
     (!outputs.is_empty()).then(|| format!("not read: {}", outputs.join(", ")))
 }
 
-/// What the probe and the run's images of dark frames looked like.
+/// The look of the probe's and the run's images of dark frames.
 fn looks(note: &EnhancerNote) -> String {
     let probe = match &note.probe {
         None => "no probe was run".to_owned(),

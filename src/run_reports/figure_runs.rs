@@ -50,7 +50,7 @@ impl FigureRuns {
         self.combined.findings()
     }
 
-    /// What a reader must know before any number.
+    /// Alerts to read before any number.
     pub(crate) fn alerts(&self, findings: &Findings<'_>) -> Vec<Alert> {
         let mut all = self.again.clone();
         all.extend(alerts(&self.combined, findings));

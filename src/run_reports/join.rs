@@ -132,7 +132,7 @@ pub(super) fn join<D: Detail>(
     Ok(joined)
 }
 
-/// What the runs that are already joined have, so that nothing is added twice.
+/// Trials of the runs that are already joined, so that nothing is added twice.
 #[derive(Default)]
 struct Known {
     /// Places of the trials with a reply, by key and by the group of the model's name; `None` of a single run, which has each trial once.

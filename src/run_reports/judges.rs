@@ -58,7 +58,7 @@ fn check_one_name(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
     Err(Error::Run { path, problem })
 }
 
-/// What decides the marks of the judge of a run; `None` if no judge was asked, or the run does not say.
+/// Settings that determine the marks of a run's judge; `None` if no judge was asked, or the run does not state them.
 fn judge_settings(manifest: &RunManifest) -> Option<Settings> {
     let judge = manifest.settings.get(JUDGE)?.as_str()?;
     // Runs of earlier versions have the judge among the models alone.

@@ -165,7 +165,7 @@ fn parted_by(group: &[usize], bases: &[&Vec<Vec<usize>>]) -> Vec<Vec<usize>> {
     parts.into_iter().map(|(_, part)| part).collect()
 }
 
-/// What the trials of the runs say of their images.
+/// The agreement of runs on their images, by curve.
 struct Seen {
     /// The runs that have each curve.
     curves: BTreeMap<LightCurve, BTreeSet<usize>>,

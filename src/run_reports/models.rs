@@ -14,7 +14,7 @@ const MOST_SETTINGS: usize = 2;
 /// The longest value of a setting in the name of a model, in letters.
 const LONGEST_VALUE: usize = 24;
 
-/// What was asked: the model, its view and condition, the question, its choices as shown, and how many times it was asked before.
+/// The item of a trial: the model, its view and condition, the question, its choices as shown, and how many times it was asked before.
 pub(super) type Item<'a> = (
     (View, &'a str),
     (Option<&'a Condition>, &'a QuestionId),
@@ -185,7 +185,7 @@ fn between(groups: &[Vec<usize>], overlap: impl Fn(usize, usize) -> Overlap) -> 
     overlaps
 }
 
-/// What tells the groups of runs apart: the settings if they are few and short, else the name of the first run.
+/// Suffixes that tell the groups of runs apart: the settings if they are few and short, else the name of the first run.
 fn suffixes(groups: &[Vec<usize>], differences: &[Setting], names: &[String]) -> Vec<String> {
     let is_short = |setting: &Setting| {
         let fits = |value: &String| value.chars().count() <= LONGEST_VALUE && !is_digest(value);

@@ -231,7 +231,7 @@ impl OpenRun {
 /// Several runs, joined to one.
 pub(super) struct JoinedRuns {
     pub(super) run: OpenRun,
-    /// What differs between the runs, and what is wrong with their numbers.
+    /// Differences between the runs, and faults of their numbers.
     pub(super) alerts: Vec<Alert>,
     /// How their enhancers were used.
     enhancers: Vec<EnhancerRow>,

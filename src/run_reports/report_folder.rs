@@ -11,9 +11,9 @@ use darkqa_score::record::Detail;
 
 /// The folder that the report of one run is written into.
 pub(super) enum ReportFolder<'a, D: Detail> {
-    /// That of the run.
+    /// The folder of the run.
     Run(&'a Store<D>),
-    /// That of its parts. Each part has its own manifest, so that the folder is no run.
+    /// The folder of its parts. Each part has its own manifest, so that the folder is no run.
     Parts(&'a Path),
 }
 

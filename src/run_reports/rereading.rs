@@ -1,4 +1,4 @@
-//! What changes if stored replies are read by the rules of this version: [`LenientChange`].
+//! Changes if stored replies are read by the rules of this version: [`LenientChange`].
 
 use crate::error::Result;
 use crate::types::manifest::{FIRST_REPLY_READING, RunManifest};

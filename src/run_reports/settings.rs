@@ -212,7 +212,7 @@ pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
     settings
 }
 
-/// What decides the replies of a model besides question and images; `None` if the run does not have the model, or does not say.
+/// Settings that determine a model's replies besides question and images; `None` if the run does not have the model, or does not state them.
 pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
     let content = run.columns.get("model")?.get(model)?;
     // A model of this program answers by rules, and reads no prompt.

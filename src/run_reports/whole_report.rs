@@ -1,4 +1,4 @@
-//! What a report of one run consists of: [`WholeReport`].
+//! The report of one run: [`WholeReport`].
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use darkqa_score::record::Detail;
 /// Name of the file with the rows of the summary.
 const SUMMARY_JSON: &str = "summary.json";
 
-/// What a report of one run consists of.
+/// The report of one run.
 pub(crate) struct WholeReport {
     /// The files by name, as `report` writes them into the folder of the run.
     pub(crate) files: Vec<(String, Vec<u8>)>,

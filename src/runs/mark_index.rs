@@ -12,7 +12,7 @@ pub(crate) const PROTOCOL: &str = "--protocol";
 /// The marks of a judge, by the words of the question and the answer: a mark is that of all questions with the same words.
 #[derive(Debug)]
 pub(crate) struct MarkIndex<M> {
-    /// What the judge is told of each question.
+    /// The digest of the judge's prompt, by question.
     words: HashMap<QuestionId, Digest>,
     /// By the digest of these words and the answer.
     by_answer: HashMap<Digest, M>,
@@ -41,7 +41,7 @@ impl<M> MarkIndex<M> {
         self.by_answer.get(&self.judged(question, answer)?)
     }
 
-    /// What the judge is told.
+    /// The digest of the judge's prompt for an answer.
     fn judged(&self, question: &QuestionId, answer: &str) -> Option<Digest> {
         let words = self.words.get(question)?;
         let parts = [words.to_string(), answer.to_owned()];

@@ -1,4 +1,4 @@
-//! What parts of another division of the same run have: [`OtherParts`].
+//! Sources and trials in parts of another division of the same run: [`OtherParts`].
 
 use std::collections::{BTreeSet, HashSet};
 use std::fs;

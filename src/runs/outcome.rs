@@ -14,7 +14,7 @@ pub(crate) struct Outcome {
     pub status: Status,
     /// Text for standard output.
     pub output: String,
-    /// What was written, which `--quiet` prints alone; empty if the text itself is the result.
+    /// Paths written, which `--quiet` prints alone; empty if the text itself is the result.
     pub written: Vec<PathBuf>,
 }
 
@@ -70,7 +70,7 @@ pub(crate) struct ShowArgs {
     /// Print the summary as JSON instead of text
     #[arg(long, add = Decides::Nothing)]
     pub json: bool,
-    /// What is written beside the report.
+    /// Files written beside the report.
     #[command(flatten)]
     pub written: WrittenArgs,
 }

@@ -1,4 +1,4 @@
-//! What of a run a shard does: [`part`].
+//! The part of a run that a shard does: [`part`].
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;

@@ -1,4 +1,4 @@
-//! What a part of a run has left of its share of `--max-cost`: [`PartCost`].
+//! The rest of a part's share of `--max-cost`: [`PartCost`].
 
 use serde_json::json;
 
@@ -11,9 +11,9 @@ const ENTRY: &str = "--max-cost of this part";
 /// The share of a part in the limit of cost of its run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PartCost {
-    /// What the part may cost, in US dollars.
+    /// The part's budget, in US dollars.
     share: f64,
-    /// What its replies cost, in US dollars.
+    /// The cost of its replies, in US dollars.
     spent: f64,
 }
 
@@ -23,7 +23,7 @@ impl PartCost {
         Self { share, spent }
     }
 
-    /// What is left; at least nothing.
+    /// The rest of the budget; at least 0.
     fn left(self) -> f64 {
         (self.share - self.spent).max(0.0)
     }

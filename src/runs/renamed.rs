@@ -33,9 +33,9 @@ pub(crate) enum OtherSettings {
 /// The models of a command.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Now<'a> {
-    /// What decides the replies of each, by name.
+    /// Settings that determine the replies of each model, by name.
     pub(crate) models: &'a BTreeMap<String, Value>,
-    /// What each is shown, by name.
+    /// The view of each model, by name.
     pub(crate) views: &'a Views,
     pub(crate) settings: OtherSettings,
 }
@@ -197,7 +197,7 @@ fn left_out(
     known.into_iter().filter(is_left).collect()
 }
 
-/// What decides the replies of a model: all but the address.
+/// Settings that determine the replies of a model: all but the address.
 fn decides(content: &Value) -> Value {
     let mut content = content.clone();
     if let Some(fields) = content.as_object_mut() {

@@ -1,4 +1,4 @@
-//! What reports read of a run where they show it: [`RunTexts`].
+//! Texts that reports read from a run where they show them: [`RunTexts`].
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -90,7 +90,7 @@ impl<D: Detail> RunTexts<D> {
         }
     }
 
-    /// What stands in the place of a reply: its text; else that of a refusal, else what the error says.
+    /// The text shown for a reply: its own; else that of a refusal, else the message of the error.
     ///
     /// # Errors
     /// As for [`record`](Self::record).

@@ -20,7 +20,7 @@ use darkqa_score::record::Detail;
 /// The models of a run that a report shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ShownModels {
-    /// Those of the file of models, and those that the last command asked.
+    /// Models in the file of models, and those that the last command asked.
     Current,
     /// Also those that the file of models no longer has, or had with other settings.
     All,

@@ -1,4 +1,4 @@
-//! What a reader must know before any number of a report: [`Alert`].
+//! Warnings above the numbers of a report: [`Alert`].
 
 use crate::text::terminal::line;
 use serde::Serialize;
@@ -75,7 +75,7 @@ pub enum AlertKind {
     Noise,
     /// Photographs in the dark that are no pair of one exposure with their frames.
     Pairs,
-    /// What the observer's numbers do not show.
+    /// Limits of the observer's numbers.
     Observer,
 }
 

@@ -22,7 +22,7 @@ impl LightReadings {
         )
     }
 
-    /// What a single reading leaves open, and how the others are asked; `None` without noise or with several readings.
+    /// The open question of a single light reading, and how the others are asked; `None` without noise or with several readings.
     pub(crate) fn open_question(&self) -> Option<String> {
         let mut readings = self.0.iter();
         let (Some(only), None) = (readings.next(), readings.next()) else {

@@ -1,8 +1,8 @@
-//! What became of a trial, in words: [`outcome`], and why a reply was not read ([`unread`]) or no reply came ([`failed`]).
+//! The outcome of a trial in words: [`outcome`], and why a reply was not read ([`unread`]) or no reply came ([`failed`]).
 
 use crate::types::{FailureKind, Record, TrialOutcome, UnreadReason};
 
-/// What became of a trial of a question with choices, by the strict reading: `✓ right`, `not read (cut at the token limit)`.
+/// The outcome of a trial of a question with choices, by the strict reading: `✓ right`, `not read (cut at the token limit)`.
 pub(crate) fn outcome(record: &Record) -> String {
     match record.detail.outcome {
         TrialOutcome::Right => "✓ right".to_owned(),

@@ -44,7 +44,7 @@ pub(crate) struct BatchServer {
     timeout: Duration,
 }
 
-/// What a batch is made of.
+/// The parts of a new batch.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NewBatch<'a> {
     /// The server's name of the input file.

@@ -1,4 +1,4 @@
-//! What the files and batches of a server say of themselves: [`RemoteFile`], [`RemoteBatch`].
+//! Files and batches as a server describes them: [`RemoteFile`], [`RemoteBatch`].
 
 use serde_json::Value;
 

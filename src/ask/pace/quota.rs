@@ -29,7 +29,7 @@ const FIRST_TOKENS: f64 = 1200.0;
 /// The maximum number of tokens of a request; a larger number from a server is wrong and is cut to this one.
 const MOST_TOKENS: f64 = 1e7;
 
-/// What was sent in the last minute. In any 60 seconds, from the first request to the last, at most the quota is sent, whatever fails:
+/// Requests and tokens of the last minute. In any 60 seconds, from the first request to the last, at most the quota is sent, whatever fails:
 /// what a pause leaves unused is lost, not made up.
 #[derive(Debug)]
 pub(super) struct QuotaWindow {

@@ -195,7 +195,7 @@ async fn a_replica_of_another_model_is_gone() {
     assert!(all.succeeded(ONE, 2, Some("a"), Instant::now()).is_ok() && all.takes(ONE, 2));
 }
 
-/// What a replica is for one model says nothing of another one at the same replicas.
+/// The state of a replica for one model does not affect another model at the same replicas.
 #[tokio::test(start_paused = true)]
 async fn each_model_has_replicas_of_its_own() {
     let all = services(2);

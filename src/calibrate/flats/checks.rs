@@ -17,7 +17,7 @@ const LIGHT: [f64; 2] = [0.01, 0.05];
 /// Least share of the tiles of an exposure in the range of light; an exposure with fewer is left out (chosen).
 const LEAST_IN_RANGE: f64 = 0.25;
 
-/// What a pair of flats gives.
+/// The result of a pair of flats.
 #[derive(Debug)]
 pub(super) struct PairFacts {
     /// Names of the two files.

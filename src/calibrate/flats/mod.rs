@@ -54,7 +54,7 @@ struct Dark {
     within: f64,
 }
 
-/// What bias frames say of the flats.
+/// Properties of the flats that bias frames determine.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Base<'a> {
     /// Means of the planes in ADU.

@@ -1,4 +1,4 @@
-//! What decoders give, [`Decoded`], and the errors that they share.
+//! The result of a decoder, [`Decoded`], and the errors that decoders share.
 
 use std::fmt;
 
@@ -26,7 +26,7 @@ impl fmt::Display for MosaicForm {
     }
 }
 
-/// What a decoder takes from the bytes of a file. The error is a text without the name of the file.
+/// The frame that a decoder reads from the bytes of a file. The error is a text without the name of the file.
 pub(super) struct Decoded {
     pub(super) height: usize,
     pub(super) width: usize,

@@ -24,7 +24,7 @@ pub(super) struct Mosaic {
     pub(super) facts: FrameFacts,
 }
 
-/// What a file says about its frame besides the samples.
+/// Properties of a frame that its file states besides the samples.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FrameFacts {
     pub(super) form: MosaicForm,

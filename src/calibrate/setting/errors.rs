@@ -17,7 +17,7 @@ pub(super) struct Errors {
     pub(super) offsets: Vec<Option<f64>>,
 }
 
-/// What a draw gives.
+/// The fit of one draw.
 struct Draw {
     offsets: Vec<f64>,
     row: f64,

@@ -1,4 +1,4 @@
-//! What is measured of one setting: [`SettingFit`].
+//! The measurement of one setting: [`SettingFit`].
 
 use serde::Serialize;
 

@@ -19,7 +19,7 @@ pub(crate) use fit::{Measured, SettingFit};
 /// Points of the probability plot of a setting (chosen).
 const PLOT_POINTS: usize = 61;
 
-/// What all settings are measured with.
+/// The inputs of every setting's measurement.
 pub(super) struct Measuring<'a> {
     pub(super) reader: &'a FrameReader,
     /// The code of white.

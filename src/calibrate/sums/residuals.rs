@@ -17,7 +17,7 @@ const WINDOW: i64 = 512;
 /// Samples that a thread counts before it adds up its list (chosen).
 const SAMPLES_AT_ONCE: usize = 1 << 20;
 
-/// What the codes of a frame are compared with.
+/// The centres from which the codes of a frame deviate.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) enum Centres<'a> {
     /// The mean of the plane and of the row, both of the frame itself.

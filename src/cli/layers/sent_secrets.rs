@@ -1,4 +1,4 @@
-//! What a file of flags may not have sent to an address of its own: [`check`].
+//! Refuses a file of flags that sends secrets to an address of its own: [`check`].
 //!
 //! Such a file may come from a repository beside a paper. It may name an address, or what is sent to one; with both it could take any
 //! file or variable of the user to a stranger. So what is sent must then be the file's own, or belong to the address.

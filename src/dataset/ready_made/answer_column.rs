@@ -11,7 +11,7 @@ use super::roles::{Column, Roles};
 use super::row::Table;
 use crate::types::shown_text::excerpt;
 
-/// What a column says in each row; `None` where it says nothing that can be read.
+/// The choice that a column names in each row; `None` where it names none that can be read.
 type Said = Vec<Option<usize>>;
 
 /// A column that may hold the answers.
@@ -105,7 +105,7 @@ pub(super) fn yes_or_no_column<'a>(
     roles: &'a Roles,
     items: &[Item],
 ) -> Result<&'a Column, String> {
-    /// What a word means that is neither yes nor no.
+    /// The meaning of a word that is neither yes nor no.
     const OTHER: usize = usize::MAX;
     let candidate = |column: &'a Column| {
         let answers: Vec<Option<String>> = items

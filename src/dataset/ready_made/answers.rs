@@ -1,4 +1,4 @@
-//! What the answers of a set mean: [`Reading`], and the one of all rows: [`one_reading`].
+//! The meaning of a set's answers: [`Reading`], and the one that fits all rows: [`one_reading`].
 
 use super::offered::{Offered, Origin, one_line};
 use crate::types::Choices;

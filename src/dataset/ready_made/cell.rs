@@ -56,7 +56,7 @@ impl FieldNames {
     }
 }
 
-/// What is known of bytes that are not kept.
+/// Facts about bytes that are not kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FileFacts {
     pub(super) digest: Digest,

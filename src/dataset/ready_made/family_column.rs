@@ -1,4 +1,4 @@
-//! What the families of questions are named by: [`FamilyOf`].
+//! The source of the families of questions: [`FamilyOf`].
 
 use std::collections::BTreeSet;
 

@@ -1,4 +1,4 @@
-//! What the `dataset.json` beside the rows of a set says: [`FolderInfo`].
+//! The `dataset.json` beside the rows of a set: [`FolderInfo`].
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::map::Map;
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// What the `dataset.json` of a folder says of a set.
+/// The `dataset.json` of a folder with a set.
 #[derive(Debug, Default)]
 pub(super) struct FolderInfo {
     pub(super) name: String,
@@ -17,7 +17,7 @@ pub(super) struct FolderInfo {
 impl FolderInfo {
     const FILE: &str = "dataset.json";
 
-    /// What the file in a folder says; nothing without it.
+    /// Reads the file of a folder; empty without one.
     pub(super) fn in_folder(folder: &Path) -> Result<Self> {
         let path = folder.join(Self::FILE);
         if !path.is_file() {
@@ -26,7 +26,7 @@ impl FolderInfo {
         Self::read(&path, &reading::json(&path)?)
     }
 
-    /// What the file at the top of a ZIP file says.
+    /// Reads the file at the top of a ZIP file.
     pub(super) fn in_archive(archive: &Archive) -> Result<Self> {
         if !archive.has(Self::FILE) {
             return Ok(Self::default());

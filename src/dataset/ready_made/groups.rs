@@ -108,7 +108,7 @@ fn parts(table: &Table, template: &str) -> Result<Vec<Part>, String> {
     Ok(parts)
 }
 
-/// What stands in the braces of a template: a column, or a column and how many of its numbers are one group.
+/// Parses the braces of a template: a column, or a column and how many of its numbers are one group.
 fn part(table: &Table, field: &str) -> Result<Part, String> {
     let Some((name, run)) = run_of(field).filter(|_| table.find(field).is_none()) else {
         return column(table, field).map(Part::Cell);
@@ -192,7 +192,7 @@ impl Groups {
         Some(StrictGroup { name, size })
     }
 
-    /// What the groups of these questions are like, in words; `None` if there are no groups.
+    /// Describes the groups of these questions; `None` without groups.
     pub(super) fn said(&self, questions: &[Question]) -> Option<String> {
         if self.rule.is_empty() {
             return None;

@@ -36,7 +36,7 @@ impl Ids {
         self.name.clone()
     }
 
-    /// What the user should know of them.
+    /// A note to the user about the identifiers.
     pub(super) fn note(&self) -> Option<String> {
         self.note.clone()
     }

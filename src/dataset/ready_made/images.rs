@@ -29,7 +29,7 @@ pub(super) enum RowImage {
     Frame(String),
 }
 
-/// What the columns of images hold.
+/// The content of the image columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ImagesAre {
     /// Images, or the paths of files.

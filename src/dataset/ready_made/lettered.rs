@@ -18,7 +18,7 @@ struct Mark {
     letter: char,
 }
 
-/// What a question has of options with letters.
+/// The form of options with letters in a question.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Lettered {
     None,
@@ -172,7 +172,7 @@ fn after_letter(text: &str, index: usize) -> Option<String> {
     (!rest.is_empty()).then(|| rest.to_owned())
 }
 
-/// What may stand behind the letter of an option, also in full-width signs, as Chinese and Japanese sets have them.
+/// Marks behind the letter of an option, also full-width ones, as Chinese and Japanese sets have them.
 const CLOSES: [char; 8] = ['.', ')', ':', '．', '。', '）', '：', '、'];
 
 /// The full-width form of a sign of ASCII.

@@ -205,7 +205,7 @@ pub(super) struct ReadySet {
     pub(super) series: Series,
     pub(super) scenes: SceneNames,
     pub(super) questions: Vec<Question>,
-    /// What was taken for what, one fact a line.
+    /// The inferred column mapping, one line per column.
     pub(super) reading: Vec<String>,
     pub(super) form: Form,
     pub(super) rows: RowCounts,
@@ -224,7 +224,7 @@ pub(super) struct RowCounts {
 pub(super) enum Form {
     /// This program's, in which nothing has to be found out.
     Own,
-    /// That of other tools.
+    /// Another tool's file.
     Foreign,
 }
 
@@ -233,13 +233,13 @@ pub(super) struct ReadQuestions {
     pub(super) questions: Vec<Question>,
     /// The scenes that the file gives to the frames.
     pub(super) scenes: SceneNames,
-    /// What was taken for what, one fact a line.
+    /// The inferred column mapping, one line per column.
     pub(super) reading: Vec<String>,
     pub(super) form: Form,
     pub(super) rows: RowCounts,
 }
 
-/// That the column `frame` names the image, if there is one.
+/// Maps the column `frame` to the image, if it exists.
 fn frame_map(table: &Table) -> Option<Map> {
     let frame = table.find("frame");
     frame.and_then(|_| "image=frame".parse().ok())

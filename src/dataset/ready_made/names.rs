@@ -9,7 +9,7 @@ use serde::Deserialize;
 /// The file of names and instructions.
 const COLUMNS: &str = include_str!("columns.toml");
 
-/// What a column is for.
+/// The role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Role {

@@ -12,7 +12,7 @@ use crate::types::question::letter;
 use crate::types::shell_word;
 use crate::types::shown_text::excerpt;
 
-/// What the columns of a row offer as options.
+/// The options in the columns of a row.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Options {
     /// No column has any.

@@ -1,4 +1,4 @@
-//! What well-known sets need beyond the rules for all: [`Preset`].
+//! Presets for well-known sets that need more than the general rules: [`Preset`].
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;

@@ -32,11 +32,11 @@ pub(super) struct Table {
     pub(super) rows: Vec<Row>,
     /// The length of all rows, in bytes.
     bytes: usize,
-    /// What was done with the rows, in words.
+    /// Changes to the rows, in words.
     pub(super) notes: Vec<String>,
 }
 
-/// What is known of a file of rows besides its rows.
+/// Facts about a file of rows besides its rows.
 #[derive(Debug, Clone)]
 pub(super) struct FileLabel {
     /// The path of the file, for messages; of a file in an archive, behind that of the archive.
@@ -78,7 +78,7 @@ pub(super) enum RowPlace {
     },
 }
 
-/// What a JSON file holds a row in.
+/// The unit of a JSON file that holds one row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum JsonUnit {
     Line,

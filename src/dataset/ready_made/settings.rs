@@ -30,7 +30,7 @@ pub struct SetArgs {
     /// Where the rows are in a JSON file, as items or images.*.qa; default: the whole file
     #[arg(long, value_name = "FIELD", add = Decides::Reply)]
     pub rows: Option<String>,
-    /// What is done about rows that show several images: leave them out, or send all images of a row in one request; default: stop
+    /// Treatment of rows that show several images: leave them out, or send all images of a row in one request; default: stop
     #[arg(long, value_name = "skip|send", add = Decides::Trials)]
     pub multi_image: Option<SeveralImages>,
     /// Leave out rows without an image; default: stop
@@ -53,7 +53,7 @@ pub struct SetArgs {
     pub keep_instructions: bool,
 }
 
-/// What is done about rows that show several images.
+/// The treatment of rows with several images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum SeveralImages {
     /// Leave them out, and state how many
@@ -62,7 +62,7 @@ pub enum SeveralImages {
     Send,
 }
 
-/// What is done about rows that cannot be asked.
+/// The treatment of rows that cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum LeaveOut {
     /// Leave them out, and state how many

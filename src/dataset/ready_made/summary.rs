@@ -1,4 +1,4 @@
-//! What was taken for what when a set was read: [`Summary`].
+//! The inferred mapping of a set, for the user: [`Summary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,7 +21,7 @@ pub(super) struct Summary<'a> {
     pub(super) ids: String,
     pub(super) cut: &'a Cut,
     pub(super) left: &'a LeftOut,
-    /// What the groups of questions are like; `None` without groups.
+    /// A description of the groups of questions; `None` without groups.
     pub(super) groups: Option<String>,
     /// The images of the set; none if the questions are about frames of other data.
     pub(super) sources: &'a BTreeMap<FrameId, ImageSource>,

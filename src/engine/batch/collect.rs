@@ -97,7 +97,7 @@ impl<D: Detail> Driver<'_, D> {
         self.cancel(part, id).await
     }
 
-    /// What follows from a batch that the server could not begin.
+    /// Handles a batch that the server could not begin.
     fn failed(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
         if let Some(quota) = &batch.quota {
             return self.quota_reached(part, quota);

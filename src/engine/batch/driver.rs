@@ -1,4 +1,4 @@
-//! What moves the parts of a run on, step by step, until nothing is left: [`Driver`].
+//! Moves the parts of a run on, step by step, until nothing is left: [`Driver`].
 //!
 //! A step calls the server at most once, and the journal holds what is about to happen before each call that changes something. So
 //! the driver may be stopped anywhere.
@@ -40,7 +40,7 @@ const SHORT_POLL: Duration = Duration::from_millis(200);
 /// How many refused looks in a row end the command; chosen.
 const MOST_REFUSED: u32 = 10;
 
-/// What a step came to.
+/// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Step {
     /// The part has gone on, and may go on at once.
@@ -65,7 +65,7 @@ pub(super) enum Until {
 /// Why the driver stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Driven {
-    /// What was to be reached is reached.
+    /// The goal is reached.
     Reached,
     /// The next part would have gone beyond `--max-cost`.
     OverBudget,
@@ -91,7 +91,7 @@ pub(super) struct Driver<'a, D> {
     pub(super) notes: Notes,
 }
 
-/// What a driver knows only while it runs.
+/// State that a driver keeps only while it runs.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
     /// Files at servers that batches may be made of.

@@ -1,8 +1,8 @@
-//! What happens to a part, as the state file has it: [`Event`].
+//! An event of a part, as in the state file: [`Event`].
 
 use serde::{Deserialize, Serialize};
 
-/// What is known of a part from its file.
+/// Facts about a part from its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PartFacts {
     /// SHA-256 of the file, as 64 hexadecimal digits.
@@ -38,7 +38,7 @@ pub(crate) struct PartFacts {
 }
 
 impl PartFacts {
-    /// What a limit of waiting tokens holds for: address and model.
+    /// The scope of a limit of waiting tokens: address and model.
     pub(super) fn place(&self) -> (String, String) {
         (self.base.clone(), self.model.clone())
     }

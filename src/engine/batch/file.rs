@@ -27,7 +27,7 @@ pub(crate) struct FileLimits {
     pub(crate) tokens: f64,
 }
 
-/// What a request is expected to take.
+/// The expected tokens and dollars of a request.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct RequestCost {
     /// Tokens of the prompt.
@@ -50,7 +50,7 @@ pub(crate) struct Destination {
     pub(crate) url: String,
 }
 
-/// What records the requests of a complete file: the run, and the journal if the program submits the file.
+/// The places where the requests of a complete file are recorded: the run, and the journal if the program submits the file.
 pub(crate) struct Register<'a, D> {
     pub(crate) store: &'a mut Store<D>,
     /// `None` for files that the user submits.

@@ -22,7 +22,7 @@ use crate::store::Store;
 use crate::types::manifest::RunManifest;
 use darkqa_score::record::Detail;
 
-/// What is done with the batches of a folder.
+/// The task for the batches of a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FolderTask {
     /// Take over the replies of those that have ended.

@@ -26,7 +26,7 @@ pub(super) struct ReplyCounts {
     unknown: usize,
 }
 
-/// What a line led to.
+/// The result of importing a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Imported {
     /// Nothing: the trial is not one of this run, or does not wait for a batch.

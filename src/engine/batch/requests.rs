@@ -21,7 +21,7 @@ pub(super) const SHARE_OF_QUOTA: f64 = 0.45;
 /// The most tokens of a part if the limit is not known; chosen.
 const PART_TOKENS: f64 = 2e6;
 
-/// What a request of a trial about a stimulus is expected to take.
+/// The expected cost of a trial's request about a stimulus.
 pub(super) type CostOf<'a, I> = &'a (dyn Fn(&Trial<I>, &Stimulus) -> RequestCost + Sync);
 
 /// The input files of all models, while they are written.

@@ -338,7 +338,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         }
     }
 
-    /// What is out, for a command that does not wait.
+    /// The outcome of a command that does not wait: batches still at work.
     fn detached(self) -> Outcome {
         let folder = self.run.store.folder().display().to_string();
         let parts = summary::lines(&self.journal, &BTreeMap::new());

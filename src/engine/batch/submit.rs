@@ -189,7 +189,7 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Moved)
     }
 
-    /// What follows from an upload or a creation that did not succeed.
+    /// Handles an upload or a creation that did not succeed.
     fn not_made(&mut self, part: usize, failure: &AskError) -> Result<Step> {
         if let Some(quota) = &failure.quota {
             return self.quota_reached(part, quota);

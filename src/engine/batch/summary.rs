@@ -1,4 +1,4 @@
-//! What is known of the parts of a run, as text: [`lines`].
+//! The state of a run's parts as text: [`lines`].
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

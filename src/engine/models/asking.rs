@@ -12,7 +12,7 @@ pub(crate) struct AskingArgs {
     /// Parameters of the model.
     #[command(flatten)]
     pub(crate) parameters: Parameters,
-    /// What is added to requests or left out.
+    /// Fields added to requests or left out.
     #[command(flatten)]
     pub(crate) request: RequestArgs,
     /// Endpoint and its key.

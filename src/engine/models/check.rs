@@ -11,10 +11,10 @@ use crate::images::workers::unstarted;
 use crate::picture::{Payload, PayloadFormat};
 use crate::types::{Condition, QuestionId, Rgb, View};
 
-/// What a model without images is asked.
+/// A question for a model without images.
 const WORDS: &str = "Is snow cold?\nA. yes\nB. no\nAnswer with the letter of one choice.";
 
-/// What a model with images is asked about an image of one colour, [`RED`].
+/// A question for a model with images, about an image of one colour, [`RED`].
 const ABOUT_IMAGE: &str =
     "Which colour has the image?\nA. blue\nB. red\nAnswer with the letter of one choice.";
 

@@ -1,4 +1,4 @@
-//! What models come to, for people: [`describe`].
+//! A description of models for people: [`describe`].
 
 use std::fmt::Write as _;
 

@@ -59,7 +59,7 @@ pub(super) struct Entry {
     /// The name in tables.
     pub(super) name: String,
     pub(super) id: ModelName,
-    /// What the model is shown; both for one with and one without images.
+    /// The views of the model; both if it is asked with and without images.
     pub(super) views: Vec<View>,
     pub(super) deployment: Option<String>,
     /// The heading under which tables show it; `None` without one.

@@ -1,4 +1,4 @@
-//! What a call changes in a list of models: `--set` ([`set`]) and `--only` ([`select`]).
+//! Changes to a list of models by a call: `--set` ([`set`]) and `--only` ([`select`]).
 
 use super::entry::{Entry, check_keys};
 use super::file::{Keys, Located};

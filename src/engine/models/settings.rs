@@ -44,11 +44,11 @@ pub(crate) struct ModelSettings {
 pub(crate) struct AskSettings {
     /// The models: those of the file in its order, then those that flags name.
     pub(crate) models: Vec<ModelSettings>,
-    /// What the file of models comes to; `None` without one.
+    /// The note about the file of models; `None` without one.
     pub(crate) file: Option<FileNote>,
 }
 
-/// What a file of models comes to, for the manifest.
+/// The manifest's note about a file of models.
 #[derive(Debug)]
 pub(crate) struct FileNote {
     /// The models that are asked, as resolved, without secrets.
@@ -57,7 +57,7 @@ pub(crate) struct FileNote {
     pub(crate) listed: Vec<ListedModel>,
 }
 
-/// What the resolution of models needs besides their flags.
+/// Inputs of resolving models besides their flags.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ResolveContext<'a> {
     /// The flags of the call itself, by long name: those of variables and files are not among them.
@@ -76,7 +76,7 @@ pub(crate) struct ResolveContext<'a> {
 /// Which of the models that see images are asked without any, too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum TextBaseline {
-    /// Those of which flags or the file of models say it.
+    /// Models marked by a flag or in the file of models.
     #[default]
     AsSaid,
     /// All of them.
@@ -93,7 +93,7 @@ pub(crate) enum KeyUse {
 }
 
 impl AskSettings {
-    /// What each model is shown, by name.
+    /// The view of each model, by name.
     pub(crate) fn views(&self) -> Views {
         let mut views = Views::new();
         for model in &self.models {
@@ -367,7 +367,7 @@ fn plain_header(headers: &[String], name: &str) -> Option<String> {
     found.map(|(_, value)| value.trim().to_owned())
 }
 
-/// What a model comes to, for the manifest: without keys, passwords and values of secret headers.
+/// The manifest's note about a model, without keys, passwords and values of secret headers.
 fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
     let access = &entry.asking.access;
     let views: Vec<String> = entry.views.iter().map(ToString::to_string).collect();

@@ -1,4 +1,4 @@
-//! What a file of models that may have come with data may not do by itself: [`check`].
+//! Refuses settings that a file of models may not have if it came with data: [`check`].
 //!
 //! Such a file is a stranger's: it could name a variable or a file of this machine, and an address of its own to send it to.
 
@@ -86,7 +86,7 @@ struct Suspect<'a> {
     file: &'a ModelsFile,
     /// Its own table.
     keys: &'a Keys,
-    /// What it comes to.
+    /// The resolved entry.
     entry: &'a Entry,
     flags: &'a AskingArgs,
 }

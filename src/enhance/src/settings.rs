@@ -92,7 +92,7 @@ impl SizeArgs {
     }
 }
 
-/// What happens to an enhancer whose images cannot be enhanced images.
+/// The treatment of an enhancer whose output cannot be an enhanced image.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct ProbeArgs {

@@ -55,7 +55,7 @@ pub(crate) struct Finish<'a> {
     steps: ImageSteps<'a>,
     /// How the file of the frame was read.
     note: InputNote,
-    /// What the camera did; `None` for a kind that leaves it open.
+    /// The camera's exposure; `None` for a kind that leaves it open.
     exposure: Option<ExposureFacts>,
     /// How dark the photograph of the frame is; `None` without a darkness of pairs.
     pair: Option<PairFacts>,

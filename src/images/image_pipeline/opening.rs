@@ -17,11 +17,11 @@ use crate::images::timings::TimedStep;
 use crate::types::EnhancerName;
 use darkqa_enhance::{Enhancer, FRAMES, Findings, Stopper, Usage};
 
-/// What ends the runs of an enhancer from another thread.
+/// Ends the runs of an enhancer from another thread.
 pub(crate) enum EnhancerStopper {
-    /// That of one that is open.
+    /// Of an open session.
     Open(Stopper),
-    /// That of one that may be opened meanwhile.
+    /// Of a session that may be opened in the meantime.
     Resting(Arc<RestingEnhancer>),
 }
 
@@ -35,13 +35,13 @@ impl EnhancerStopper {
     }
 }
 
-/// What the store knows of an enhancer and of its images.
+/// The stored state of an enhancer and of its images.
 enum Known<'a> {
     /// Nothing: it is opened and tried, and what is found is kept at this place, if there is a store.
     Nothing(Option<FindingsPlace<'a>>),
-    /// What the probe finds.
+    /// The findings of the probe.
     Findings(Findings),
-    /// What the probe finds, and all images of the plan.
+    /// The findings of the probe, and all images of the plan.
     All(Findings),
 }
 
@@ -117,7 +117,7 @@ impl<'a> ImagePipeline<'a> {
         Ok(())
     }
 
-    /// What the store knows of a model.
+    /// The stored state of a model.
     fn known<I>(
         &self,
         model: &Model,

@@ -1,4 +1,4 @@
-//! What is done before the first question: images are made to find errors, enhancers are tried, and opened for each worker.
+//! Preparation before the first question: images are made to find errors, enhancers are tried, and opened for each worker.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;

@@ -93,7 +93,7 @@ pub struct SensorArgs {
         value_delimiter = ',',
         default_value = "paper", add = Decides::Trials)]
     pub profile: Vec<Profile>,
-    /// What the light ratio r amplifies; default: as --profile says, shot-only in paper
+    /// Noise that the light ratio r amplifies; default: as --profile says, shot-only in paper
     ///
     /// It is the choice that matters most. At grey 128, L1, K 0.77 and r 200, read, row and quantisation noise add 0.03, 0
     /// and 0 codes of deviation with shot-only, and 9–19, 1–3 and 1–2 codes with all. shot-only is the default because it is
@@ -107,7 +107,7 @@ pub struct SensorArgs {
     /// in paper
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub draws: Option<Draws>,
-    /// What the light ratio r depends on; default: as --profile says, independent in paper
+    /// Quantity that the light ratio r depends on; default: as --profile says, independent in paper
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub coupling: Option<Coupling>,
     /// The sensor: sony-a7s2, nikon-d850, canon-eos-5d4, canon-eos-70d, canon-eos-700d, or a TOML file of a calibration

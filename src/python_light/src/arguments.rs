@@ -19,7 +19,7 @@ use crate::errors::{value_error, wrong_type};
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Level(pub(crate) Option<Severity>);
 
-/// What is the same for all images of a call.
+/// Settings shared by all images of a call.
 pub(crate) struct Settings {
     pub(crate) kind: Kind,
     pub(crate) synthesis: Synthesis,

@@ -22,7 +22,7 @@ use darkqa_score::record::Detail;
 pub(crate) enum ThumbnailChoice {
     /// No image
     None,
-    /// Those that the page has room for
+    /// Those shown on the page
     Shown,
     /// All that the run has
     All,

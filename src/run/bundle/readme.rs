@@ -12,7 +12,7 @@ use crate::types::shown_text::shown;
 use crate::types::{AxisLevel, Trials, shell_word};
 use darkqa_score::record::Detail;
 
-/// What a README is written from.
+/// Inputs of a README.
 pub(super) struct ReadmeInputs<'a> {
     /// Name of the run, and of the folder in the archive.
     pub(super) name: &'a str,
@@ -20,7 +20,7 @@ pub(super) struct ReadmeInputs<'a> {
     pub(super) command: &'a str,
     /// The findings and the table by level, as Markdown.
     pub(super) findings: &'a str,
-    /// What was left out or changed, a line each.
+    /// Parts that were left out or changed, a line each.
     pub(super) changes: &'a [String],
     /// Names and sizes of the files.
     pub(super) files: &'a [(String, usize)],
@@ -60,7 +60,7 @@ fn fenced(lines: &str) -> String {
     format!("{fence}sh\n{lines}\n{fence}\n")
 }
 
-/// What a run asked, as its trials tell.
+/// The questions, models and conditions of a run, from its trials.
 #[derive(Default)]
 struct Asked {
     levels: BTreeSet<AxisLevel>,

@@ -1,4 +1,4 @@
-//! What of a run says where it was made, or is secret: [`Redactor`] takes it out.
+//! Removes secrets, and places that identify the machine, from a run: [`Redactor`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 /// Least length of a key in a variable, in bytes (chosen): shorter values are words.
 const LEAST_KEY: usize = 8;
 
-/// What stands in place of a key.
+/// The replacement of a key.
 const SECRET: &str = "[secret]";
 
 /// Begins an image within a text: its letters say nothing.
@@ -21,7 +21,7 @@ const IMAGE: &str = "data:image/";
 /// Endings of the names of variables that hold keys.
 const KEY_NAMES: [&str; 4] = ["_KEY", "_TOKEN", "_SECRET", "_PASSWORD"];
 
-/// What was taken out or written in another way.
+/// A part that was removed or replaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Change {
     /// A path on this machine, of which the last name stays.
@@ -79,7 +79,7 @@ static PATH: LazyLock<Regex> = LazyLock::new(|| {
 /// A user and password before a host.
 static USER: LazyLock<Regex> =
     LazyLock::new(|| pattern(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'@?#]+@"#));
-/// What follows an address behind `?` or `#`.
+/// The query or fragment of an address.
 static QUERY: LazyLock<Regex> = LazyLock::new(|| pattern(r#"(https?://[^\s"'?#]+)[?#][^\s"']*"#));
 /// Forms of keys of known vendors.
 static KEY: LazyLock<Regex> = LazyLock::new(|| {

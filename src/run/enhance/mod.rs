@@ -269,7 +269,7 @@ impl ImageOrigin for EnhancedOrigin {
     const IS_REPLACED: bool = false;
 }
 
-/// What decides the pixels besides the image, with a name for the digest that a reader of the message understands.
+/// Settings that determine the pixels besides the image, with a name for the digest that a reader of the message understands.
 fn pixel_settings(digest: &Digest, size: &SizeArgs) -> Value {
     let mut settings = identity::enhancer(digest, size);
     if let Some(fields) = settings.as_object_mut()

@@ -1,4 +1,4 @@
-//! What a planned evaluation can detect: [`power`].
+//! The effect that a planned evaluation can detect: [`power`].
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::types::{Condition, KindReading, Question};
 use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::tested_sentences::AskedSets;
 
-/// What questions about these data can detect; `None` without questions, or if nobody knows their answers.
+/// The effect that questions about these data can detect; `None` without questions, or if nobody knows their answers.
 pub(super) fn power(
     dataset: &Dataset,
     questions: &[Question],
@@ -42,7 +42,7 @@ pub(super) fn power(
     PowerForecast::new(&clusters, &of_questions.collect::<Vec<u32>>(), asked)
 }
 
-/// What is asked in these conditions.
+/// The sets of trials in these conditions.
 pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> AskedSets {
     let variants: BTreeSet<KindReading> = conditions.iter().map(Condition::kind_reading).collect();
     let last = variants.iter().filter_map(|variant| variant.kind).max();

@@ -55,7 +55,7 @@ pub(crate) struct EvaluateArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct ChoiceArgs {
-    /// What the server lets the model write; constrained replies give other numbers than free ones
+    /// Replies that the server lets the model write; constrained replies give other numbers than free ones
     #[arg(long, value_enum, default_value_t, add = Decides::Reply)]
     pub constrain: Constrain,
     /// Ask how likely each choice is, by the probabilities of tokens (logprobs): the report then has the model's confidence against

@@ -23,7 +23,7 @@ struct CheckedLine {
     /// Name of the person; empty in files without names.
     #[serde(default)]
     person: String,
-    /// What the person found before the answer was shown; `None` in files of verdicts alone.
+    /// The person's answer before the true one was shown; `None` in files of verdicts alone.
     #[serde(default)]
     found: Option<Found>,
     #[serde(default)]
@@ -41,7 +41,7 @@ enum Found {
 }
 
 impl CheckedLine {
-    /// What the person found about the question, if the line says it.
+    /// The person's finding about the question, if the line states one.
     fn check(&self) -> Option<Check> {
         let frame = &self.frame.as_ref()?.0;
         let scene = frame.rsplit_once('/').map_or(&**frame, |(scene, _)| scene);
@@ -58,12 +58,12 @@ impl CheckedLine {
     }
 }
 
-/// What people decided about questions.
+/// People's decisions about questions.
 #[derive(Default)]
 pub(super) struct Verdicts {
     /// The questions that some person rejected.
     pub(super) rejected: BTreeSet<QuestionId>,
-    /// What each person found about each question.
+    /// The findings of each person about each question.
     pub(super) checks: Checks,
 }
 

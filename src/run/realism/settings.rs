@@ -43,7 +43,7 @@ pub(crate) struct RealismArgs {
     /// The bins of the residuals' divergence
     #[arg(long, value_enum, default_value_t, add = Decides::Nothing)]
     pub kl_bins: Bins,
-    /// What is done about empty bins of fu; both are shown
+    /// Treatment of empty bins of fu; both are shown
     #[arg(long, value_enum, default_value_t, add = Decides::Nothing)]
     pub kl_empty: EmptyBins,
     /// The sensor and its noise.

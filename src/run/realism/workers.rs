@@ -12,7 +12,7 @@ pub(super) struct PairWorkers<'a> {
 }
 
 impl PairWorkers<'_> {
-    /// What `work` makes of each item and its index, in the order of the items. `what` names them in the progress.
+    /// Applies `work` to each item and its index, and returns the results in the order of the items. `what` names them in the progress.
     pub(super) fn map<I: Sync, T: Send>(
         &self,
         what: &'static str,

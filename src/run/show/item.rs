@@ -13,7 +13,7 @@ use crate::types::{Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
 pub(super) struct ShownAnswer {
     pub(super) model: String,
     pub(super) condition: Option<Condition>,
-    /// What became of the trial, in the words of the report.
+    /// The outcome of the trial, in the words of the report.
     pub(super) outcome: String,
     pub(super) reply: String,
     /// The frame or walk that was shown.

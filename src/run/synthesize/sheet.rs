@@ -94,7 +94,7 @@ impl Sheet {
     }
 }
 
-/// What made the images, in words: camera and seed, gain and light ratio in each light reading, and the flags of further variants.
+/// Describes how the images were made: camera and seed, gain and light ratio in each light reading, and the flags of further variants.
 fn foot(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) -> String {
     let has = |test: fn(Kind) -> bool| degradations.iter().any(|how| test(how.kind()));
     let mut facts = Vec::new();

@@ -88,7 +88,7 @@ fn many_models_alert(findings: &Findings<'_>) -> Option<Alert> {
     (!compares_models(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
 }
 
-/// That the photographs were taken in the dark.
+/// Alerts that the photographs were taken in the dark.
 fn set_alert(set: PhotographedSet) -> Option<Alert> {
     let notice = set.notice();
     notice.map(|text| Alert::new(AlertKind::Pairs, text))
@@ -176,7 +176,7 @@ fn cost_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     over.collect()
 }
 
-/// What became of the runs when they were joined: models that stand apart, and runs that add nothing to the others.
+/// Alerts about joining the runs: models that stand apart, and runs that add nothing to the others.
 pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let repeated = joined
         .runs
@@ -209,7 +209,7 @@ pub(super) fn named_again(folders: &[(String, usize)]) -> Vec<Alert> {
     alerts.collect()
 }
 
-/// What was done to the images of the runs when they were read.
+/// Alerts about changes to the images of the runs when they were read.
 fn input_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut lines = BTreeMap::<String, Vec<&str>>::new();
     for run in runs {

@@ -52,7 +52,7 @@ pub(super) fn left_out_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     alerts.collect()
 }
 
-/// That models stand apart, with the names of the first.
+/// The sentence about models that stand apart, with the names of the first.
 fn stand_apart(models: &[&ModelApart]) -> String {
     let names: Vec<&String> = models.iter().map(|apart| &apart.model).collect();
     let (all, apart) = (listed(&names), listed(&models[0].names));

@@ -1,4 +1,4 @@
-//! What the levels of runs do to the signal-to-noise ratio of images with sensor noise, and to their codes: [`noise_alerts`],
+//! The effect of the runs' levels on the signal-to-noise ratio of images with sensor noise, and on their codes: [`noise_alerts`],
 //! [`rounding_alert`].
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};

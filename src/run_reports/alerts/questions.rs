@@ -12,7 +12,7 @@ use darkqa_score::findings::Findings;
 use darkqa_score::record::Detail;
 use darkqa_score::subject::is_control;
 
-/// What differs between the questions of the runs, and between the files that they are about.
+/// Differences between the questions of the runs, and between the files that they are about.
 pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut asked = Vec::<BTreeMap<&QuestionId, Option<&RunQuestion>>>::new();
     for run in &joined.runs {

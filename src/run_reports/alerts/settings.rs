@@ -14,7 +14,7 @@ use darkqa_score::record::Detail;
 /// The flags that decide the orders in which choices are shown.
 const ORDERS: [&str; 2] = ["--shuffle-options", "--circular"];
 
-/// What differs between the settings in the manifests.
+/// Differences between the settings in the manifests.
 pub(super) fn setting_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let names = names(&joined.runs);
     let manifests: Vec<&RunManifest> = joined.runs.iter().map(|run| &run.manifest).collect();

@@ -8,7 +8,7 @@ pub(super) fn names(runs: &[JoinedRun]) -> Vec<String> {
     runs.iter().map(|run| run.name.clone()).collect()
 }
 
-/// What differs, with the settings behind it: `The light differs: --seed is 0 in a and 1 in b.`
+/// The sentence about a difference, with the settings behind it: `The light differs: --seed is 0 in a and 1 in b.`
 pub(super) fn sentence(what: &str, settings: &[Setting], names: &[String]) -> String {
     let settings: Vec<String> = settings
         .iter()

@@ -25,15 +25,15 @@ const QUESTIONS: &str = "questions";
 const LEVELS: &str = "levels";
 const VARIANT: &str = "variant";
 
-/// What the runs of one table share: questions, light and prompts.
+/// Settings that the runs of one table share: questions, light and prompts.
 pub(super) struct GroupKey {
-    /// What it is in words.
+    /// Its description in words.
     pub(super) title: String,
     /// The digests of its questions, light and prompts.
     pub(super) digests: GroupDigests,
     /// Settings in words, by name.
     pub(super) shared: Vec<(String, String)>,
-    /// What has to be equal.
+    /// Settings that must be equal.
     settings: Settings,
     /// The images that were sent, by question and condition.
     images: HashMap<(String, String), BTreeSet<Digest>>,
@@ -163,7 +163,7 @@ impl GroupKey {
         self.settings == other.settings && self.disagreeing(other).is_none()
     }
 
-    /// What the two show or take as true in different ways, in words; `None` if nothing.
+    /// Images or true answers in which the two differ, in words; `None` without a difference.
     fn disagreeing(&self, other: &Self) -> Option<String> {
         let shared = self.images.iter();
         let shared = shared.filter_map(|(place, own)| Some((own, other.images.get(place)?)));
@@ -189,7 +189,7 @@ impl GroupKey {
         }
     }
 
-    /// What differs from the group with this number.
+    /// Differences from the group with this number.
     pub(super) fn difference(&self, first: &Self, number: usize) -> GroupDifference {
         let names = [format!("table {number}"), "this one".to_owned()];
         let settings = [Some(first.settings.clone()), Some(self.settings.clone())];
@@ -217,7 +217,7 @@ pub(super) fn grouped<M>(members: Vec<M>, key: impl Fn(&M) -> &GroupKey) -> Vec<
     groups
 }
 
-/// What has to be equal: questions, light, prompts and levels.
+/// Settings that must be equal: questions, light, prompts and levels.
 fn settings(
     manifest: &RunManifest,
     questions: &[RunQuestion],
@@ -238,7 +238,7 @@ fn settings(
     Ok(settings)
 }
 
-/// What decides raw images.
+/// Settings that determine raw images.
 fn light(manifest: &RunManifest) -> Settings {
     let parts = [
         pixels(manifest),

@@ -86,7 +86,7 @@ fn question() -> Vec<Column<ChoiceRow>> {
     ]
 }
 
-/// What both readings found in the reply.
+/// Columns of both readings of the reply.
 fn readings() -> Vec<Column<ChoiceRow>> {
     vec![
         column("strict", Int8, MayBeNull, |row: &ChoiceRow| {

@@ -36,7 +36,7 @@ fn double<'r>(number: Option<f64>) -> Cell<'r> {
     number.map_or(Cell::Null, Cell::Double)
 }
 
-/// What was asked: question, model and condition.
+/// Columns of question, model and condition.
 pub(super) fn head<D: Tabled>() -> Vec<Column<Row<D>>> {
     vec![
         column("key", Key, Always, |row: &Row<D>| {
@@ -75,7 +75,7 @@ pub(super) fn head<D: Tabled>() -> Vec<Column<Row<D>>> {
     ]
 }
 
-/// What came back.
+/// Columns of the reply.
 pub(super) fn reply<D: Tabled>() -> Vec<Column<Row<D>>> {
     vec![
         column("reply", LongText, MayBeNull, |row: &Row<D>| {
@@ -145,7 +145,7 @@ pub(super) fn image<D: Tabled>() -> Vec<Column<Row<D>>> {
     ]
 }
 
-/// What few runs have.
+/// Columns that few runs fill.
 pub(super) fn last<D: Tabled>() -> Vec<Column<Row<D>>> {
     vec![
         column("reading", Text, MayBeNull, |row: &Row<D>| {

@@ -18,10 +18,10 @@ pub(super) trait Tabled: Detail + Sync + 'static {
     /// The name of the table with its version. New columns stand at the end of the same version.
     const TABLE: &'static str;
 
-    /// What is read of the whole run before its rows are written.
+    /// Data of the whole run, read before its rows are written.
     type Context: Send + Sync;
 
-    /// What a row has besides its record.
+    /// Data of a row besides its record.
     type Further: Send + Sync;
 
     /// The columns, in order.
@@ -37,7 +37,7 @@ pub(super) trait Tabled: Detail + Sync + 'static {
         questions: &[RunQuestion],
     ) -> Result<Self::Context>;
 
-    /// What the row of a record has besides it; `None` if the record has no row.
+    /// The data of a record's row besides it; `None` if the record has no row.
     fn further(context: &Self::Context, record: &Record<Self>) -> Option<Self::Further>;
 
     /// The name of the frame or the walk that the question is about.
@@ -94,7 +94,7 @@ impl LightTexts {
     }
 }
 
-/// What a row has of its question.
+/// The columns that a row takes from its question.
 pub(super) struct QuestionTexts {
     /// `None` if the data name no scenes.
     pub(super) scene: Option<String>,
@@ -102,7 +102,7 @@ pub(super) struct QuestionTexts {
     pub(super) answer: Option<String>,
 }
 
-/// What makes rows of the records of a run.
+/// Makes the rows of a run's records.
 pub(super) struct Rows<D: Tabled> {
     names: RecordedNames,
     lights: HashMap<Option<Condition>, Arc<LightTexts>>,

@@ -22,7 +22,7 @@ pub(super) struct Coverage {
 }
 
 impl Coverage {
-    /// What these parts have, each with its folder.
+    /// The coverage of these parts, each with its folder.
     ///
     /// # Errors
     /// If a part does not say what it has, or is of a run with another number of sources.
@@ -98,7 +98,7 @@ impl Coverage {
         absent.min_by_key(Vec::len).unwrap_or_default()
     }
 
-    /// What is missing, in words; `None` if nothing is. `absent` are the shards that have it, as far as they are known.
+    /// The missing trials, in words; `None` if none are. `absent` are the shards that have them, as far as they are known.
     pub(super) fn missing(&self, absent: &[Shard]) -> Option<String> {
         if self.trials.iter().all(Option::is_some) {
             return None;

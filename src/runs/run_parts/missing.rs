@@ -1,4 +1,4 @@
-//! What the parts of a run lack, by its plan where there is one: [`check`], [`warn_unfinished`].
+//! Checks which trials the parts of a run lack, by its plan where there is one: [`check`], [`warn_unfinished`].
 
 use super::coverage::Coverage;
 use super::part::StoredPart;

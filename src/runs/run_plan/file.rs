@@ -28,7 +28,7 @@ pub(super) struct PlanFile {
     /// The digest of each other file.
     pub(super) files: BTreeMap<String, Digest>,
     pub(super) counts: PlanCounts,
-    /// What the whole run takes with the models and enhancers of the call that wrote the plan.
+    /// The estimate for the whole run with the models and enhancers of the call that wrote the plan.
     pub(super) estimate: PlanEstimate,
     /// The models of that call.
     pub(super) models: Vec<String>,

@@ -21,7 +21,7 @@ pub struct Rooms {
     /// Width and height in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480", add = Decides::Pixels)]
     pub size: [usize; 2],
-    /// What the pixels are; with linear light, OpenEXR files are written beside the PNG files
+    /// Encoding of the pixels; with linear light, OpenEXR files are written beside the PNG files
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub light: RoomLight,
 }

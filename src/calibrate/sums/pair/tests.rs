@@ -77,7 +77,7 @@ fn noise_is_that_of_the_definition() {
     }
 }
 
-/// What stands still in both frames changes nothing, and offsets of whole rows are row noise alone.
+/// A fixed pattern changes nothing, and offsets of whole rows are row noise alone.
 #[test]
 fn fixed_pattern_cancels_and_rows_are_row_noise() {
     let hot = HotPixels::none(BAYER.plane_rows());

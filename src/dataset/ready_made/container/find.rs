@@ -21,12 +21,12 @@ pub(in crate::dataset::ready_made) struct FoundFiles {
     pub(in crate::dataset::ready_made) further: Vec<PathBuf>,
     /// The ZIP file that holds the set.
     pub(in crate::dataset::ready_made) archive: Option<Arc<Archive>>,
-    /// What was passed over, in words.
+    /// Files that were left out, in words.
     pub(in crate::dataset::ready_made) notes: Vec<String>,
     pub(in crate::dataset::ready_made) joined: Joined,
 }
 
-/// What several files are to each other.
+/// The relation of several files to each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) enum Joined {
     /// Parts of one table, with the same columns.

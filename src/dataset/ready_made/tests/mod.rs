@@ -33,7 +33,7 @@ fn map(text: &str) -> SetArgs {
     }
 }
 
-/// What a set refuses to be read for.
+/// The message with which a set is refused.
 fn refusal(path: &Path, args: &SetArgs) -> String {
     open(path, args)
         .err()

@@ -1,4 +1,4 @@
-//! What has two meanings is refused, with a command that names one; the command works as it is printed.
+//! Ambiguous data are refused, with a command that resolves them; the command works as it is printed.
 
 use serde_json::{Value, json};
 

@@ -35,11 +35,11 @@ pub struct ModelListing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "program", derive(clap::ValueEnum))]
 pub enum ModelColumn {
-    /// What the endpoint calls it
+    /// Its name at the endpoint
     Id,
-    /// What tells two offers of one id apart
+    /// The deployment, which tells two offers of one id apart
     Deployment,
-    /// What the server's replies call it
+    /// Its name in the server's replies
     Served,
 }
 

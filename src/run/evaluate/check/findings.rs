@@ -1,4 +1,4 @@
-//! What a check finds, one line a finding: [`Findings`].
+//! The findings of a check, one per line: [`Findings`].
 
 use std::collections::BTreeMap;
 

@@ -26,18 +26,18 @@ pub(super) enum Depth {
 /// The number of images whose brightness is measured.
 const SAMPLED: usize = 32;
 
-/// What is known of one image.
+/// Facts about one image.
 struct Looked<'a> {
     id: &'a FrameId,
     facts: Result<Facts>,
     bytes: u64,
 }
 
-/// What an image is like.
+/// The properties of an image.
 struct Facts {
     size: (u32, u32),
     digest: Digest,
-    /// What was done when it was read, if anything.
+    /// Changes made when it was read, if any.
     note: Option<Box<InputNote>>,
 }
 

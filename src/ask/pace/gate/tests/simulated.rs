@@ -118,7 +118,7 @@ impl MockServer {
     }
 }
 
-/// What came of asking a server.
+/// The outcome of asking a server.
 pub(super) struct Asked {
     pub(super) seconds: f64,
     pub(super) refused: usize,
