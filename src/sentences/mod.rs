@@ -3,7 +3,7 @@
 //! Each sentence comes from typed results and from fixed wording. The terminal, the page, `summary.json` and `tables.tex` show the
 //! same strings. Rules:
 //!
-//! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “falls below”, only if p is below 0.05 after the correction over
+//! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “less often right”, only if p is below 0.05 after the correction over
 //!   all tests that sentences rest on, in the strict and in the lenient parsing, with the same direction.
 //! - If only the strict parsing detects a difference, the sentence is about the answer format.
 //! - If nothing is detected, the sentence says so, with the interval. It never says that there is no difference.
@@ -81,7 +81,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences
 }
 
-/// Sentences about noise, enhancers and words alone.
+/// Sentences about noise, enhancers and no images.
 fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> {
     let unit = findings.unit;
     let of = |kind| of_set(findings, kind, variant);

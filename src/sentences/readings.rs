@@ -27,20 +27,19 @@ pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<
     .map(of);
     let mut numbers = Numbers::of(unit);
     let text = format!(
-        "Of {} findings about noise, {} under all {} noise profiles, {} under some, {} under none; {} reversed between profiles, {} open.",
+        "{} of {} findings about noise {} under all {} noise profiles.",
+        numbers.count("all", all),
         numbers.count("findings", whole.len()),
-        verb(&numbers.count("all", all), "holds", "hold"),
+        if all == 1 { "holds" } else { "hold" },
         numbers.count("readings", readings),
-        numbers.count("some", some),
-        numbers.count("none", none),
-        verb(&numbers.count("reversed", reversed), "is", "are"),
-        verb(&numbers.count("open", open), "is", "are"),
     );
-    let detail = "corrected over all claims, models and profiles; under none: the opposite is detected under a profile; the table by reading names them";
-    Some(numbers.sentence("readings", Tone::Note, text, detail.to_owned()))
-}
-
-fn verb(count: &str, one: &str, several: &str) -> String {
-    let verb = if count == "1" { one } else { several };
-    format!("{count} {verb}")
+    let detail = format!(
+        "{} under some; {} with opposite effects under two; {} with the opposite effect alone; {} open; corrected over all claims, models \
+         and profiles; the table by reading names them",
+        numbers.count("some", some),
+        numbers.count("reversed", reversed),
+        numbers.count("none", none),
+        numbers.count("open", open),
+    );
+    Some(numbers.sentence("readings", Tone::Note, text, detail))
 }

@@ -18,7 +18,7 @@ const MAX_NAMED: usize = 3;
 fn topic(kind: PooledKind, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
     match (kind, enhancer) {
         (PooledKind::Enhancer, Some(name)) => name.to_string(),
-        (PooledKind::Blind, _) => "dark images against the words alone".to_owned(),
+        (PooledKind::Blind, _) => "dark images against no images".to_owned(),
         _ => kind.name_on(variant.kind).to_owned(),
     }
 }

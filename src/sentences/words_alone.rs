@@ -1,4 +1,4 @@
-//! Sentences about models that fall below their replies to the words alone: all together, or in one family.
+//! Sentences about models that are less often right with images than without: all together, or in one family.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +15,10 @@ use darkqa_score::pooled::PooledFinding;
 use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 
-/// Where the models fall below their replies to the words alone.
+/// The second side of a comparison of images with no images, if both are of the same models.
+const WITHOUT: &str = "without images";
+
+/// Where the models are less often right than without images.
 pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let shown = of_verdict(levels, Significance::Worse);
     let Some(largest) = PooledFinding::largest(&shown) else {
@@ -25,13 +28,13 @@ pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sen
     };
     let mut numbers = Numbers::of(unit);
     let who = match &largest.models[..] {
-        [one] => format!("{one} falls"),
-        _ => "the models fall".to_owned(),
+        [one] => format!("{one} is"),
+        _ => "the models are".to_owned(),
     };
     let below = second_side(largest);
     let at = runs(&shown, levels);
     let place = capitalised(largest.level.axis().unwrap_or(Axis::LIGHT).place);
-    let text = format!("{place} {who} below {below} at {at}.");
+    let text = format!("{place} {who} less often right than {below} at {at}.");
     let detail = detail(largest, &mut numbers, &format!("; at {}", largest.level));
     Some(numbers.sentence("below blind", Tone::Worse, text, detail))
 }
@@ -40,13 +43,21 @@ pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sen
 fn second_side(finding: &PooledFinding) -> String {
     let mut models = finding.blind_models.iter();
     match &finding.blind_models[..] {
-        _ if models.all(|model| finding.models.contains(model)) => "the words alone".to_owned(),
+        _ if models.all(|model| finding.models.contains(model)) => WITHOUT.to_owned(),
         [other] => format!("{other} without images"),
         _ => "the models without images".to_owned(),
     }
 }
 
-/// What the untouched images give over the words alone, of all models together.
+/// Another model that images are compared with, as ` against NAME without images`; empty if each model is compared with itself.
+fn against(finding: &PooledFinding) -> String {
+    match &*second_side(finding) {
+        WITHOUT => String::new(),
+        other => format!(" against {other}"),
+    }
+}
+
+/// What the untouched images add, of all models together.
 pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
     let of = findings.pooled.iter().find(|finding| {
         finding.kind == PooledKind::Blind
@@ -64,14 +75,14 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
     );
     let text = match of.claim() {
         Claim::Detected(Significance::Better) => format!(
-            "At L0 images give {} points over {}: {with} % with them, {without} % without.",
+            "At L0 images add {} points{}: {with} % with them, {without} % without.",
             numbers.size("gain", of.strict.difference.value),
-            second_side(of)
+            against(of)
         ),
         Claim::Detected(_) => format!(
-            "At L0 images cost {} points against {}: {with} % with them, {without} % without.",
+            "At L0 images cost {} points{}: {with} % with them, {without} % without.",
             numbers.size("cost", of.strict.difference.value),
-            second_side(of)
+            against(of)
         ),
         // That no verdict is possible is said for all topics together.
         Claim::Impossible => return None,
@@ -100,7 +111,7 @@ pub(super) fn by_family<'f>(
     comparisons.collect()
 }
 
-/// The family in which a model falls furthest below the words alone, and how many models do in that family. `all` are the
+/// The family in which a model is furthest below its score without images, and how many models do in that family. `all` are the
 /// comparisons of all models and families. `None` if the findings over all families (`pooled`) say it of the same single model.
 pub(super) fn in_a_family(
     all: &[&Comparison],
@@ -130,16 +141,16 @@ pub(super) fn in_a_family(
     let family = capitalised(family_name(most.family.as_ref()));
     let text = if fallen == 1 {
         let (than, at) = (than(most), levels_below(&of_family, most));
-        format!("{family}: {model} falls below {than} at {at}.")
+        format!("{family}: {model} is less often right than {than} at {at}.")
     } else {
         let than = if below.iter().all(|of| is_own(of)) {
-            "the words alone"
+            WITHOUT
         } else {
             "a model without images"
         };
         let fallen = numbers.count("fallen", fallen);
         let models = numbers.count("models", models);
-        format!("{family}: {fallen} of {models} models fall below {than}.")
+        format!("{family}: {fallen} of {models} models are less often right than {than}.")
     };
     let detail = comparison_detail(most, &mut numbers)?;
     Some(numbers.sentence("below blind", Tone::Worse, text, detail))
@@ -154,10 +165,10 @@ fn is_own(comparison: &Comparison) -> bool {
     comparison.first.model == comparison.second.model
 }
 
-/// The second side of a comparison with words alone, in words.
+/// The second side of a comparison with no images, in words.
 fn than(comparison: &Comparison) -> String {
     if is_own(comparison) {
-        "the words alone".to_owned()
+        WITHOUT.to_owned()
     } else {
         format!("{} without images", comparison.second.model)
     }
@@ -178,7 +189,7 @@ fn levels_below(of_family: &[&Comparison], of: &Comparison) -> String {
     level_runs(&below, &sorted(pair.collect()))
 }
 
-/// Effect, interval, p and n of a comparison with words alone.
+/// Effect, interval, p and n of a comparison with no images.
 fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<String> {
     let (model, level) = (&comparison.first.model, comparison.first.level?);
     let against = if is_own(comparison) {

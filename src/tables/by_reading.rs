@@ -109,7 +109,10 @@ fn shown(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
     }
     let mut table = table
         .column(Text, "terminal holds | page holds", |row| match row {
-            Row::Finding(finding) => TableCell::from(finding.robustness.word()),
+            Row::Finding(finding) => TableCell::from(match finding.robustness {
+                Robustness::Reversed => "opposite effects",
+                other => other.word(),
+            }),
             Row::Thresholds(..) => TableCell::Blank,
         })
         .column(Count, "page n", |row| match row {
@@ -221,7 +224,7 @@ fn title(finding: &FindingByReading) -> String {
             let other = finding.blind.as_ref();
             let of = other.map(|name| format!(" of {name}")).unwrap_or_default();
             format!(
-                "{} falls below blind{of}: {level} with noise − blind",
+                "{} is less often right than without images{of}: {level} with noise − without images",
                 words::family(Some(family))
             )
         }
@@ -241,7 +244,7 @@ fn clause(finding: &FindingByReading) -> String {
         NoiseHypothesis::EnhancerHelps(name) => format!("{name} helps at {}", span(levels, 2)),
         NoiseHypothesis::BelowBlind(family, level) => {
             let family = words::family(Some(family));
-            format!("{level} with noise, {family}: below the words alone")
+            format!("{level} with noise, {family}: less often right than without images")
         }
     }
 }

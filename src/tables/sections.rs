@@ -38,7 +38,7 @@ pub(crate) const SECTIONS: [Section; 15] = [
         "Does each finding hold under every reading?",
         "The paper’s noise can be read in several ways. Each finding is computed under every reading on the same items, at L1–L5. It \
          holds where an effect on its side is detected after Holm’s correction over all claims, models and readings, has the opposite \
-         where one on the other side is detected, and is open otherwise; it is reversed only if both are detected. The curves under each \
+         where one on the other side is detected, and is open otherwise; the profiles contradict each other only if both are detected. The curves under each \
          reading are in the figures of accuracy.",
         &[],
     ),
@@ -55,7 +55,7 @@ pub(crate) const SECTIONS: [Section; 15] = [
     (
         "families",
         "Families of questions",
-        "Underlined: shown to be below a model without images (its own, if it was asked so). There the model answers better without an image than with the image.",
+        "Underlined: detected to be less often right than a model without images (its own, if it was asked so).",
         &["families"],
     ),
     (

@@ -48,7 +48,7 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
         .family_cells(None, ReadingMode::Strict);
     let mut cells = cells.filter(|cell| cell.subject.level.is_some());
     if cells.any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty()) {
-        parts.push(format!("{BELOW} shown to be below the words alone"));
+        parts.push(format!("{BELOW} less often right than without images"));
     }
     let mut text = String::new();
     if !ladder.series.is_empty() {

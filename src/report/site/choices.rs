@@ -35,7 +35,7 @@ pub(crate) struct ChoiceRow {
     threshold: Option<Result<EvThreshold, NoThreshold>>,
     /// The enhancer, the level and the difference from raw images of the largest gain.
     gain: Option<(String, AxisLevel, Estimate, Significance)>,
-    /// The levels at which the model is shown to be below a model without images.
+    /// The levels at which the model is detected to be less often right than a model without images.
     below: Vec<AxisLevel>,
     /// Replies that cannot be read, and all replies.
     unread: [usize; 2],
@@ -233,7 +233,7 @@ const HEAD: [&str; 12] = [
     "change in points",
     "threshold in EV",
     "best enhancer, gain in points",
-    "below blind at",
+    "worse than without images at",
     "unread in %",
     "date",
     "version",

@@ -121,12 +121,12 @@ fn what_images_give_over_the_words_alone_is_said_at_l0() {
         (
             1.0,
             0.0,
-            "+ At L0 images give 100.0 points over the words alone: 100.0 % with them, 0.0 % without. (",
+            "+ At L0 images add 100.0 points: 100.0 % with them, 0.0 % without. (",
         ),
         (
             0.0,
             1.0,
-            "− At L0 images cost 100.0 points against the words alone: 0.0 % with them, 100.0 % without. (",
+            "− At L0 images cost 100.0 points: 0.0 % with them, 100.0 % without. (",
         ),
         (
             0.5,
@@ -216,7 +216,7 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
     let without = of_kind(&few, "no verdict");
     assert_eq!(
         without[0],
-        "· With 7 frames no verdict on darkness, noise and dark images against the words alone is possible, however large the effect. (the smallest \
+        "· With 7 frames no verdict on darkness, noise and dark images against no images is possible, however large the effect. (the smallest \
          possible p = 0.078; take more frames)"
     );
     let lift = of_kind(&few, "enhancer");
@@ -229,7 +229,7 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
     assert!(of_kind(&fewer, "best").is_empty());
     let without = of_kind(&fewer, "no verdict");
     assert!(
-        without[0].starts_with("· With 4 frames no verdict on darkness, noise, lift, dark images against the words alone and the best model is possible,"),
+        without[0].starts_with("· With 4 frames no verdict on darkness, noise, lift, dark images against no images and the best model is possible,"),
         "{without:?}"
     );
     let enough = said(&asked("m", 8, &levels));

@@ -208,7 +208,11 @@ fn each_kind_and_verdict_has_its_words() {
     assert!(said[1].starts_with("+ lift helps at L2, L4–L5, by up to 22.0 points. ("));
     assert!(say(Blind, &[(0.2, Better), (0.0, NotShown)]).is_empty());
     let said = say(Blind, &[(0.2, Better), (-0.1, Worse)]);
-    assert!(said[0].starts_with("− In the dark the models fall below the words alone at L2. ("));
+    assert!(
+        said[0].starts_with(
+            "− In the dark the models are less often right than without images at L2. ("
+        )
+    );
 }
 
 /// Findings about L1–L5 without a verdict, and the mean of L4–L5 with one.

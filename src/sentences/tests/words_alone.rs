@@ -1,4 +1,4 @@
-//! Golden sentences about models that fall below the words alone.
+//! Golden sentences about models that are less often right than without images.
 
 use super::{checked, finding};
 use crate::sentences::words_alone;
@@ -81,7 +81,7 @@ fn a_family_below_the_words_alone_is_said_once() {
     };
     assert_eq!(
         say(&one, &[]).unwrap(),
-        "− Object colour: sim-F falls below the words alone at L4–L5. (sim-F at L5: −30.0 [−40.0, −20.0], p = 0.012; n = 45 in 24 scenes)"
+        "− Object colour: sim-F is less often right than without images at L4–L5. (sim-F at L5: −30.0 [−40.0, −20.0], p = 0.012; n = 45 in 24 scenes)"
     );
     let two = [
         &one[..],
@@ -90,7 +90,7 @@ fn a_family_below_the_words_alone_is_said_once() {
     let said = say(&two.concat(), &[]).unwrap();
     assert!(
         said.starts_with(
-            "− Object colour: 2 of 3 models fall below the words alone. (sim-F at L5: "
+            "− Object colour: 2 of 3 models are less often right than without images. (sim-F at L5: "
         ),
         "{said}"
     );
@@ -99,7 +99,7 @@ fn a_family_below_the_words_alone_is_said_once() {
     let said = say(&other, &[]).unwrap();
     assert!(
         said.starts_with(
-            "− Object colour: sim-F falls below c without images at L5. (sim-F at L5 against c: "
+            "− Object colour: sim-F is less often right than c without images at L5. (sim-F at L5 against c: "
         ),
         "{said}"
     );
@@ -126,22 +126,22 @@ fn below_whose_words_is_said() {
         (
             &["a"],
             &["a"],
-            "In the dark a falls below the words alone at L5.",
+            "In the dark a is less often right than without images at L5.",
         ),
         (
             &["a"],
             &["random"],
-            "In the dark a falls below random without images at L5.",
+            "In the dark a is less often right than random without images at L5.",
         ),
         (
             &["a", "b"],
             &["b"],
-            "In the dark the models fall below the words alone at L5.",
+            "In the dark the models are less often right than without images at L5.",
         ),
         (
             &["a", "b"],
             &["c", "d"],
-            "In the dark the models fall below the models without images at L5.",
+            "In the dark the models are less often right than the models without images at L5.",
         ),
     ];
     for (models, blind, expected) in rows {
