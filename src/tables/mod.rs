@@ -8,6 +8,7 @@ mod by_reading;
 mod calibration;
 mod comparisons;
 mod enhancers;
+mod fails_first;
 mod families;
 mod fidelity;
 mod flips;
@@ -68,6 +69,7 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
         vec![families::families(findings)],
         strict_groups(findings),
         pooled::pooled(findings),
+        fails_first::fails_first(findings).into(),
         comparisons::comparisons(findings),
         answers::answers(findings),
         calibration::calibration(findings),
