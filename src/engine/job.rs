@@ -20,7 +20,7 @@ use crate::images::source::{input_summary, warn_of_inputs};
 use crate::images::stored_findings::StoredFindings;
 use crate::images::timings::Timings;
 use crate::report::forecast::{Forecast, json, render};
-use crate::runs::outcome::{Outcome, StdoutFormat};
+use crate::runs::outcome::Outcome;
 use crate::store::{self, Store};
 use crate::types::manifest::{RunManifest, Status};
 use crate::types::{StoredDetail as _, TrialKey};
@@ -91,9 +91,10 @@ impl<'a, E: Experiment> Job<'a, E> {
         let forecast = self.forecast()?;
         Ok(Outcome::text(
             Status::Complete,
-            match show {
-                StdoutFormat::Json => json(&forecast)?,
-                _ => render(&forecast),
+            if show.is_json() {
+                json(&forecast)?
+            } else {
+                render(&forecast)
             },
         ))
     }

@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::report::choice_report::ChoiceReport;
+use crate::report::report_length::ReportLength;
 use crate::sentences::Sentence;
 use crate::tables::{BASELINE, strict_groups, summary_rows};
 use crate::text::alert::Alert;
@@ -16,12 +17,17 @@ use crate::text::table::{Table, TableRow};
 use crate::types::UnreadReason;
 use crate::types::manifest::RunManifest;
 
-/// A head, and the rows of a table as objects with the column names as keys.
+/// A head, and the rows of tables as objects with the column names as keys.
 #[derive(Serialize)]
 struct Document<'a, H> {
     #[serde(flatten)]
     head: H,
-    rows: Rows<'a>,
+    /// The rows of the summary; left out with the findings alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rows: Option<Rows<'a>>,
+    /// Every table by the name of its file; only in a full report.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    tables: BTreeMap<&'a str, Rows<'a>>,
 }
 
 /// The rows of tables with the same columns as objects.
@@ -58,13 +64,29 @@ impl Serialize for Named<'_> {
     }
 }
 
-/// A head and a table as one JSON document.
+/// A head, the summary's rows, and in a full report every table, as one JSON document.
 ///
 /// # Errors
 /// If the document cannot be written.
-pub(super) fn document(head: impl Serialize, rows: &Table) -> Result<String> {
-    let rows = Rows::of(rows);
-    serde_json::to_string_pretty(&Document { head, rows })
+pub(super) fn document(
+    head: impl Serialize,
+    rows: &Table,
+    tables: &[Table],
+    length: ReportLength,
+) -> Result<String> {
+    let document = Document {
+        head,
+        rows: (length != ReportLength::Findings).then(|| Rows::of(rows)),
+        tables: tables
+            .chunk_by(|one, other| one.name == other.name)
+            .filter(|parts| {
+                let mut columns = parts[0].columns.iter();
+                length == ReportLength::Full && columns.any(|column| !column.heads.csv.is_empty())
+            })
+            .map(|parts| (parts[0].name, Rows(parts)))
+            .collect(),
+    };
+    serde_json::to_string_pretty(&document)
         .map(|text| text + "\n")
         .map_err(|e| Error::data("summary.json", e))
 }
@@ -137,7 +159,11 @@ impl<'a> RunList<'a> {
 ///
 /// # Errors
 /// If the document cannot be written.
-pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<String> {
+pub(crate) fn summary(
+    report: &ChoiceReport<'_>,
+    runs: RunList<'_>,
+    length: ReportLength,
+) -> Result<String> {
     let mut tables = report.tables.iter();
     let groups = strict_groups(report.findings);
     let head = Head {
@@ -152,5 +178,7 @@ pub(crate) fn summary(report: &ChoiceReport<'_>, runs: RunList<'_>) -> Result<St
     document(
         head,
         &summary_rows(&report.findings.summary, &report.findings.grid.listing),
+        &report.tables,
+        length,
     )
 }

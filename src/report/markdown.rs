@@ -4,14 +4,16 @@ use std::borrow::Cow;
 use std::fmt::Write;
 
 use crate::report::choice_report::ChoiceReport;
+use crate::report::finding_groups::FindingGroups;
 use crate::report::openeqa::{OpenReport, coverage};
+use crate::report::report_length::ReportLength;
 use crate::report::self_agreement::{self, AgreementReport};
 use crate::report::short::head;
-use crate::sentences::{Sentence, how_to_read};
+use crate::sentences::how_to_read;
 use crate::text::alert::Alert;
 use crate::text::readable::readable;
 use crate::text::table::{Column, ColumnKind, Table, TableFormat};
-use crate::text::words::{ends, interval, words};
+use crate::text::words::{counted, ends, interval, words};
 
 /// Name of the table by level of accuracies and scores.
 const LEVELS: &str = "levels";
@@ -23,19 +25,23 @@ pub(crate) struct MarkdownReport<'a> {
     /// Numbers of models, questions and replies.
     head: Vec<String>,
     alerts: &'a [Alert],
-    sentences: &'a [Sentence],
-    /// The line below the findings; `None` without one.
-    how_to_read: Option<Cow<'static, str>>,
+    groups: FindingGroups<'a>,
+    /// The line below the findings.
+    how_to_read: Cow<'static, str>,
+    /// Whether all findings stand open, and not folded below the first of each group.
+    is_open: bool,
     tables: Vec<&'a Table>,
 }
 
 impl<'a> MarkdownReport<'a> {
     /// The report of questions with choices.
-    pub(crate) fn of_choices(report: &'a ChoiceReport<'a>, names: Vec<String>) -> Self {
-        let is_tested = |sentence: &Sentence| sentence.values.contains_key("p");
-        let has_tests = report.sentences.iter().any(is_tested);
-        let mut tables = named(&report.tables, LEVELS);
-        if report.findings.common.is_some() && tables.len() > 1 {
+    pub(crate) fn of_choices(
+        report: &'a ChoiceReport<'a>,
+        names: Vec<String>,
+        length: ReportLength,
+    ) -> Self {
+        let mut tables = tables(&report.tables, LEVELS, length);
+        if length == ReportLength::Summary && report.findings.common.is_some() && tables.len() > 1 {
             // Models that were asked different questions are compared on those that they share.
             tables.retain(|table| table.caption.contains("all models"));
         }
@@ -43,27 +49,37 @@ impl<'a> MarkdownReport<'a> {
             names,
             head: vec![head(report)],
             alerts: &report.alerts,
-            sentences: &report.sentences,
-            how_to_read: has_tests.then(|| how_to_read(&report.sentences).into()),
+            groups: FindingGroups::new(&report.sentences),
+            how_to_read: how_to_read(&report.sentences).into(),
+            is_open: length != ReportLength::Summary,
             tables,
         }
     }
 
     /// The report of questions without true answers.
-    pub(crate) fn of_own_answers(report: &'a AgreementReport<'a>, names: Vec<String>) -> Self {
+    pub(crate) fn of_own_answers(
+        report: &'a AgreementReport<'a>,
+        names: Vec<String>,
+        length: ReportLength,
+    ) -> Self {
         let parts = self_agreement::markdown_parts(report);
         Self {
             names,
             head: vec![parts.head],
             alerts: parts.alerts,
-            sentences: parts.sentences,
-            how_to_read: Some(parts.how_to_read.into()),
-            tables: named(parts.tables, parts.levels),
+            groups: FindingGroups::new(parts.sentences),
+            how_to_read: parts.how_to_read.into(),
+            is_open: length != ReportLength::Summary,
+            tables: tables(parts.tables, parts.levels, length),
         }
     }
 
     /// The report of open questions, with its tables.
-    pub(crate) fn of_open(report: &'a OpenReport<'_>, tables: &'a [Table]) -> Self {
+    pub(crate) fn of_open(
+        report: &'a OpenReport<'_>,
+        all: &'a [Table],
+        length: ReportLength,
+    ) -> Self {
         let judge = report.judge.unwrap_or("nobody");
         let mut head = vec![format!(
             "OpenEQA by LLM-Match, marked by {judge}, protocol {}",
@@ -74,10 +90,39 @@ impl<'a> MarkdownReport<'a> {
             names: report.names(),
             head,
             alerts: report.alerts,
-            sentences: &[],
-            how_to_read: None,
-            tables: named(tables, LEVELS),
+            groups: FindingGroups::new(&[]),
+            how_to_read: Cow::default(),
+            is_open: false,
+            tables: tables(all, LEVELS, length),
         }
+    }
+
+    /// The summary, the first finding of each group, and all findings; empty without findings.
+    fn findings(&self) -> String {
+        if self.groups.count() == 0 {
+            return String::new();
+        }
+        let mut text = format!("**{}**\n\n", inline(&self.groups.summary()));
+        if !self.is_open {
+            for (group, first) in self.groups.first() {
+                let sign = first.shown().tone.sign();
+                text += &finding(sign, group, &(first.text() + "."), &first.interval_words());
+            }
+            let count = counted(self.groups.count(), "finding");
+            let _ = writeln!(text, "\n<details><summary>All {count}</summary>\n");
+        }
+        for group in self.groups.all() {
+            let _ = writeln!(text, "#### {}\n", group.title);
+            for sentence in group.findings.iter().flat_map(|finding| &finding.sentences) {
+                text += &finding(sentence.tone.sign(), "", &sentence.text, &sentence.detail);
+            }
+            text.push('\n');
+        }
+        let _ = writeln!(text, "{}\n", block(&self.how_to_read));
+        if !self.is_open {
+            text += "</details>\n\n";
+        }
+        text
     }
 
     /// The text.
@@ -89,21 +134,7 @@ impl<'a> MarkdownReport<'a> {
         for alert in self.alerts {
             let _ = writeln!(text, "> **Note:** {}\n", inline(&alert.text));
         }
-        for sentence in self.sentences {
-            let (sign, detail) = (sentence.tone.sign(), inline(&sentence.detail));
-            let line = inline(&sentence.text);
-            let _ = writeln!(
-                text,
-                "- {} **{line}**\\\n  {detail}",
-                block(&sign.to_string())
-            );
-        }
-        if !self.sentences.is_empty() {
-            text.push('\n');
-        }
-        if let Some(line) = &self.how_to_read {
-            let _ = writeln!(text, "{}\n", block(line));
-        }
+        text += &self.findings();
         for table in &self.tables {
             text += &of_table(table);
         }
@@ -111,10 +142,31 @@ impl<'a> MarkdownReport<'a> {
     }
 }
 
-/// The tables of a name that have a row.
-fn named<'a>(tables: &'a [Table], name: &str) -> Vec<&'a Table> {
-    let tables = tables.iter().filter(|table| table.name == name);
-    tables.filter(|table| !table.rows.is_empty()).collect()
+/// A finding of a list, with its sign, its group or nothing, and a line below it.
+fn finding(sign: char, group: &str, text: &str, detail: &str) -> String {
+    let sign = block(&sign.to_string());
+    let [group, text, detail] = [group, text, detail].map(inline);
+    let line = match &*group {
+        "" => format!("- {sign} **{text}**"),
+        _ => format!("- {sign} **{group}:** {text}"),
+    };
+    match &*detail {
+        "" => line + "\n",
+        _ => format!("{line}\\\n  {detail}\n"),
+    }
+}
+
+/// The tables of a name that have a row; all that the page shows in a full report, none with the findings alone.
+fn tables<'a>(tables: &'a [Table], name: &str, length: ReportLength) -> Vec<&'a Table> {
+    tables
+        .iter()
+        .filter(|table| match length {
+            ReportLength::Summary => table.name == name,
+            ReportLength::Findings => false,
+            ReportLength::Full => !table.section.is_empty(),
+        })
+        .filter(|table| !table.rows.is_empty())
+        .collect()
 }
 
 /// A table with the columns and rows of the page. An interval stands behind its number.

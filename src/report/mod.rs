@@ -3,6 +3,7 @@
 pub(crate) mod calibration;
 pub(crate) mod choice_report;
 pub(crate) mod doctor;
+mod finding_groups;
 pub(crate) mod forecast;
 pub(crate) mod json;
 pub(crate) mod markdown;
@@ -12,6 +13,7 @@ pub(crate) mod power;
 pub(crate) mod products;
 pub(crate) mod questions;
 pub(crate) mod realism;
+pub(crate) mod report_length;
 pub(crate) mod self_agreement;
 pub(crate) mod short;
 pub(crate) mod site;

@@ -1,7 +1,8 @@
-//! The text of a report of questions with choices: [`short`] for 80 columns, [`findings`] alone, and [`full`] with all tables.
+//! The text of a report of questions with choices: [`text()`].
 
+pub(super) mod findings;
 mod foot;
-pub(super) mod marked;
+mod marked;
 mod name_column;
 
 use std::collections::BTreeSet;
@@ -11,12 +12,13 @@ use std::path::Path;
 use self::foot::BELOW;
 use self::name_column::{LEVEL, NameColumn};
 use crate::report::choice_report::ChoiceReport;
-use crate::sentences::{FIRST, Sentence, how_to_read};
-use crate::text::alert::lines;
+use crate::report::finding_groups::FindingGroups;
+use crate::report::report_length::ReportLength;
+use crate::sentences::how_to_read;
 use crate::text::frame_count::frames;
 use crate::text::ladder::{Ladder, SeriesByLevel};
 use crate::text::light_readings::LightReadings;
-use crate::text::terminal::{line as line_of, render};
+use crate::text::terminal::render;
 use crate::text::words::{counted, percent, reach_of};
 use crate::text::wrapped::{WIDTH, wrapped};
 use crate::types::manifest::RunManifest;
@@ -39,55 +41,29 @@ const MAX_ROWS: usize = 24;
 /// Maximum number of levels side by side in the table: so many leave room for names.
 const MAX_LEVELS: usize = 7;
 
-/// The alerts, the findings and one table. `runs` are the runs with their folders.
+/// A report of questions with choices as text. `runs` are the runs with their folders.
 #[must_use]
-pub(crate) fn short(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
-    let mut text = findings(report);
-    text.push('\n');
-    text += &marked::table(&table(report));
+pub(crate) fn text(
+    report: &ChoiceReport<'_>,
+    runs: &[(&RunManifest, &Path)],
+    length: ReportLength,
+) -> String {
+    let groups = FindingGroups::new(&report.sentences);
+    let mut text = findings::findings(
+        &head(report),
+        &report.alerts,
+        &groups,
+        length,
+        &how_to_read(&report.sentences),
+    );
+    match length {
+        ReportLength::Findings => return text,
+        ReportLength::Summary => text += &marked::table(&table(report)),
+        ReportLength::Full => text += &render(&report.tables),
+    }
     text += &open_question(report);
     for (_, folder) in runs {
         let _ = writeln!(text, "run: {}", folder.display());
-    }
-    text
-}
-
-/// All that a report of questions with choices says: the alerts, the findings, every table, and the folders of the runs.
-#[must_use]
-pub(crate) fn full(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
-    let mut text = lines(&report.alerts);
-    for sentence in &report.sentences {
-        text += &marked::sentence(sentence);
-    }
-    if !report.sentences.is_empty() {
-        text += &line_of([" ", &how_to_read(&report.sentences), " "]);
-        text.push('\n');
-    }
-    text += &render(&report.tables);
-    text += &open_question(report);
-    for (_, folder) in runs {
-        let _ = writeln!(text, "run: {}", folder.display());
-    }
-    text
-}
-
-/// The head, the alerts and all that is found, without a table.
-#[must_use]
-pub(crate) fn findings(report: &ChoiceReport<'_>) -> String {
-    let mut text = head(report) + "\n";
-    for alert in &report.alerts {
-        text += &marked::alert(alert);
-    }
-    for sentence in report.sentences.iter().take(FIRST) {
-        text += &marked::sentence(sentence);
-    }
-    if report.sentences.len() > FIRST {
-        let more = counted(report.sentences.len() - FIRST, "more finding");
-        let _ = writeln!(text, " {more}: --full");
-    }
-    let is_tested = |sentence: &Sentence| sentence.values.contains_key("p");
-    if report.sentences.iter().any(is_tested) {
-        text += &wrapped(" ", &how_to_read(&report.sentences), " ");
     }
     text
 }

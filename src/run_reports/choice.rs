@@ -13,9 +13,10 @@ use crate::report::choice_report::ChoiceReport;
 use crate::report::json::{RunList, summary};
 use crate::report::markdown::MarkdownReport;
 use crate::report::products::{PAGE, products};
-use crate::report::short::{findings, full, short};
+use crate::report::report_length::ReportLength;
+use crate::report::short;
 use crate::runs::outcome::Outcome;
-use crate::runs::outcome::StdoutFormat;
+use crate::runs::outcome::{StdoutFormat, Syntax};
 use crate::runs::stored::{ShownModels, StoredRun, name};
 use crate::store::Store;
 use crate::tables::{FLIPS, write_flips};
@@ -63,14 +64,13 @@ pub(super) fn in_its_folder(
     let files = files(&report, combined, RunList::One(manifest, None))?;
     write_rows(&findings, folder)?;
     target.write(&files, manifest)?;
-    if show == StdoutFormat::Json {
-        return summary(&report, RunList::One(manifest, Some(folder)));
-    }
+    let list = RunList::One(manifest, Some(folder));
+    let text = text(&report, &[(manifest, folder)], list, show)?;
     if show.is_document() {
-        return Ok(text(&report, &[(manifest, folder)], show));
+        return Ok(text);
     }
     let page = folder.join(PAGE);
-    Ok(text(&report, &[(manifest, folder)], show) + &format!("report: {}\n", page.display()))
+    Ok(text + &format!("report: {}\n", page.display()))
 }
 
 /// The files of a report by name.
@@ -80,7 +80,8 @@ pub(super) fn files(
     runs: RunList<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, &combined.shown())?;
-    Ok(with_summary(products, summary(report, runs)?))
+    let summary = summary(report, runs, ReportLength::Summary)?;
+    Ok(with_summary(products, summary))
 }
 
 /// Writes the file that has a row for each item into a folder.
@@ -91,19 +92,26 @@ pub(super) fn write_rows(findings: &Findings<'_>, folder: &Path) -> Result<()> {
     write_with(&folder.join(FLIPS), |out| write_flips(findings, out))
 }
 
-/// The text of a report in a format other than JSON.
+/// The text of a report for standard output; `list` are the same runs for JSON.
 pub(super) fn text(
     report: &ChoiceReport<'_>,
     runs: &[(&RunManifest, &Path)],
+    list: RunList<'_>,
     show: StdoutFormat,
-) -> String {
-    match show {
-        StdoutFormat::Findings => findings(report),
-        StdoutFormat::Full => full(report, runs),
-        StdoutFormat::Markdown => {
-            let names = runs.iter().map(|(_, folder)| name(folder)).collect();
-            MarkdownReport::of_choices(report, names).text()
-        }
-        StdoutFormat::Short | StdoutFormat::Json => short(report, runs),
+) -> Result<String> {
+    match show.syntax {
+        Syntax::Text => Ok(short::text(report, runs, show.length)),
+        Syntax::Markdown => Ok(markdown(report, runs, show.length)),
+        Syntax::Json => summary(report, list, show.length),
     }
+}
+
+/// The report as Markdown.
+pub(super) fn markdown(
+    report: &ChoiceReport<'_>,
+    runs: &[(&RunManifest, &Path)],
+    length: ReportLength,
+) -> String {
+    let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+    MarkdownReport::of_choices(report, names, length).text()
 }

@@ -18,10 +18,11 @@ use crate::error::{Error, Result};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::products::PAGE;
+use crate::report::report_length::ReportLength;
 use crate::runs::mark_index::MarkIndex;
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::outcome::Outcome;
-use crate::runs::outcome::StdoutFormat;
+use crate::runs::outcome::{StdoutFormat, Syntax};
 use crate::runs::predictions::{AnswerState, Prediction, predictions};
 use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort};
 use crate::store::Store;
@@ -143,7 +144,7 @@ impl Scores {
         let tables = tables(&report);
         Ok(WholeReport {
             files: files(&report, &tables)?,
-            markdown: self.show(&report, &tables, StdoutFormat::Markdown)?,
+            markdown: MarkdownReport::of_open(&report, &tables, ReportLength::Summary).text(),
         })
     }
 
@@ -160,10 +161,10 @@ impl Scores {
         show: StdoutFormat,
     ) -> Result<String> {
         let folder = &self.run.folder;
-        match show {
-            StdoutFormat::Json => summary_json(report, tables, Some(folder)),
-            StdoutFormat::Markdown => Ok(MarkdownReport::of_open(report, tables).text()),
-            _ => Ok(render(report, tables, &self.run.folders())),
+        match show.syntax {
+            Syntax::Json => summary_json(report, tables, Some(folder), show.length),
+            Syntax::Markdown => Ok(MarkdownReport::of_open(report, tables, show.length).text()),
+            Syntax::Text => Ok(render(report, tables, &self.run.folders())),
         }
     }
 
@@ -188,7 +189,8 @@ impl Scores {
 /// The files of the report of one run, by name.
 fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, tables)?;
-    Ok(with_summary(products, summary_json(report, tables, None)?))
+    let summary = summary_json(report, tables, None, ReportLength::Summary)?;
+    Ok(with_summary(products, summary))
 }
 
 /// A run of open questions, or several joined to one, with its whole records.

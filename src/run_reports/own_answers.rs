@@ -11,9 +11,10 @@ use crate::error::Result;
 use crate::report::json::RunList;
 use crate::report::markdown::MarkdownReport;
 use crate::report::products::PAGE;
-use crate::report::self_agreement::{AgreementReport, TextLength, products, summary, text};
-use crate::runs::StdoutFormat;
+use crate::report::report_length::ReportLength;
+use crate::report::self_agreement::{AgreementReport, products, summary, text};
 use crate::runs::stored::name;
+use crate::runs::{StdoutFormat, Syntax};
 use crate::text::alert::Alert;
 use crate::types::ChoiceDetail;
 use crate::types::manifest::RunManifest;
@@ -37,15 +38,13 @@ pub(super) fn in_its_folder(
     let files = files(&report, combined, RunList::One(manifest, None))?;
     target.write(&files, manifest)?;
     let folder = target.path();
-    let runs = [(manifest, folder)];
-    Ok(match length(show) {
-        None if show == StdoutFormat::Markdown => markdown(&report, &runs),
-        None => summary(&report, RunList::One(manifest, Some(folder)))?,
-        Some(length) => {
-            let page = folder.join(PAGE);
-            text(&report, &runs, length) + &format!("report: {}\n", page.display())
-        }
-    })
+    let list = RunList::One(manifest, Some(folder));
+    let text = shown(&report, &[(manifest, folder)], list, show)?;
+    if show.is_document() {
+        return Ok(text);
+    }
+    let page = folder.join(PAGE);
+    Ok(text + &format!("report: {}\n", page.display()))
 }
 
 /// The report of several runs, or of one that is not written into its folder. The files are made only if they are `wanted`.
@@ -64,11 +63,7 @@ pub(super) fn compared(
     } else {
         Vec::new()
     };
-    let text = match length(show) {
-        None if show == StdoutFormat::Markdown => markdown(&report, &runs),
-        None => summary(&report, list)?,
-        Some(length) => text(&report, &runs, length),
-    };
+    let text = shown(&report, &runs, list, show)?;
     Ok(ReportOutput { files, text })
 }
 
@@ -79,7 +74,7 @@ pub(super) fn whole(combined: &Combined) -> Result<WholeReport> {
     let runs = combined.manifests();
     Ok(WholeReport {
         files: files(&report, combined, RunList::One(runs[0].0, None))?,
-        markdown: markdown(&report, &runs),
+        markdown: markdown(&report, &runs, ReportLength::Summary),
     })
 }
 
@@ -90,7 +85,8 @@ fn files(
     runs: RunList<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, &combined.shown())?;
-    Ok(with_summary(products, summary(report, runs)?))
+    let summary = summary(report, runs, ReportLength::Summary)?;
+    Ok(with_summary(products, summary))
 }
 
 fn found(combined: &Combined) -> SelfAgreement<'_> {
@@ -113,17 +109,25 @@ fn report<'a>(
     AgreementReport::new(found, above, &enhancers::rows(&combined.runs))
 }
 
-fn markdown(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)]) -> String {
-    let names = runs.iter().map(|(_, folder)| name(folder)).collect();
-    MarkdownReport::of_own_answers(report, names).text()
+/// The text of a report for standard output; `list` are the same runs for JSON.
+fn shown(
+    report: &AgreementReport<'_>,
+    runs: &[(&RunManifest, &Path)],
+    list: RunList<'_>,
+    show: StdoutFormat,
+) -> Result<String> {
+    match show.syntax {
+        Syntax::Text => Ok(text(report, runs, show.length)),
+        Syntax::Markdown => Ok(markdown(report, runs, show.length)),
+        Syntax::Json => summary(report, list, show.length),
+    }
 }
 
-/// How much is printed; `None` for a document.
-fn length(show: StdoutFormat) -> Option<TextLength> {
-    match show {
-        StdoutFormat::Findings => Some(TextLength::Findings),
-        StdoutFormat::Short => Some(TextLength::Short),
-        StdoutFormat::Full => Some(TextLength::Full),
-        StdoutFormat::Markdown | StdoutFormat::Json => None,
-    }
+fn markdown(
+    report: &AgreementReport<'_>,
+    runs: &[(&RunManifest, &Path)],
+    length: ReportLength,
+) -> String {
+    let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+    MarkdownReport::of_own_answers(report, names, length).text()
 }

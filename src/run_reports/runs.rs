@@ -18,14 +18,14 @@ use super::{open, own_answers};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::report::choice_report::ChoiceReport;
-use crate::report::json::{RunList, summary};
+use crate::report::json::RunList;
 use crate::report::products::PAGE;
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
-use crate::runs::StdoutFormat;
 use crate::runs::record_table;
 use crate::runs::run_parts::{any_run, choice_run};
 use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, name};
+use crate::runs::{StdoutFormat, Syntax};
 use crate::store::now;
 use crate::store::{AddressChange, Store};
 use crate::text::alert::Alert;
@@ -71,8 +71,8 @@ pub(crate) struct ReportShowArgs {
     /// The formats that every report has.
     #[command(flatten)]
     pub show: ShowArgs,
-    /// Print the findings and the table by level as Markdown, for an issue or a README
-    #[arg(long, conflicts_with_all = ["full", "findings", "json"], help_heading = "Output", add = Decides::Nothing)]
+    /// Print the report as Markdown, for an issue or a README
+    #[arg(long, conflicts_with = "json", help_heading = "Output", add = Decides::Nothing)]
     pub markdown: bool,
 }
 
@@ -107,10 +107,14 @@ impl ReportArgs {
 
     /// How the report is printed.
     fn format(&self) -> StdoutFormat {
+        let format = self.show.show.format();
         if self.show.markdown {
-            StdoutFormat::Markdown
+            StdoutFormat {
+                syntax: Syntax::Markdown,
+                ..format
+            }
         } else {
-            self.show.show.format()
+            format
         }
     }
 }
@@ -281,10 +285,7 @@ fn compare(
         baseline.add_to(&mut report);
     }
     let list = RunList::Several(&runs);
-    let shown = match args.format() {
-        StdoutFormat::Json => summary(&report, list)?,
-        show => text(&report, &runs, show),
-    };
+    let shown = text(&report, &runs, list, args.format())?;
     let files = match &args.out {
         Some(out) => {
             let files = report_files(&report, combined, list)?;

@@ -7,7 +7,7 @@ use super::{choice, enhancers, open, own_answers};
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::RunList;
-use crate::runs::StdoutFormat;
+use crate::report::report_length::ReportLength;
 use crate::runs::stored::{AnyRun, StoredRun};
 use crate::tables::{FLIPS, write_flips};
 use crate::types::{ChoiceDetail, OpenDetail, Truths};
@@ -40,7 +40,7 @@ fn choice_report(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
     }
     Ok(WholeReport {
         files,
-        markdown: choice::text(&report, &runs, StdoutFormat::Markdown),
+        markdown: choice::markdown(&report, &runs, ReportLength::Summary),
     })
 }
 

@@ -23,4 +23,4 @@ pub(crate) mod run_texts;
 pub(crate) mod shard;
 pub(crate) mod stored;
 
-pub(crate) use outcome::{Outcome, ShowArgs, StdoutFormat};
+pub(crate) use outcome::{Outcome, ShowArgs, StdoutFormat, Syntax};

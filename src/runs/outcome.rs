@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::report::report_length::ReportLength;
 use crate::types::Decides;
 use crate::types::manifest::Status;
 
@@ -50,7 +51,7 @@ impl Outcome {
 
     /// The same result, its text wanted as it is unless it is the short one.
     pub(crate) fn in_format(mut self, format: StdoutFormat) -> Self {
-        if format != StdoutFormat::Short {
+        if format != StdoutFormat::SUMMARY {
             self.written.clear();
         }
         self
@@ -61,11 +62,11 @@ impl Outcome {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct ShowArgs {
-    /// Print every table, not only the findings and the accuracies
-    #[arg(long, conflicts_with_all = ["json", "findings"], add = Decides::Nothing)]
+    /// Print all findings and every table
+    #[arg(long, conflicts_with = "findings", add = Decides::Nothing)]
     pub full: bool,
-    /// Print the findings alone, without a table
-    #[arg(long, conflicts_with = "json", add = Decides::Nothing)]
+    /// Print all findings, without a table
+    #[arg(long, add = Decides::Nothing)]
     pub findings: bool,
     /// Print the summary as JSON instead of text
     #[arg(long, add = Decides::Nothing)]
@@ -97,34 +98,52 @@ impl ShowArgs {
     /// The format that the flags ask for.
     #[must_use]
     pub(crate) fn format(&self) -> StdoutFormat {
-        match (self.json, self.full, self.findings) {
-            (true, ..) => StdoutFormat::Json,
-            (_, true, _) => StdoutFormat::Full,
-            (.., true) => StdoutFormat::Findings,
-            _ => StdoutFormat::Short,
+        StdoutFormat {
+            syntax: if self.json {
+                Syntax::Json
+            } else {
+                Syntax::Text
+            },
+            length: match (self.full, self.findings) {
+                (true, _) => ReportLength::Full,
+                (_, true) => ReportLength::Findings,
+                _ => ReportLength::Summary,
+            },
         }
     }
 }
 
-/// Format of a report on standard output. Open questions have one text for all but JSON.
+/// Format of a report on standard output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum StdoutFormat {
-    /// The findings and one table.
-    Short,
-    /// The findings alone.
-    Findings,
-    /// The findings and every table.
-    Full,
-    /// The findings and the table by level, as Markdown.
+pub(crate) struct StdoutFormat {
+    pub(crate) syntax: Syntax,
+    pub(crate) length: ReportLength,
+}
+
+/// Syntax of a report on standard output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Syntax {
+    Text,
     Markdown,
     Json,
 }
 
 impl StdoutFormat {
+    /// The text without a flag.
+    const SUMMARY: Self = Self {
+        syntax: Syntax::Text,
+        length: ReportLength::Summary,
+    };
+
     /// Whether the text is a document of its own, to which no line may be added.
     #[must_use]
     pub(crate) fn is_document(self) -> bool {
-        matches!(self, Self::Markdown | Self::Json)
+        self.syntax != Syntax::Text
+    }
+
+    /// Whether the text is JSON.
+    pub(crate) fn is_json(self) -> bool {
+        self.syntax == Syntax::Json
     }
 }
 

@@ -47,7 +47,9 @@ impl<'f> Topic<'f> {
     /// A sentence about a variant, which is named if there are several lights, or if the levels do not tell it.
     pub(super) fn named(&self, variant: &KindReading, mut sentence: Sentence) -> Sentence {
         if self.lights.len() > 1 || self.shares_levels {
-            sentence.text = format!("{}: {}", light(variant, None), sentence.text);
+            let light = light(variant, None);
+            sentence.text = format!("{light}: {}", sentence.text);
+            sentence.scope.light = Some(light);
         }
         sentence
     }

@@ -30,6 +30,8 @@ pub(crate) use baseline::{against_baseline, no_verdict};
 pub(crate) use models::dark_levels;
 pub(crate) use sample::left_out;
 pub(crate) use self_agreement::self_agreement;
+#[cfg(test)]
+pub(crate) use sentence::Scope;
 pub(crate) use sentence::{Sentence, Tone};
 
 use std::collections::BTreeSet;
@@ -41,9 +43,6 @@ use crate::types::{Family, KindReading};
 use darkqa_score::confusion::FalseAnswer;
 use darkqa_score::findings::Findings;
 use darkqa_score::pooled_kind::PooledKind;
-
-/// Largest number of sentences that are shown first; the others follow on request.
-pub(crate) const FIRST: usize = 8;
 
 /// The line below the sentences: how their signs, p-values and intervals are to be read.
 pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {

@@ -178,6 +178,7 @@ fn enhancer(shown: &Shown<'_>, verdict: Significance, unit: ClusterUnit) -> Opti
     let name = shown.largest.enhancer.as_ref()?;
     let at = &shown.at;
     let mut numbers = Numbers::of(unit);
+    numbers.about(name);
     let size = shown.size(&mut numbers);
     let is_better = verdict == Significance::Better;
     let (text, note) = if is_observer(shown.largest) {
@@ -207,6 +208,7 @@ fn no_effect(
         return Some(format);
     }
     let mut numbers = Numbers::of(unit);
+    numbers.about(name);
     let text = format!("{name} at {}: no effect detected.", runs(unshown, levels));
     let more = format!(
         "; largest at {}{}",
@@ -269,6 +271,10 @@ pub(super) fn detail(finding: &PooledFinding, numbers: &mut Numbers, more: &str)
     let who = models(&finding.models, numbers);
     let strict = &finding.strict;
     let difference = numbers.difference("", strict.difference);
+    match &finding.mean_over[..] {
+        [] => numbers.at(finding.level),
+        over => numbers.at(level_runs(over, over)),
+    }
     let p = numbers.p("p", strict.p_report.unwrap_or(strict.holm));
     let sample = numbers.sample(finding);
     format!("{who}: {difference}, {p}{more}; {sample}")

@@ -79,6 +79,9 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
 fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::of(unit);
     let name = row.first.enhancer.as_ref().map_or("", |name| name.as_str());
+    if let Some(enhancer) = &row.first.enhancer {
+        numbers.about(enhancer);
+    }
     let (model, raw) = (&row.first.model, row.second.condition());
     let text = match verdict(row) {
         Significance::Worse | Significance::Better => {

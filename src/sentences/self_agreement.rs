@@ -271,6 +271,7 @@ fn enhanced(
         of_levels(enhancer, model, &light(variant, None), levels)
     };
     let mut numbers = Numbers::of(found.unit);
+    numbers.about(enhancer);
     let level = strongest.first.level?;
     let difference = numbers.difference("", strongest.strict.paired.difference);
     let p = numbers.p(

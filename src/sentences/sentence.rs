@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::text::words::{counted, p, points};
+use crate::types::EnhancerName;
 use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::estimate::Estimate;
@@ -25,6 +26,20 @@ pub(crate) struct Sentence {
     pub detail: String,
     /// Every number of both, by name, as it is written there.
     pub values: BTreeMap<String, f64>,
+    /// Tells the sentence from others of its kind.
+    #[serde(skip)]
+    pub scope: Scope,
+}
+
+/// The part of a run that a sentence is about.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct Scope {
+    /// The light, if there are several sentences with the same content about different lights.
+    pub light: Option<String>,
+    /// The enhancer.
+    pub subject: Option<String>,
+    /// The level, or the levels, of the difference.
+    pub at: Option<String>,
 }
 
 /// What a sentence shows.
@@ -53,6 +68,11 @@ impl Tone {
             Self::Worse => '−',
             Self::NotShown | Self::Note => '·',
         }
+    }
+
+    /// Whether a gain or a loss is detected.
+    pub(crate) fn is_detected(self) -> bool {
+        matches!(self, Self::Better | Self::Worse)
     }
 
     /// The word of the verdict, for style sheets.
@@ -89,13 +109,27 @@ impl From<Significance> for Tone {
 pub(super) struct Numbers {
     values: BTreeMap<String, f64>,
     unit: ClusterUnit,
+    scope: Scope,
 }
 
 impl Numbers {
     /// No numbers yet; clusters are of this unit.
     pub(super) fn of(unit: ClusterUnit) -> Self {
-        let values = BTreeMap::new();
-        Self { values, unit }
+        Self {
+            values: BTreeMap::new(),
+            unit,
+            scope: Scope::default(),
+        }
+    }
+
+    /// Notes the level, or the levels, of the difference.
+    pub(super) fn at(&mut self, levels: impl ToString) {
+        self.scope.at = Some(levels.to_string());
+    }
+
+    /// Notes the enhancer that the sentence is about.
+    pub(super) fn about(&mut self, enhancer: &EnhancerName) {
+        self.scope.subject = Some(enhancer.to_string());
     }
 
     /// The sentence with these numbers.
@@ -112,6 +146,7 @@ impl Numbers {
             text,
             detail,
             values: self.values,
+            scope: self.scope,
         }
     }
 

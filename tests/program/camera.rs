@@ -65,13 +65,14 @@ fn exposure_times_have_an_axis_of_their_own() {
         "--model script:m.jsonl --data frames --variant all --out run",
     ));
     let run = bench.path("run");
+    let findings = bench.complete(&words("report run --findings"));
     for sentence in [
         "With noise, darkness costs 100.0 points at L5, from 100.0 % at L0.",
         "automatic exposure: Darkness costs 100.0 points at L5, from 100.0 % at L0.",
         "Motion blur costs 100.0 points at T133.33, from 100.0 % at L0.",
     ] {
-        let said = stdout.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(said.contains(sentence), "{sentence}: {stdout}");
+        let said = findings.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(said.contains(sentence), "{sentence}: {findings}");
         let page = read(&run.join("report.html"));
         assert!(page.contains(sentence), "{sentence}");
     }

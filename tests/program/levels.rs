@@ -222,7 +222,7 @@ fn findings_stand_beside_each_other_under_every_reading() {
     );
     for part in [
         "Does each finding hold under every reading?",
-        "Of 2 findings about noise, 2 hold under all 3 noise profiles",
+        "2 of 2 findings about noise hold under all 3 noise profiles",
         "Noise compounds the drop: holds under paper, eld, physical.",
         "the break (threshold EV)",
     ] {

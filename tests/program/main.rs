@@ -64,6 +64,7 @@ mod realism;
 mod record_table;
 mod replicas;
 mod report;
+mod report_head;
 mod report_of_parts;
 mod rooms;
 mod same_bytes;

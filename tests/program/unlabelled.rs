@@ -349,17 +349,16 @@ fn fewer_questions_a_photograph_grow_to_more() {
 }
 
 #[test]
-fn two_models_are_held_against_each_other_first() {
+fn two_models_are_held_against_each_other() {
     let bench = photographs();
     let shown = bench.complete(&words(&format!("{ASKED} --model random")));
     // References are not compared with models.
     assert!(!shown.contains("give the same answer"), "{shown}");
     bench.file("other.jsonl", text(&bench, "eyes.jsonl"));
     let shown = bench.complete(&words(&format!("{ASKED} --model script:other.jsonl")));
-    let shown = on_one_line(shown.split_once('\n').unwrap().1);
-    let first = shown.split(" · ").nth(1).unwrap();
+    let shown = on_one_line(&shown);
     assert!(
-        first.starts_with(
+        shown.contains(
             "At L0 script:eyes.jsonl and script:other.jsonl give the same answer to 100.0 %"
         ),
         "{shown}"
@@ -530,7 +529,7 @@ fn an_enhancer_of_photographs_in_the_dark_does_no_harm_in_the_light() {
     let of = |flags: &str| on_one_line(&bench.complete(&words(&format!("{line} {flags}"))));
     let dark = of("--light dark --out dark");
     assert!(
-        dark.contains("Lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known."),
+        dark.contains("Lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known (trained on this program's synthesis)."),
         "{dark}"
     );
     assert!(!dark.contains("harm"), "{dark}");

@@ -22,6 +22,7 @@ use crate::drawing::chart;
 use crate::error::Result;
 use crate::report::json;
 use crate::report::products::{PAGE, table_files};
+use crate::report::report_length::ReportLength;
 use crate::text::alert::{Alert, lines};
 use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
@@ -75,6 +76,7 @@ pub(crate) fn summary_json(
     report: &OpenReport<'_>,
     tables: &[Table],
     folder: Option<&Path>,
+    length: ReportLength,
 ) -> Result<String> {
     let head = Head {
         schema: "darkqa.openeqa-summary/1",
@@ -88,7 +90,7 @@ pub(crate) fn summary_json(
         readings: report.light_readings(),
         alerts: report.alerts,
     };
-    json::document(head, &tables[0])
+    json::document(head, &tables[0], tables, length)
 }
 
 /// The text at the end of a run: its progress if it is not complete, the scores by level, split and category, the number of

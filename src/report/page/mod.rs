@@ -25,6 +25,7 @@ use serde_json::{Value, json};
 use crate::drawing::chart::Figure;
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
+use crate::report::finding_groups::{FindingGroup, FindingGroups};
 use crate::report::short::{head, who_is_judged};
 use crate::report::template::filled;
 use crate::sentences::{Sentence, how_to_read};
@@ -61,14 +62,15 @@ struct Page<'a> {
     /// Heading: the title without the names of runs.
     heading: String,
     /// The first screen; `None` of a page without one.
-    head: Option<PageHead<'a>>,
+    head: Option<PageHead>,
     /// What families of questions are called.
     family: &'static str,
     /// Warnings at the top of the page.
     alerts: Vec<&'a str>,
     intro: Vec<String>,
-    /// The findings in words; `None` of an experiment that has none.
-    sentences: Option<Vec<PageSentence<'a>>>,
+    /// The number of findings; `None` of an experiment that has none.
+    findings: Option<usize>,
+    groups: Vec<PageGroup<'a>>,
     how_to_read: String,
     /// Heading of the table of answers against answers.
     answers_title: &'static str,
@@ -80,6 +82,13 @@ struct Page<'a> {
     script: String,
 }
 
+/// A group of findings, as the template reads it.
+#[derive(Serialize)]
+struct PageGroup<'a> {
+    title: &'static str,
+    sentences: Vec<PageSentence<'a>>,
+}
+
 /// A finding in words, as the template reads it.
 #[derive(Serialize)]
 struct PageSentence<'a> {
@@ -87,6 +96,18 @@ struct PageSentence<'a> {
     sign: char,
     text: &'a str,
     detail: &'a str,
+}
+
+impl<'a> PageGroup<'a> {
+    fn new(group: &FindingGroup<'a>) -> Self {
+        let sentences = group.findings.iter().flat_map(|finding| &finding.sentences);
+        Self {
+            title: group.title,
+            sentences: sentences
+                .map(|sentence| PageSentence::new(sentence))
+                .collect(),
+        }
+    }
 }
 
 impl<'a> PageSentence<'a> {
@@ -105,11 +126,11 @@ pub(crate) struct PageContent<'a> {
     /// The models in words, for the heading.
     pub(crate) who: String,
     /// The first screen; `None` of a page without one.
-    pub(in crate::report) head: Option<PageHead<'a>>,
+    pub(in crate::report) head: Option<PageHead>,
     /// Lines about the numbers as a whole.
     pub(crate) intro: Vec<String>,
     pub(crate) alerts: &'a [Alert],
-    pub(crate) sentences: &'a [Sentence],
+    pub(in crate::report) groups: FindingGroups<'a>,
     pub(crate) how_to_read: String,
     pub(crate) tables: &'a [Table],
     /// The sections in order.
@@ -133,12 +154,13 @@ pub(crate) fn page<'a>(
     inputs: &PageInputs<'a>,
 ) -> Result<String> {
     let findings = report.findings;
+    let groups = FindingGroups::new(&report.sentences);
     let content = PageContent {
         who: who_is_judged(&findings.grid),
-        head: PageHead::new(report, inputs)?,
+        head: PageHead::new(report, &groups, inputs)?,
         intro: intro(report),
         alerts: &report.alerts,
-        sentences: &report.sentences,
+        groups,
         how_to_read: how_to_read(&report.sentences),
         tables: &report.tables,
         sections: &SECTIONS,
@@ -172,7 +194,8 @@ pub(crate) fn page_of<'a>(
             head: content.head,
             family: "family",
             alerts: content.alerts.iter().map(|alert| &*alert.text).collect(),
-            sentences: Some(content.sentences.iter().map(PageSentence::new).collect()),
+            findings: Some(content.groups.count()),
+            groups: content.groups.all().iter().map(PageGroup::new).collect(),
             how_to_read: content.how_to_read,
             answers_title: content.answers_title,
             intro: [content.intro, Vec::from_iter(sample::words(content.grid))].concat(),
@@ -215,7 +238,8 @@ pub(in crate::report) fn page_of_open_questions(
             head: None,
             family: "category",
             alerts: content.alerts.iter().map(String::as_str).collect(),
-            sentences: None,
+            findings: None,
+            groups: Vec::new(),
             how_to_read: String::new(),
             answers_title: "",
             intro: content.intro,

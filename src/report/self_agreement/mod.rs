@@ -14,9 +14,11 @@ mod text;
 use serde::Serialize;
 
 use crate::error::Result;
+use crate::report::finding_groups::FindingGroups;
 use crate::report::json::{Rows, RunList, RunsHead, document};
-use crate::report::page::{PageContent, PageInputs, page_of};
+use crate::report::page::{PageContent, PageHead, PageInputs, page_of};
 use crate::report::products::files;
+use crate::report::report_length::ReportLength;
 use crate::report::short::who_is_judged;
 use crate::sentences::Sentence;
 use crate::text::alert::Alert;
@@ -26,7 +28,7 @@ use crate::text::words::counted;
 use darkqa_score::self_agreement::SelfAgreement;
 
 pub(crate) use agreement_report::AgreementReport;
-pub(crate) use text::{TextLength, text};
+pub(crate) use text::text;
 
 use self::measure::{AGREEMENT, HOW_TO_READ};
 use crate::types::Truths;
@@ -40,12 +42,13 @@ pub(crate) fn products<'a>(
     inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figures::figures(report.found)?;
+    let groups = FindingGroups::new(&report.sentences);
     let content = PageContent {
         who: who_is_judged(&report.found.grid),
-        head: None,
+        head: (groups.count() > 0).then(|| PageHead::without_images(&groups)),
         intro: intro(report.found),
         alerts: &report.alerts,
-        sentences: &report.sentences,
+        groups,
         how_to_read: HOW_TO_READ.to_owned(),
         tables: &report.tables,
         sections: &sections::SECTIONS,
@@ -116,7 +119,11 @@ struct Head<'a> {
 ///
 /// # Errors
 /// If the document cannot be written.
-pub(crate) fn summary(report: &AgreementReport<'_>, runs: RunList<'_>) -> Result<String> {
+pub(crate) fn summary(
+    report: &AgreementReport<'_>,
+    runs: RunList<'_>,
+    length: ReportLength,
+) -> Result<String> {
     let mut tables = report.tables.iter();
     let own_answers = tables.find(|table| table.name == tables::OWN_ANSWERS);
     let head = Head {
@@ -127,5 +134,5 @@ pub(crate) fn summary(report: &AgreementReport<'_>, runs: RunList<'_>) -> Result
         findings: &report.sentences,
         own_answers: own_answers.map(Rows::of),
     };
-    document(head, &tables::summary(report.found))
+    document(head, &tables::summary(report.found), &report.tables, length)
 }

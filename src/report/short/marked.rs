@@ -1,4 +1,4 @@
-//! Alerts and findings as lines of the terminal, with their signs in colour: [`alert`] and [`sentence`].
+//! Alerts and findings as lines of the terminal, with their signs in colour: [`alert`], [`summary`], [`signed`] and [`sentence`].
 //!
 //! Colours stand in the text as ANSI sequences; whoever prints it takes them out where the terminal has none. A sign or a word says
 //! the same as each colour.
@@ -12,7 +12,7 @@ use crate::text::wrapped::wrapped;
 use crate::types::shown_text::shown;
 
 /// An alert, wrapped.
-pub(in crate::report) fn alert(alert: &Alert) -> String {
+pub(super) fn alert(alert: &Alert) -> String {
     marked(
         &wrapped("! ", &shown(&alert.text), "  "),
         1,
@@ -21,18 +21,35 @@ pub(in crate::report) fn alert(alert: &Alert) -> String {
 }
 
 /// A sentence with its sign, and its detail beneath.
-pub(in crate::report) fn sentence(sentence: &Sentence) -> String {
-    let sign = format!(" {}  ", sentence.tone.sign());
-    let style = match sentence.tone {
+pub(super) fn sentence(sentence: &Sentence) -> String {
+    let first = format!(" {}  ", sentence.tone.sign());
+    let text = wrapped(&first, &shown(&sentence.text), "    ");
+    signed(&text, 2, sentence.tone) + &wrapped("    ", &shown(&sentence.detail), "    ")
+}
+
+/// Lines whose sign ends at a column, in the colour of the tone.
+pub(super) fn signed(lines: &str, end: usize, tone: Tone) -> String {
+    let style = match tone {
         Tone::Better => colour(AnsiColor::Green),
         Tone::Worse => colour(AnsiColor::Red),
         Tone::NotShown | Tone::Note => Style::new().bold(),
     };
-    let text = wrapped(&sign, &shown(&sentence.text), "    ");
-    marked(&text, 2, style) + &wrapped("    ", &shown(&sentence.detail), "    ")
+    marked(lines, end, style)
 }
 
-/// A table with its marks of what is below the words alone in red.
+/// The summary of a report, in bold.
+pub(super) fn summary(text: &str) -> String {
+    let lines = wrapped(" ", &shown(text), " ");
+    let style = Style::new().bold();
+    format!("{style}{}{style:#}\n", lines.trim_end())
+}
+
+/// The title of a group of findings.
+pub(super) fn heading(title: &str) -> String {
+    format!(" {title}\n")
+}
+
+/// A table with its marks of what is below the score without images in red.
 pub(super) fn table(text: &str) -> String {
     let style = colour(AnsiColor::Red);
     shown(text).replace(BELOW, &format!("{style}{BELOW}{style:#}"))

@@ -71,7 +71,7 @@ fn reported<D: Detail>(
     run.manifest.count(Counts::new(trials, failed));
     let mut outcome = write(store, run, show.format())?;
     record_table::update(store.folder(), show.table())?;
-    if show.format() != StdoutFormat::Json {
+    if !show.format().is_json() {
         outcome.output.insert_str(0, text);
     }
     Ok(outcome)

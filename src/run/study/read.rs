@@ -17,7 +17,6 @@ use crate::runs::stored::StoredRun;
 
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
-use crate::runs::StdoutFormat;
 use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifest::{Counts, RunManifest, Status};
@@ -135,7 +134,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     run.manifest.count(Counts::new(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;
     record_table::update(&args.out, args.show.table())?;
-    if args.show.format() != StdoutFormat::Json {
+    if !args.show.format().is_json() {
         outcome.output.insert_str(0, &summary(&counts));
     }
     Ok(outcome)

@@ -86,7 +86,10 @@ fn first_screen(browser: &mut Browser) {
         format!("[...document.querySelectorAll('{selector}')].map(e => e.textContent)")
     };
     let groups = browser.evaluate(&texts(".first-findings th"));
-    assert_eq!(groups, json!(["Darkness", "Noise", "Without images"]));
+    assert_eq!(
+        groups,
+        json!(["Darkness", "Noise", "Without images", "Sample"])
+    );
     assert_eq!(
         browser.evaluate("document.querySelectorAll('#figure-head .panel svg').length"),
         1
