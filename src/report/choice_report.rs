@@ -1,7 +1,7 @@
 //! All that a report of questions with choices shows: [`ChoiceReport`].
 
 use crate::sentences::{Sentence, sentences};
-use crate::tables::{EnhancerRow, enhancers, observer_notes, tables};
+use crate::tables::{EnhancerRow, enhancers, observer_notes, tables, with_training};
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::table::Table;
 use darkqa_score::findings::Findings;
@@ -32,7 +32,7 @@ impl<'a> ChoiceReport<'a> {
             findings: shown,
             alerts: alerts.into_iter().chain(notes).collect(),
             sentences: sentences(shown),
-            tables: tables(findings),
+            tables: with_training(tables(findings), &findings.grid.listing),
         }
     }
 

@@ -255,7 +255,7 @@ impl<'a> Finding<'a> {
             .copied()
             .filter(|sentence| sentence.scope.light == shown.scope.light)
             .filter(|sentence| sentence.tone.is_detected() || *sentence == shown)
-            .map(|sentence| sentence.text.trim_end_matches('.'))
+            .map(Sentence::claim)
             .collect();
         let more = texts.len().saturating_sub(MAX_CLAUSES);
         texts.truncate(MAX_CLAUSES);
@@ -263,7 +263,7 @@ impl<'a> Finding<'a> {
         if more > 0 {
             text += &format!("; {more} more");
         }
-        text
+        text + &shown.scope.training
     }
 
     /// The intervals in words; empty of a finding without one.

@@ -6,7 +6,9 @@ use super::join::JoinedRun;
 use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::counted;
-use crate::types::enhancer_note::{ELSEWHERE, EnhancerNote, JudgedImages, ProbeOutcome};
+use crate::types::enhancer_note::{
+    ELSEWHERE, EnhancerNote, JudgedImages, ProbeOutcome, TRAINED_ON,
+};
 
 /// A row for each enhancer; several runs that used it in the same way have one.
 pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
@@ -100,6 +102,7 @@ fn how(note: &EnhancerNote) -> String {
     let parts = [
         said(ELSEWHERE, "enhanced "),
         said("preset", "preset "),
+        said(TRAINED_ON, "trained on "),
         said("range_in", "fed "),
         said("color", "colours "),
         said("input = ", "input = "),

@@ -7,6 +7,7 @@ use serde_json::Value;
 use super::join::{Joined, JoinedRun};
 use super::settings::is_of_people;
 use crate::runs::renamed::ADAPTED_FOR;
+use crate::runs::training::training_data;
 use crate::types::{ModelColumn, ModelListing};
 use darkqa_score::record::Detail;
 
@@ -30,6 +31,9 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
             for name in names.filter_map(Value::as_str) {
                 listing.add_people(shown(name));
             }
+        }
+        for (enhancer, data) in training_data(&run.manifest) {
+            listing.add_training(enhancer, data);
         }
         for (field, changes) in &run.manifest.settings {
             if let Some(model) = field.strip_prefix(ADAPTED_FOR) {

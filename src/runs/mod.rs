@@ -22,5 +22,6 @@ pub(crate) mod run_plan;
 pub(crate) mod run_texts;
 pub(crate) mod shard;
 pub(crate) mod stored;
+pub(crate) mod training;
 
 pub(crate) use outcome::{Outcome, ShowArgs, StdoutFormat, Syntax};

@@ -77,6 +77,9 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(answers::fidelity(findings));
     sentences.extend(answers::unread(findings));
     sentences.extend(sample::power(&findings.pooled, findings.unit));
+    for sentence in &mut sentences {
+        sentence.name_training(&findings.grid.listing);
+    }
     sentences
 }
 

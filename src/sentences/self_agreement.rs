@@ -38,6 +38,9 @@ pub(crate) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
         }
         sentences.extend(way_out(found, model));
     }
+    for sentence in &mut sentences {
+        sentence.name_training(&found.grid.listing);
+    }
     sentences
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::text::words::{counted, p, points};
-use crate::types::EnhancerName;
+use crate::types::{EnhancerName, ModelListing};
 use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::estimate::Estimate;
@@ -31,6 +31,23 @@ pub(crate) struct Sentence {
     pub scope: Scope,
 }
 
+impl Sentence {
+    /// Adds the training data of the enhancer to the text, if they are known.
+    pub(super) fn name_training(&mut self, listing: &ModelListing) {
+        let enhancer = self.scope.subject.as_deref();
+        if let Some(training) = enhancer.and_then(|enhancer| listing.training(enhancer)) {
+            self.scope.training = format!(" ({training})");
+            self.text = format!("{}{}.", self.claim(), self.scope.training);
+        }
+    }
+
+    /// The text without training data and full stop.
+    pub(crate) fn claim(&self) -> &str {
+        let text = self.text.trim_end_matches('.');
+        text.strip_suffix(&self.scope.training).unwrap_or(text)
+    }
+}
+
 /// The part of a run that a sentence is about.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Scope {
@@ -40,6 +57,8 @@ pub(crate) struct Scope {
     pub subject: Option<String>,
     /// The level, or the levels, of the difference.
     pub at: Option<String>,
+    /// Training data of the enhancer at the end of the text; empty if unknown.
+    pub training: String,
 }
 
 /// What a sentence shows.

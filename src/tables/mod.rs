@@ -22,6 +22,7 @@ mod strict_groups;
 mod subjects;
 mod summary;
 mod thresholds;
+mod training;
 
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::{Table, TableBuilder, TableCell};
@@ -44,6 +45,7 @@ pub(crate) use sections::{ENHANCERS, SECTIONS, Section};
 pub(crate) use strict_groups::strict_groups;
 pub(crate) use summary::{reading, summary as summary_rows};
 pub(crate) use thresholds::why as level_words;
+pub(crate) use training::with_training;
 
 /// All tables of an evaluation; the first is the summary. What is not shown is in the files alone.
 #[must_use]
@@ -67,9 +69,9 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
         by_reading::by_reading(findings),
         vec![best::best(findings)],
         vec![families::families(findings)],
+        fails_first::fails_first(findings).into(),
         strict_groups(findings),
         pooled::pooled(findings),
-        fails_first::fails_first(findings).into(),
         comparisons::comparisons(findings),
         answers::answers(findings),
         calibration::calibration(findings),

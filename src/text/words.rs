@@ -67,6 +67,11 @@ pub(crate) fn percent(share: f64) -> String {
     format!("{:.1}", 100.0 * share).replace('-', "−")
 }
 
+/// Whether a condition or a light in words, as `L3-noise+lift` or `with noise + lift`, is enhanced by an enhancer.
+pub(crate) fn names_enhancer(text: &str, enhancer: &str) -> bool {
+    text.split([' ', '+']).any(|word| word == enhancer)
+}
+
 /// A difference of shares in percentage points, with its sign and one decimal.
 pub(crate) fn points(difference: f64) -> String {
     let text = format!("{:+.1}", 100.0 * difference);

@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 
 use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, DarkMark, LineStyle, Panel, PanelContent, PlotLine};
-use crate::text::words::{counted, family as family_name, light_with};
+use crate::text::words::{counted, family as family_name, light_with, names_enhancer};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 use darkqa_score::choice::ReadingMode;
@@ -280,6 +280,18 @@ impl<'a> Overview<'a> {
         )
     }
 
+    /// The training data of the enhancers in some panels; empty if none are known.
+    fn training(&self, panels: &[Panel]) -> String {
+        let lines = || panels.iter().flat_map(|panel| &panel.lines);
+        self.findings
+            .grid
+            .listing
+            .trainings()
+            .filter(|(enhancer, _)| lines().any(|line| names_enhancer(&line.name, enhancer)))
+            .map(|(enhancer, training)| format!("; {enhancer}: {training}"))
+            .collect()
+    }
+
     /// The number of items, as `177 items in 24 scenes`.
     fn items(&self) -> String {
         let grid = &self.findings.grid;
@@ -459,9 +471,9 @@ impl<'a> Overview<'a> {
         }
         let chart = Chart {
             measure,
+            note: self.note() + &self.training(&panels),
             panels,
             columns,
-            note: self.note(),
         };
         Some((caption.to_owned(), chart))
     }

@@ -52,6 +52,9 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
         Some(variant) => overview.mean_by_enhancer(variant, &models),
         None => None,
     };
+    let training = by_enhancer
+        .as_ref()
+        .map_or_else(String::new, |(_, chart)| overview.training(&chart.panels));
     OverviewPanels {
         charts: vec![
             ("models", by_model),
@@ -68,7 +71,7 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
         variant,
         enhancer,
         // The caption of each panel says what its bands are.
-        note: format!("n = {}; strict reading", overview.items()),
+        note: format!("n = {}; strict reading{training}", overview.items()),
     }
 }
 

@@ -9,7 +9,7 @@ use super::preset::Preset;
 use super::sidecar::ModelSidecar;
 use super::size_plan::SizeRule;
 use super::size_search::MULTIPLES;
-use darkqa_ground::types::enhancer_note::ConventionLine;
+use darkqa_ground::types::enhancer_note::{ConventionLine, TRAINED_ON};
 
 /// Source of ranges that nothing states.
 const ASSUMED: &str = "assumed";
@@ -65,6 +65,10 @@ impl Description {
             None => "not stated; --llie-options tile=N tries it and checks every seam".to_owned(),
         };
         lines.add("tile", convention.tile.unwrap_or(Tile::None), source);
+        if let Some(data) = &convention.trained_on {
+            let source = self.source(|s| s.trained_on.is_some(), "");
+            lines.add(TRAINED_ON, data, source);
+        }
         lines.0
     }
 

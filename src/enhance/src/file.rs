@@ -98,6 +98,23 @@ impl ModelFile {
         })
     }
 
+    /// The enhancer of the program with a digest; `None` if no enhancer of this version has it.
+    #[must_use]
+    pub fn built_in_with(digest: &str) -> Option<Self> {
+        darkqa_models::BUILT_IN
+            .iter()
+            .filter_map(|built_in| Self::read(Path::new(built_in.name)).ok())
+            .find(|file| file.digest.to_string() == digest)
+    }
+
+    /// Data that the model was trained on; `None` if neither sidecar nor preset states them.
+    #[must_use]
+    pub fn trained_on(&self) -> Option<&str> {
+        let preset = self.preset.as_ref();
+        let preset = preset.and_then(|preset| preset.content.sidecar.trained_on.as_deref());
+        self.sidecar.trained_on.as_deref().or(preset)
+    }
+
     /// The same file, with this output as the default to read.
     #[must_use]
     pub fn with_output(mut self, place: usize) -> Self {
@@ -350,6 +367,7 @@ mod tests {
             "# a remark",
             "color = \"rgb\"\npad = \"reflect\"\nrounding = \"round\"",
             "multiple = 1\nmean = [0, 0, 0]\nstd = [1, 1, 1]",
+            "trained_on = \"LOL-v1\"",
             "[extra]",
         ] {
             assert_eq!(digest(same), bare, "{same}");

@@ -66,6 +66,9 @@ pub(super) struct ModelSidecar {
     pub(super) tile: Option<Tile>,
     /// Rounding of values to bytes.
     pub(super) rounding: Option<Rounding>,
+    /// Data that the model was trained on, as reports name them; no part of a digest, because they decide no image.
+    #[serde(default, skip_serializing)]
+    pub(super) trained_on: Option<String>,
     /// Values of further inputs, by their names.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) extra: BTreeMap<String, ExtraValue>,
@@ -141,6 +144,9 @@ const MOST_PIXELS: usize = 100_000_000;
 
 /// Largest multiple, in pixels; chosen: twice what any published model needs, and a small image filled up to it still fits anywhere.
 const MOST_MULTIPLE: usize = 1024;
+
+/// Most characters of the name of training data; chosen, because it stands next to each result.
+const MOST_TRAINED_ON: usize = 60;
 
 /// Most further inputs; chosen.
 const MOST_EXTRA: usize = 64;
@@ -240,6 +246,14 @@ impl ModelSidecar {
                 ));
             }
         }
+        let is_line = |text: &String| {
+            text.chars().count() <= MOST_TRAINED_ON && !text.contains(char::is_control)
+        };
+        if !self.trained_on.iter().all(is_line) {
+            return Err(format!(
+                "trained_on is one line of at most {MOST_TRAINED_ON} characters"
+            ));
+        }
         if self.extra.len() > MOST_EXTRA {
             return Err(format!("extra has at most {MOST_EXTRA} inputs"));
         }
@@ -299,6 +313,7 @@ impl ModelSidecar {
             output,
             tile: self.tile.or(preset.tile),
             rounding: self.rounding.or(preset.rounding),
+            trained_on: self.trained_on.or_else(|| preset.trained_on.clone()),
             extra,
         }
     }
@@ -330,6 +345,7 @@ mod tests {
             color_out = "rgb"
             channels = "y"
             input = "image ^ 0.8"
+            trained_on = "LOL-v1"
             [extra]
             exposure = 0.5
             z = { noise = "normal", std = 0.9 }

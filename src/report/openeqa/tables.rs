@@ -1,7 +1,7 @@
 //! Tables of a run of open questions: [`tables`].
 
 use super::open_report::OpenReport;
-use crate::tables::{enhancers, reading};
+use crate::tables::{enhancers, reading, with_training};
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::text::latex::escaped;
 use crate::text::table::ColumnKind::{Accuracy, Count, Points, Share, Text};
@@ -35,6 +35,7 @@ pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
         let series = whole.series.keys();
         tables.extend(series.map(|series| by_group(report.summary, series, &whole, &groups)));
     }
+    let mut tables = with_training(tables, &report.summary.listing);
     let used = enhancers(report.enhancers);
     tables.extend(used.map(|table| Table {
         section: SECTION,

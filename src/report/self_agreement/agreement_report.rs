@@ -2,7 +2,7 @@
 
 use super::tables;
 use crate::sentences::{Sentence, self_agreement};
-use crate::tables::{EnhancerRow, enhancers};
+use crate::tables::{EnhancerRow, enhancers, with_training};
 use crate::text::alert::Alert;
 use crate::text::table::Table;
 use darkqa_score::self_agreement::SelfAgreement;
@@ -25,7 +25,7 @@ impl<'a> AgreementReport<'a> {
         alerts: Vec<Alert>,
         used: &[EnhancerRow],
     ) -> Self {
-        let mut tables = tables::tables(found);
+        let mut tables = with_training(tables::tables(found), &found.grid.listing);
         tables.extend(enhancers(used));
         Self {
             sentences: self_agreement(found),

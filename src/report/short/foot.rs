@@ -110,6 +110,9 @@ pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String
     let listing = &report.findings.grid.listing;
     let foot = listing.foot(models.iter().copied());
     let mut text = foot.map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
+    for (enhancer, training) in listing.trainings() {
+        text += &wrapped(" ", &format!("{enhancer}: {training}"), "   ");
+    }
     for model in models.iter().filter(|model| **model != CHANCE) {
         let facts = listing.columns().iter().map(|column| {
             let fact = Some(listing.fact(*column, model)).filter(|fact| !fact.is_empty());

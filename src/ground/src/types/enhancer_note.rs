@@ -9,6 +9,9 @@ use super::{Flaw, SizeLog};
 /// Key of the statement that images were enhanced elsewhere.
 pub const ELSEWHERE: &str = "enhanced";
 
+/// Key of the statement of the data that the model was trained on.
+pub const TRAINED_ON: &str = "trained_on";
+
 /// How a run used an enhancer, and whether its images can be enhanced images.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct EnhancerNote {
@@ -97,6 +100,13 @@ pub struct FlawedImage {
 }
 
 impl EnhancerNote {
+    /// Data that the model was trained on; `None` if nobody stated them.
+    #[must_use]
+    pub fn trained_on(&self) -> Option<&str> {
+        let line = self.convention.iter().find(|line| line.key == TRAINED_ON)?;
+        Some(&line.value)
+    }
+
     /// The note of a run that used the enhancer before, with this one for what came later.
     #[must_use]
     pub fn after(mut self, earlier: Option<Self>) -> Self {

@@ -29,6 +29,8 @@ pub struct ModelListing {
     columns: Vec<ModelColumn>,
     /// The names under which people answered.
     people: BTreeSet<String>,
+    /// Data that enhancers were trained on, by the enhancer's name.
+    training: BTreeMap<String, String>,
 }
 
 /// A further column of tables, about the model of a row.
@@ -124,6 +126,24 @@ impl ModelListing {
     /// Notes that people answered under this name.
     pub fn add_people(&mut self, name: String) {
         self.people.insert(name);
+    }
+
+    /// Notes the data that an enhancer was trained on.
+    pub fn add_training(&mut self, enhancer: &str, data: String) {
+        self.training.insert(enhancer.to_owned(), data);
+    }
+
+    /// The enhancers with known training data, each with `trained on DATA`.
+    pub fn trainings(&self) -> impl Iterator<Item = (&str, String)> {
+        let training = self.training.iter();
+        training.map(|(enhancer, data)| (&**enhancer, format!("trained on {data}")))
+    }
+
+    /// `trained on DATA` of an enhancer; `None` if its training data are unknown.
+    #[must_use]
+    pub fn training(&self, enhancer: &str) -> Option<String> {
+        let data = self.training.get(enhancer)?;
+        Some(format!("trained on {data}"))
     }
 
     /// True if people answered under this name, or under the name before a run or a time in brackets, as `human (one)`.
