@@ -5,6 +5,7 @@ mod confidence;
 mod names;
 mod overview;
 mod photographed;
+mod split;
 mod story;
 mod tables;
 mod thresholds;
@@ -23,6 +24,7 @@ use darkqa_score::subject::{CHANCE, Subject, pooled_models};
 
 pub(crate) use names::{KnownNames, Names};
 pub(crate) use overview::{OverviewPanels, overview};
+pub(crate) use split::split;
 pub(crate) use story::{StoryCurves, story_curves};
 pub(crate) use tables::paper_tables;
 pub(crate) use thresholds::without_threshold;
@@ -472,7 +474,7 @@ impl<'a> Overview<'a> {
         let chart = Chart {
             measure,
             note: self.note() + &self.training(&panels),
-            panels,
+            panels: split(panels),
             columns,
         };
         Some((caption.to_owned(), chart))

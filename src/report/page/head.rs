@@ -7,7 +7,7 @@ use super::inputs::PageInputs;
 use super::strip::Strip;
 use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, Figure};
-use crate::drawing::figures::{Names, overview};
+use crate::drawing::figures::{Names, overview, split};
 use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
@@ -135,6 +135,7 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
         .map(|(caption, chart)| {
             let chart = Chart {
                 note: panels.note.clone(),
+                panels: split(chart.panels.clone()),
                 ..chart.clone()
             };
             figure("head", caption, &Drawn::Lines(chart))

@@ -1,0 +1,89 @@
+//! Panels of few lines, from panels with any number: [`split`].
+
+use crate::drawing::chart::{Panel, PanelContent, PlotLine};
+
+/// Most curves of a panel; chosen: as many as there are colours that everybody can tell apart.
+const MAX_CURVES: usize = 6;
+
+/// Panels of at most [`MAX_CURVES`] curves each. A reference line is in each panel that has the curve of its model, or in all.
+pub(crate) fn split(panels: Vec<Panel>) -> Vec<Panel> {
+    panels.into_iter().flat_map(split_panel).collect()
+}
+
+fn split_panel(panel: Panel) -> Vec<Panel> {
+    let is_curve = |line: &PlotLine| matches!(line.content, PanelContent::Curve(_));
+    let count = panel.lines.iter().filter(|line| is_curve(line)).count();
+    if count <= MAX_CURVES {
+        return vec![panel];
+    }
+    let (curves, others): (Vec<PlotLine>, Vec<PlotLine>) =
+        panel.lines.into_iter().partition(is_curve);
+    let has_curve =
+        |curves: &[PlotLine], line: &PlotLine| curves.iter().any(|curve| curve.model == line.model);
+    // Parts of nearly equal size.
+    let parts = count.div_ceil(MAX_CURVES);
+    let size = count.div_ceil(parts);
+    curves
+        .chunks(size)
+        .enumerate()
+        .map(|(part, own)| Panel {
+            title: format!("{} ({} of {parts})", panel.title, part + 1),
+            model: panel.model.clone(),
+            lines: own
+                .iter()
+                .chain(
+                    others
+                        .iter()
+                        .filter(|line| has_curve(own, line) || !has_curve(&curves, line)),
+                )
+                .cloned()
+                .collect(),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawing::chart::LineStyle;
+
+    fn line(name: &str, content: PanelContent, model: Option<&str>) -> PlotLine {
+        PlotLine {
+            name: name.to_owned(),
+            style: LineStyle(0),
+            content,
+            model: model.map(str::to_owned),
+        }
+    }
+
+    fn panel(curves: usize) -> Panel {
+        let names: Vec<String> = (0..curves).map(|index| format!("m{index}")).collect();
+        let curves = names
+            .iter()
+            .map(|name| line(name, PanelContent::Curve(Vec::new()), Some(name)));
+        let others = [
+            line("m0 without images", PanelContent::Flat(0.4), Some("m0")),
+            line("chance", PanelContent::Flat(0.3), None),
+        ];
+        Panel {
+            title: "t".to_owned(),
+            lines: curves.chain(others).collect(),
+            model: None,
+        }
+    }
+
+    #[test]
+    fn no_panel_has_more_than_six_curves() {
+        assert_eq!(split(vec![panel(6)]).len(), 1);
+        let parts = split(vec![panel(7)]);
+        let names = |panel: &Panel| -> Vec<String> {
+            panel.lines.iter().map(|line| line.name.clone()).collect()
+        };
+        assert_eq!(
+            names(&parts[0]),
+            ["m0", "m1", "m2", "m3", "m0 without images", "chance"]
+        );
+        assert_eq!(names(&parts[1]), ["m4", "m5", "m6", "chance"]);
+        assert_eq!(parts[1].title, "t (2 of 2)");
+    }
+}
