@@ -1,7 +1,7 @@
 //! The findings of a report by group: [`FindingGroups`]. The page, the terminal and Markdown open with the same summary and the same
 //! finding of each group, and list all findings in the same groups.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 
 use crate::sentences::Sentence;
 use crate::text::words::{percent, points};
@@ -261,7 +261,7 @@ impl<'a> Finding<'a> {
         texts.truncate(MAX_CLAUSES);
         let mut text = texts.join("; ");
         if more > 0 {
-            text += &format!("; {more} more");
+            let _ = write!(text, "; {more} more");
         }
         text + &shown.scope.training
     }

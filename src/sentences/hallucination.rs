@@ -136,7 +136,7 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
 /// Share, interval, the share at L0, the limit and n of an answer.
 fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut Numbers) -> String {
     let share = answer.collapse.share;
-    numbers.at(answer.level);
+    numbers.at(&answer.level);
     let ends = [
         ("share", share.value),
         ("low", share.low),

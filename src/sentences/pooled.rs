@@ -272,8 +272,8 @@ pub(super) fn detail(finding: &PooledFinding, numbers: &mut Numbers, more: &str)
     let strict = &finding.strict;
     let difference = numbers.difference("", strict.difference);
     match &finding.mean_over[..] {
-        [] => numbers.at(finding.level),
-        over => numbers.at(level_runs(over, over)),
+        [] => numbers.at(&finding.level),
+        over => numbers.at(&level_runs(over, over)),
     }
     let p = numbers.p("p", strict.p_report.unwrap_or(strict.holm));
     let sample = numbers.sample(finding);

@@ -142,7 +142,7 @@ impl Numbers {
     }
 
     /// Notes the level, or the levels, of the difference.
-    pub(super) fn at(&mut self, levels: impl ToString) {
+    pub(super) fn at(&mut self, levels: &impl ToString) {
         self.scope.at = Some(levels.to_string());
     }
 

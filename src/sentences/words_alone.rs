@@ -198,7 +198,7 @@ fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<S
         format!(" against {}", comparison.second.model)
     };
     let paired = &comparison.strict.paired;
-    numbers.at(level);
+    numbers.at(&level);
     let difference = numbers.difference("", paired.difference);
     let tested = &comparison.strict;
     let p = numbers.p("p", tested.p_report.unwrap_or(tested.holm));

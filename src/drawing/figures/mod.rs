@@ -285,13 +285,15 @@ impl<'a> Overview<'a> {
     /// The training data of the enhancers in some panels; empty if none are known.
     fn training(&self, panels: &[Panel]) -> String {
         let lines = || panels.iter().flat_map(|panel| &panel.lines);
-        self.findings
+        let notes: Vec<String> = self
+            .findings
             .grid
             .listing
             .trainings()
             .filter(|(enhancer, _)| lines().any(|line| names_enhancer(&line.name, enhancer)))
             .map(|(enhancer, training)| format!("; {enhancer}: {training}"))
-            .collect()
+            .collect();
+        notes.concat()
     }
 
     /// The number of items, as `177 items in 24 scenes`.

@@ -1,5 +1,7 @@
 //! The opening of a report in the terminal: [`findings`].
 
+use std::fmt::Write;
+
 use super::marked;
 use crate::report::finding_groups::{Finding, FindingGroups};
 use crate::report::report_length::ReportLength;
@@ -28,7 +30,7 @@ pub(in crate::report) fn findings(
     if groups.count() == 0 {
         return text + "\n";
     }
-    text += &format!("\n{}\n", marked::summary(&groups.summary()));
+    let _ = write!(text, "\n{}\n", marked::summary(&groups.summary()));
     if length == ReportLength::Summary {
         for (title, finding) in groups.first() {
             text += &row(title, finding);
