@@ -1,4 +1,4 @@
-//! What the figures of reports show: a [`Chart`] of lines over the levels, and others.
+//! Figures of reports: a [`Chart`] of lines over the levels, and others.
 //!
 //! Lines differ by colour, and also by dash and marker, so that they can be distinguished without colour.
 
@@ -39,7 +39,7 @@ pub(crate) struct Figure {
     pub caption: String,
     /// The figure as SVG.
     pub svg: String,
-    /// What it shows, for the script of the page; `None` of a figure that the page shows as it is.
+    /// The data of the chart for the script of the page; `None` for a figure that the page shows as it is.
     pub data: Option<String>,
 }
 
@@ -164,6 +164,6 @@ pub(crate) struct Chart {
     pub panels: Vec<Panel>,
     /// Number of panels in a row.
     pub columns: usize,
-    /// What the caption says besides.
+    /// Further text of the caption.
     pub note: String,
 }

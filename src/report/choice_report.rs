@@ -11,7 +11,7 @@ use darkqa_score::findings::Findings;
 pub struct ChoiceReport<'a> {
     /// The numbers that are shown.
     pub findings: &'a Findings<'a>,
-    /// What a reader must know before any number.
+    /// Warnings above the numbers.
     pub alerts: Vec<Alert>,
     /// The findings in words.
     pub(crate) sentences: Vec<Sentence>,

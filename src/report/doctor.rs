@@ -13,7 +13,7 @@ const PAGE: &str = include_str!("doctor.html");
 pub(crate) struct DoctorPage {
     /// Name of the model's file.
     pub(crate) model: String,
-    /// What follows from the images.
+    /// The conclusion from the images.
     pub(crate) conclusion: String,
     /// Whether there is one plausible convention.
     pub(crate) is_settled: bool,
@@ -24,7 +24,7 @@ pub(crate) struct DoctorPage {
     pub(crate) columns: Vec<DoctorColumn>,
     /// How the model is fed and read now.
     pub(crate) description: String,
-    /// What was done because of the sizes of the frames.
+    /// Changes because of the sizes of the frames.
     pub(crate) sizes: String,
 }
 
@@ -32,7 +32,7 @@ pub(crate) struct DoctorPage {
 #[derive(Debug, Serialize)]
 pub(crate) struct DoctorColumn {
     pub(crate) title: String,
-    /// What is wrong; `None` if the images can be enhanced images.
+    /// The fault; `None` if the images can be enhanced images.
     pub(crate) problem: Option<String>,
     /// The image of each frame.
     pub(crate) cells: Vec<DoctorCell>,

@@ -201,7 +201,7 @@ impl<'a> FindingGroup<'a> {
         }
     }
 
-    /// What the enhancers were detected to do; that nothing was detected, if so.
+    /// The detected effects of the enhancers, or the statement that none was detected.
     fn enhancers(&self) -> String {
         let Some(first) = self.first.map(|first| &self.findings[first]) else {
             return String::new();
@@ -246,7 +246,7 @@ impl<'a> Finding<'a> {
             .unwrap_or(self.sentences[0])
     }
 
-    /// What was detected in the light of [`Self::shown`], without a full stop.
+    /// The detected effect in the light of [`Self::shown`], without a full stop.
     pub(super) fn text(&self) -> String {
         let shown = self.shown();
         let mut texts: Vec<&str> = self

@@ -92,13 +92,13 @@ pub(crate) struct Forecast {
     /// The frames or walks, if intervals and tests need more of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub few_sources: Option<FewSources>,
-    /// What the whole run can detect; `None` for a shard, and for questions without choices or answers.
+    /// The effect that the whole run can detect; `None` for a shard, and for questions without choices or answers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub power: Option<PowerForecast>,
     /// Size of the largest request in bytes, as sampled images suggest, if requests hold many images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_request: Option<f64>,
-    /// What an image store gives the next model; `None` without one.
+    /// The images that an image store saves the next model; `None` without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_store: Option<StoreForecast>,
 }
@@ -110,11 +110,11 @@ pub(crate) struct FewSources {
     pub number: usize,
     /// How many intervals and tests need.
     pub needed: usize,
-    /// What they are, in the singular.
+    /// The counted thing, in the singular.
     pub of: &'static str,
 }
 
-/// What an image store gives another model that is asked about the same images.
+/// The images that an image store saves another model that is asked about the same images.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct StoreForecast {
     /// Which images it keeps, in words.

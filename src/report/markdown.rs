@@ -18,7 +18,7 @@ use crate::text::words::{counted, ends, interval, words};
 /// Name of the table by level of accuracies and scores.
 const LEVELS: &str = "levels";
 
-/// What a report says in Markdown.
+/// The content of a Markdown report.
 pub(crate) struct MarkdownReport<'a> {
     /// Names of the runs.
     names: Vec<String>,

@@ -1,4 +1,4 @@
-//! What a run can detect, in words, before anything is asked: [`PowerForecast`].
+//! The effect that a run can detect, in words, before anything is asked: [`PowerForecast`].
 
 use serde::Serialize;
 

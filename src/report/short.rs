@@ -68,7 +68,7 @@ pub(crate) fn text(
     text
 }
 
-/// What a single light reading leaves open; empty without noise or with several readings.
+/// The open question of a single light reading; empty without noise or with several readings.
 fn open_question(report: &ChoiceReport<'_>) -> String {
     let readings = LightReadings::of(&report.findings.grid.subjects);
     let open = readings.open_question();

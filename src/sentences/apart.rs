@@ -13,7 +13,7 @@ use darkqa_score::grid::Grid;
 use darkqa_score::pooled::pool;
 use darkqa_score::subject::{Subject, is_reference};
 
-/// What each of them answered at L0 and at its darkest level, and the other models on the same questions.
+/// The accuracy of each of them at L0 and at its darkest level, and of the other models on the same questions.
 pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {
     let others = others(findings);
     if others.is_empty() {

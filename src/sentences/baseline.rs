@@ -12,7 +12,7 @@ use darkqa_score::subject::judged;
 /// Largest number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;
 
-/// What is shown about each model against the run `old`; one sentence if nothing is shown about any. `random` and the observer are
+/// The detected differences of each model from the run `old`; one sentence if none is detected for any. `random` and the observer are
 /// left out if there are others.
 pub(crate) fn against_baseline(
     rows: &[BaselineRow],
@@ -88,7 +88,7 @@ fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<
     Some(numbers.sentence("baseline", verdict.into(), text, detail))
 }
 
-/// That no difference is shown, with the largest one; that no verdict is possible; or that nothing can be compared.
+/// The sentence that no difference is shown, with the largest one; that no verdict is possible; or that nothing can be compared.
 fn nothing_shown(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::of(unit);
     if rows.is_empty() {

@@ -15,14 +15,14 @@ use darkqa_score::pooled::PooledFinding;
 use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 
-/// What darkness, or another cause, costs in each topic.
+/// The cost of darkness, or of another cause, in each topic.
 pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
     let topics = Topic::all(findings);
     let sentences = topics.iter().flat_map(|topic| of_topic(findings, topic));
     sentences.collect()
 }
 
-/// What darkness costs with the last kind of degradation, in each of its lights; then what it costs with another kind, if the last
+/// The cost of darkness with the last kind of degradation, in each of its lights; then with another kind, if the last
 /// does not show it. If the two differ, both are named.
 fn of_topic(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> {
     let Topic { lights, others, .. } = topic;
@@ -68,7 +68,7 @@ fn of_topic(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> {
     sentences
 }
 
-/// What is shown over all levels: a loss, else a gain, else nothing; `None` without a verdict.
+/// The verdict over all levels: a loss, else a gain, else nothing; `None` without a verdict.
 fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
     let mut verdicts = [
         Significance::Worse,
@@ -79,7 +79,7 @@ fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
     verdicts.find(|verdict| !of_verdict(levels, *verdict).is_empty())
 }
 
-/// What is shown over several levels together; `None` if nothing is.
+/// The verdict over several levels together; `None` if nothing is detected.
 fn mean_verdict(mean: &PooledFinding) -> Option<Significance> {
     match mean.claim() {
         Claim::Detected(verdict) => Some(verdict),
@@ -95,7 +95,7 @@ fn name(variant: &KindReading) -> String {
     }
 }
 
-/// What darkness costs with one variant, at the darkest level where it is shown; else over the darker levels together, if it is shown
+/// The cost of darkness with one variant, at the darkest level where it is shown; else over the darker levels together, if it is shown
 /// there; else that nothing is shown at the darkest level. The sentence begins with `name`.
 pub(super) fn with_variant(
     levels: &[&PooledFinding],
@@ -156,7 +156,7 @@ fn named(text: &str, name: Option<&str>) -> String {
     }
 }
 
-/// What darkness costs over several levels together, none of which shows it alone.
+/// The cost of darkness over several levels together, none of which shows it alone.
 fn over_levels(
     mean: &PooledFinding,
     levels: &[&PooledFinding],

@@ -83,7 +83,7 @@ impl<'f> TopAnswer<'f> {
     }
 }
 
-/// That a model gives one answer far too often: of the family and the model with the largest excess over the true share. It is said only
+/// The finding that a model gives one answer far too often: of the family and the model with the largest excess over the true share. It is printed only
 /// if the answer is detected to be more frequent than at L0, in both parsings and after the correction over all sentences.
 pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<Sentence> {
     let shown = answers.iter().filter(|answer| answer.collapse.is_shown());

@@ -148,7 +148,7 @@ pub(super) fn noise(
     vec![numbers.sentence("noise", Tone::NotShown, text.to_owned(), detail)]
 }
 
-/// What each enhancer does: a sentence for each verdict, with its levels.
+/// The effects of each enhancer: a sentence for each verdict, with its levels.
 pub(super) fn enhancers(
     all: &[&PooledFinding],
     means: &[&PooledFinding],
@@ -173,7 +173,7 @@ pub(super) fn enhancers(
     sentences
 }
 
-/// What an enhancer is shown to do.
+/// The detected effect of an enhancer.
 fn enhancer(shown: &Shown<'_>, verdict: Significance, unit: ClusterUnit) -> Option<Sentence> {
     let name = shown.largest.enhancer.as_ref()?;
     let at = &shown.at;

@@ -30,7 +30,7 @@ pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences
 }
 
-/// What the dark costs a model in photographs.
+/// The cost of the dark for a model in photographs.
 fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::of(unit);
     let least = if pair.is_lower_bound { "≥ " } else { "" };
@@ -75,7 +75,7 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
     sentence("real against synthetic", row, numbers, text)
 }
 
-/// What an enhancer does to photographs.
+/// The effect of an enhancer on photographs.
 fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::of(unit);
     let name = row.first.enhancer.as_ref().map_or("", |name| name.as_str());
@@ -98,7 +98,7 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
     sentence("real enhanced", row, numbers, text)
 }
 
-/// What is detected, in both parsings and after the correction over all sentences.
+/// The verdict in both parsings and after the correction over all sentences.
 fn verdict(row: &Comparison) -> Significance {
     match row.claim() {
         Claim::Detected(verdict) => verdict,

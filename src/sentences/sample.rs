@@ -14,7 +14,7 @@ pub(super) const WIDE: f64 = 0.05;
 /// Largest number of models that a sentence names.
 const MAX_NAMED: usize = 3;
 
-/// What findings of a kind are about.
+/// The subject of findings of a kind.
 fn topic(kind: PooledKind, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
     match (kind, enhancer) {
         (PooledKind::Enhancer, Some(name)) => name.to_string(),

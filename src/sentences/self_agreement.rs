@@ -139,7 +139,7 @@ fn compared<'f>(
         .filter(move |comparison| comparison.first.model == model)
 }
 
-/// What the darkest level of a variant leaves of a model's answers.
+/// The agreement of a model's answers at the darkest level of a variant.
 fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &KindReading) -> Option<Sentence> {
     let mut cells = found.whole().filter(|cell| cell.subject.model == model);
     let raw =
@@ -182,7 +182,7 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &KindReading) -> Op
     Some(numbers.sentence("agreement_in_the_dark", tone, text, detail))
 }
 
-/// What stands beside the agreement at the darkest level.
+/// The detail beside the agreement at the darkest level.
 fn darkness_detail(
     found: &SelfAgreement<'_>,
     dark: &AgreementCell,
@@ -242,7 +242,7 @@ fn darkness_detail(
     parts.join(", ")
 }
 
-/// What an enhancer does to a model's agreement, over the levels of a variant; at L0 if there is none.
+/// The effect of an enhancer on a model's agreement, over the levels of a variant; at L0 if there is none.
 fn enhanced(
     found: &SelfAgreement<'_>,
     model: &str,
@@ -291,7 +291,7 @@ fn enhanced(
     Some(numbers.sentence("agreement_enhanced", tone, capitalised(&text), detail))
 }
 
-/// What an enhancer of images in the light of `of` does to the answers of a model, with the levels at which it makes them more and less
+/// The effect of an enhancer of images in the light of `of` on the answers of a model, with the levels at which it makes them more and less
 /// like those at L0.
 fn of_levels(
     enhancer: &EnhancerName,
@@ -327,7 +327,7 @@ fn of_levels(
     }
 }
 
-/// What an enhancer of photographs in the dark does to the answers of a model. The answers at L0 were given in the dark themselves, so
+/// The effect of an enhancer of photographs in the dark on the answers of a model. The answers at L0 were given in the dark themselves, so
 /// that a change is neither help nor harm.
 fn of_photographs(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
     match change {

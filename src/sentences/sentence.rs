@@ -15,9 +15,9 @@ use darkqa_score::significance::{Significance, SwapMethod};
 /// A finding in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Sentence {
-    /// What the finding is about.
+    /// The kind of finding.
     pub kind: &'static str,
-    /// What was shown.
+    /// The direction of the effect.
     #[serde(rename = "verdict")]
     pub tone: Tone,
     /// One sentence.
@@ -61,7 +61,7 @@ pub(crate) struct Scope {
     pub training: String,
 }
 
-/// What a sentence shows.
+/// The direction of a sentence's effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(crate) enum Tone {
     /// An improvement is shown.

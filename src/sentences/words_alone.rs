@@ -39,7 +39,7 @@ pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sen
     Some(numbers.sentence("below blind", Tone::Worse, text, detail))
 }
 
-/// What a finding compares images with.
+/// The side with which a finding compares images.
 fn second_side(finding: &PooledFinding) -> String {
     let mut models = finding.blind_models.iter();
     match &finding.blind_models[..] {
@@ -57,7 +57,7 @@ fn against(finding: &PooledFinding) -> String {
     }
 }
 
-/// What the untouched images add, of all models together.
+/// The gain from untouched images, over all models.
 pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
     let of = findings.pooled.iter().find(|finding| {
         finding.kind == PooledKind::Blind

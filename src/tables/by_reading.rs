@@ -249,7 +249,7 @@ fn clause(finding: &FindingByReading) -> String {
     }
 }
 
-/// What each reading says, as `Noise compounds the drop under paper, eld; open under physical (−1.2 to 5.0 points).`
+/// The findings by reading, as `Noise compounds the drop under paper, eld; open under physical (−1.2 to 5.0 points).`
 fn sentence(finding: &FindingByReading) -> String {
     let of = |standing: Support| -> Vec<String> {
         let effects = finding.effects.iter();

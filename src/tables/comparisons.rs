@@ -325,7 +325,7 @@ fn numbers(builder: TableBuilder<&Comparison>, mode: ReadingMode) -> TableBuilde
         )
 }
 
-/// What of the second side the first side does not imply: another model, another condition, or both.
+/// The second side without what the first implies: another model, another condition, or both.
 fn against(comparison: &Comparison) -> String {
     let (first, second) = (&comparison.first, &comparison.second);
     match (first.model != second.model, comparison.kind) {

@@ -11,7 +11,7 @@ pub(crate) struct EnhancerRow {
     pub(crate) name: String,
     /// How it was fed and read, and what was done because of sizes.
     pub(crate) how: String,
-    /// What the probe and the images of the run looked like.
+    /// The look of the probe's and the run's images.
     pub(crate) looks: String,
 }
 

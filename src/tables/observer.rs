@@ -8,7 +8,7 @@ use crate::types::control::OBSERVER;
 use darkqa_score::findings::Findings;
 use darkqa_score::observed::{ObserverCell, ObserverSummary};
 
-/// What the observer is, above its table.
+/// The definition of the observer, above its table.
 const HEADING: &str = "Known-signal observer (given the untouched frame; not a model)";
 
 /// Share of an image's variance that the untouched frame explains, from which on the image is still like it (chosen).
@@ -123,7 +123,7 @@ fn controls(observer: &ObserverSummary) -> Table {
     table
 }
 
-/// What the reader must know: a control that is not at chance, a missing control, and images of changed geometry.
+/// Remarks for the reader: a control that is not at chance, a missing control, and images of changed geometry.
 pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
     if !observer.is_asked() {
         return Vec::new();
@@ -153,7 +153,7 @@ pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
     own.filter(|cell| cell.seen <= 0.0).map(blank).collect()
 }
 
-/// What a standing control is, as `shown …` of it.
+/// The image of a standing control, to follow `shown …`.
 pub(crate) fn what_it_is(control: &ObserverCell) -> &'static str {
     if Control::from_model_name(&control.subject.model) == Some(Control::OtherRoom) {
         "the same observer, shown images of other rooms"

@@ -45,7 +45,7 @@ pub(crate) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
     vec![all, by_family]
 }
 
-/// What must be known of the groups.
+/// Remarks on the groups.
 fn foot(score: &StrictScore) -> Option<String> {
     let most = score.cells.iter().map(|cell| cell.incomplete).max();
     let joined = score

@@ -143,7 +143,7 @@ fn reason(summary: &CurveSummary) -> String {
     reasons.join("; ")
 }
 
-/// What a threshold needs, if one is not known for lack of it, and a line for each curve of all families together of which levels are
+/// The requirements of a threshold that is unknown for lack of them, and a line for each curve of all families together with the levels that are
 /// left out.
 fn notes(curves: &[&Curve]) -> Vec<String> {
     let curves = curves.iter().filter(|curve| curve.family.is_none());

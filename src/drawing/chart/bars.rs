@@ -25,6 +25,6 @@ pub(crate) struct BarPanel {
 #[derive(Debug, Clone)]
 pub(crate) struct BarChart {
     pub panels: Vec<BarPanel>,
-    /// What the caption says besides.
+    /// Further text of the caption.
     pub note: String,
 }

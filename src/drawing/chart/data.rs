@@ -1,4 +1,4 @@
-//! What a chart shows, for the script of the page, which draws it again at the width there is: [`ChartData`].
+//! The data of a chart for the script of the page, which draws it again at the available width: [`ChartData`].
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! What a figure of a report shows: [`Drawn`].
+//! The content of a report's figure: [`Drawn`].
 
 use super::Chart;
 use super::bars::BarChart;
@@ -7,7 +7,7 @@ use super::reliability::ReliabilityChart;
 use super::thresholds::ThresholdChart;
 use crate::error::Result;
 
-/// What a figure shows.
+/// The content of a figure.
 #[derive(Debug, Clone)]
 pub(crate) enum Drawn {
     Lines(Chart),
@@ -17,7 +17,7 @@ pub(crate) enum Drawn {
 }
 
 impl Drawn {
-    /// What the caption says besides: numbers of items, and what bands and bars are.
+    /// Further text of the caption: numbers of items, and the meaning of bands and bars.
     pub(crate) fn note(&self) -> String {
         match self {
             Self::Lines(chart) => chart.note.clone(),
@@ -27,7 +27,7 @@ impl Drawn {
         }
     }
 
-    /// What the figure shows, for the script of the page; `None` of a figure that the page shows as it is.
+    /// The data of the figure for the script of the page; `None` for a figure that the page shows as it is.
     ///
     /// # Errors
     /// If it cannot be written.

@@ -24,6 +24,6 @@ pub(crate) struct ReliabilityPanel {
 #[derive(Debug, Clone)]
 pub(crate) struct ReliabilityChart {
     pub panels: Vec<ReliabilityPanel>,
-    /// What the caption says besides.
+    /// Further text of the caption.
     pub note: String,
 }

@@ -21,7 +21,7 @@ pub(crate) struct OverviewPanels {
     pub variant: Option<KindReading>,
     /// The first enhancer and the name that is shown for it.
     pub enhancer: Option<(EnhancerName, String)>,
-    /// What the intervals of the first chart are.
+    /// The meaning of the first chart's intervals.
     pub note: String,
 }
 
@@ -97,7 +97,7 @@ impl Overview<'_> {
         }
     }
 
-    /// What the bands of a mean are.
+    /// The meaning of a mean's bands.
     fn band(&self, models: &[&str]) -> String {
         match models {
             [_] => format!("Bands: 95 % intervals by {}.", self.findings.unit),

@@ -79,7 +79,7 @@ fn accuracy(of: Estimate, is_below: bool) -> TableCell {
 }
 
 impl Overview<'_> {
-    /// What holds for all numbers of a table.
+    /// The basis of all numbers of a table.
     fn basis(&self) -> String {
         let (grid, unit) = (&self.findings.grid, self.findings.unit);
         format!(

@@ -5,7 +5,7 @@ use super::look::Look;
 use super::sheet::{Anchor, Place, Sheet, Stroke};
 use crate::drawing::chart::{Chart, LineStyle, PanelContent, PlotLine};
 
-/// What stands before a name in a legend.
+/// The mark before a name in a legend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sample {
     /// A line with its mark.

@@ -36,7 +36,7 @@ pub(crate) use tex::tex;
 
 use crate::drawing::chart::drawn::Drawn;
 
-/// What a figure shows as a sheet.
+/// Draws a figure as a sheet.
 pub(crate) fn sheet(figure: &Drawn, look: &Look) -> Sheet {
     match figure {
         Drawn::Lines(chart) => lines::lines(chart, look),

@@ -17,7 +17,7 @@ const COLUMNS: usize = 2;
 #[derive(Debug)]
 pub(crate) struct OverviewSheet {
     pub sheet: Sheet,
-    /// What each panel shows, after its letter.
+    /// A caption for each panel, after its letter.
     pub caption: String,
     /// The panels that are left out, each with the reason.
     pub left_out: Vec<(&'static str, String)>,

@@ -1,4 +1,4 @@
-//! What is drawn on a figure for a paper, in points: [`Sheet`]. PDF and SVG are two ways to write the same marks.
+//! The marks of a figure for a paper, in points: [`Sheet`]. PDF and SVG are two ways to write the same marks.
 
 use std::sync::Arc;
 

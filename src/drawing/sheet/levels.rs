@@ -106,7 +106,7 @@ fn insets(blocks: &[LevelBlock]) -> Vec<u16> {
     factors.into_iter().collect()
 }
 
-/// What the insets show; empty without one.
+/// Describes the insets; empty without one.
 fn how_inset(blocks: &[LevelBlock]) -> String {
     let factors = insets(blocks);
     if factors.is_empty() {

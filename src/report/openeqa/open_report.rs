@@ -17,7 +17,7 @@ pub(crate) struct OpenReport<'a> {
     pub manifest: &'a RunManifest,
     /// The names and manifests of all runs.
     pub runs: Vec<(&'a str, &'a RunManifest)>,
-    /// What stands above everything, if there are several runs.
+    /// Warnings above everything, if there are several runs.
     pub alerts: &'a [Alert],
     /// How the enhancers were used.
     pub enhancers: &'a [EnhancerRow],

@@ -48,7 +48,7 @@ pub(in crate::report) struct SizeLimit {
     pub(in crate::report) pictures: usize,
 }
 
-/// What was asked.
+/// The kind of questions.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::report) enum PageKind {

@@ -15,7 +15,7 @@ pub struct PageRun<'a> {
     /// The folder of the run as a command on it names it; of an absolute path the name alone, behind `DIR/`.
     pub folder: String,
     pub manifest: &'a RunManifest,
-    /// What the trials of the run took.
+    /// The usage of the run's trials.
     pub usage: RunUsage,
     /// Cost of the replies in words; `None` if it is not known.
     pub cost: Option<String>,

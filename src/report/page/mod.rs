@@ -41,7 +41,7 @@ use darkqa_score::grid::Grid;
 /// The template of the page, its style and its script.
 const PAGE: &str = include_str!("page.html");
 pub(super) const STYLE: &str = include_str!("page.css");
-/// What pages share: names, the theme, and charts that are drawn at the width there is.
+/// Parts shared by pages: names, the theme, and charts that are drawn at the available width.
 const CHART_SCRIPT: &str = concat!(
     include_str!("script/base.js"),
     include_str!("script/charts.js")
@@ -63,7 +63,7 @@ struct Page<'a> {
     heading: String,
     /// The first screen; `None` of a page without one.
     head: Option<PageHead>,
-    /// What families of questions are called.
+    /// The noun for families of questions.
     family: &'static str,
     /// Warnings at the top of the page.
     alerts: Vec<&'a str>,
@@ -121,7 +121,7 @@ impl<'a> PageSentence<'a> {
     }
 }
 
-/// What a page shows, besides its figures and the facts of its runs.
+/// The content of a page, besides its figures and the facts of its runs.
 pub(crate) struct PageContent<'a> {
     /// The models in words, for the heading.
     pub(crate) who: String,
@@ -208,7 +208,7 @@ pub(crate) fn page_of<'a>(
     )
 }
 
-/// What the page of open questions shows, besides its figures.
+/// The content of the page of open questions, besides its figures.
 pub(in crate::report) struct OpenContent<'a> {
     pub(in crate::report) title: String,
     pub(in crate::report) intro: Vec<String>,

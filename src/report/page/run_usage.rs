@@ -1,10 +1,10 @@
-//! What the trials of a run took: [`RunUsage`].
+//! The usage of a run's trials: [`RunUsage`].
 
 use std::collections::BTreeSet;
 
 use crate::types::{ChoiceDetail, TrialRef, Usage};
 
-/// What the trials of a run took at endpoints: requests, tokens, bytes of images, waiting, and the models that the servers named.
+/// The usage of a run's trials at endpoints: requests, tokens, bytes of images, waiting, and the models that the servers named.
 /// Built-in models take none of these.
 #[derive(Debug, Clone, Default)]
 pub struct RunUsage {

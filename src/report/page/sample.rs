@@ -9,7 +9,7 @@ use darkqa_score::grid::Grid;
 /// The most replies that a page shows. Chosen: as many have room on a page of 12 MB, and are read in two seconds.
 const MOST_REPLIES: usize = 200_000;
 
-/// What darkness and enhancement did to an item, for any model; of several the first.
+/// The effect of darkness and enhancement on an item, for any model; of several the first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Fate {
     /// Right in the dark, and wrong after an enhancer.
@@ -29,7 +29,7 @@ pub(super) fn sample<'a>(grid: &Grid<'a>) -> Option<Grid<'a>> {
     (grid.items.len() > most).then(|| grid.restricted(&chosen(grid, most)))
 }
 
-/// That the page shows a sample of its items, if it does.
+/// The remark that the page shows a sample of its items; `None` if it shows all.
 pub(super) fn words(grid: &Grid<'_>) -> Option<String> {
     let (all, most) = (grid.items.len(), MOST_REPLIES / grid.subjects.len().max(1));
     (all > most).then(|| {

@@ -20,7 +20,7 @@ pub(super) struct PageSection<'a> {
     tables: Vec<tables::PageTable<'a>>,
 }
 
-/// Those of the sections that have a table, a figure or samples.
+/// Sections that have a table, a figure or samples.
 pub(super) fn sections<'a>(
     sections: &[Section],
     tables: &'a [Table],

@@ -1,4 +1,4 @@
-//! What people found when they checked questions, as text and as JSON: [`text`], [`json()`].
+//! Findings of people who checked questions, as text and as JSON: [`text`], [`json()`].
 
 use std::fmt::Write as _;
 

@@ -8,7 +8,7 @@ use crate::text::terminal;
 use darkqa_score::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
 use darkqa_score::realism::mean::Mean;
 
-/// What a gain of a picture is, in words that stand beside every gain.
+/// The definition of a picture's gain, printed beside every gain.
 pub(crate) const AS_SAVED: &str =
     "as saved; a smaller K than the sensor's means that noise was averaged away";
 

@@ -10,7 +10,7 @@ use darkqa_score::self_agreement::SelfAgreement;
 /// All that a report without true answers shows.
 pub(crate) struct AgreementReport<'a> {
     pub(super) found: &'a SelfAgreement<'a>,
-    /// What a reader must know before any number.
+    /// Warnings above the numbers.
     pub(super) alerts: Vec<Alert>,
     /// The findings in words.
     pub(super) sentences: Vec<Sentence>,

@@ -78,7 +78,7 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
         .collect()
 }
 
-/// What Markdown shows of a report.
+/// The parts of a Markdown report.
 pub(super) struct MarkdownParts<'a> {
     /// Numbers of models, questions and replies.
     pub(super) head: String,
@@ -90,7 +90,7 @@ pub(super) struct MarkdownParts<'a> {
     pub(super) levels: &'static str,
 }
 
-/// What Markdown shows of a report.
+/// The parts of a report in Markdown.
 pub(super) fn markdown_parts<'a>(report: &'a AgreementReport<'_>) -> MarkdownParts<'a> {
     MarkdownParts {
         head: text::head(report),

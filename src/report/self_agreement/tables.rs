@@ -78,7 +78,7 @@ fn unread(cell: &AgreementCell) -> usize {
     unread.map_or(0, |share| (share.value * share.n as f64).round() as usize)
 }
 
-/// What a cell is to the others of its model, in files.
+/// The role of a cell among those of its model, in files.
 fn role(cell: &AgreementCell) -> &'static str {
     match cell.role() {
         CellRole::Floor => "floor",

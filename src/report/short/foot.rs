@@ -80,7 +80,7 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
     text
 }
 
-/// What the observer is, and the score of its standing control, for each run that has its own; empty if it is not shown.
+/// Defines the observer, and has the score of its standing control, for each run that has its own; empty if it is not shown.
 fn observer_control(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let is_shown = findings
@@ -105,7 +105,7 @@ fn observer_control(report: &ChoiceReport<'_>) -> String {
     wrapped(" ", &line, " ")
 }
 
-/// What the marks of models mean, and a line for each model with what its further columns hold.
+/// The meaning of the marks of models, and a line for each model with its further columns.
 pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
     let listing = &report.findings.grid.listing;
     let foot = listing.foot(models.iter().copied());

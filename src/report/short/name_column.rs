@@ -10,7 +10,7 @@ pub(super) const LEVEL: usize = 7;
 /// The first column of the table: names, cut to a width.
 pub(super) struct NameColumn {
     width: usize,
-    /// What several different names become if they are cut.
+    /// Cut names that several different names share.
     alike: BTreeSet<String>,
 }
 

@@ -16,7 +16,7 @@ pub(super) struct BoardTable {
 /// A row: its first cells, the model with the page of its run, and the others.
 #[derive(Serialize)]
 pub(super) struct BoardRow {
-    /// What the filter looks for.
+    /// The text that the filter searches.
     pub(super) words: String,
     pub(super) cells: Vec<BoardCell>,
 }

@@ -1,4 +1,4 @@
-//! What a site shows: [`Site`].
+//! The content of a site: [`Site`].
 
 use serde::Serialize;
 
@@ -20,18 +20,18 @@ pub(crate) struct Site {
 
 /// Rows that can be compared: of one set of questions, one light and one prompt.
 pub(crate) struct SiteGroup {
-    /// What its rows share, in words.
+    /// The settings that its rows share, in words.
     pub(crate) title: String,
     /// The digests of its questions, light and prompts.
     pub(crate) digests: GroupDigests,
     /// Settings that its rows share, by name.
     pub(crate) shared: Vec<(String, String)>,
-    /// What differs from the first table of its kind; `None` for the first.
+    /// Differences from the first table of its kind; `None` for the first.
     pub(crate) differs: Option<GroupDifference>,
     pub(crate) rows: GroupRows,
 }
 
-/// What differs between two groups.
+/// Differences between two groups.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub(crate) struct GroupDifference {
     /// The number of the other group.

@@ -18,7 +18,7 @@ const SCRIPT: &str = concat!(
     include_str!("site.js")
 );
 
-/// What the ranks of open questions would need.
+/// The reason why open questions are not ranked.
 const NOT_RANKED: &str = "Scores are in %, over the answers that were marked. These rows are not ranked: scores of open answers have no test of one model against another here.";
 
 #[derive(Serialize)]

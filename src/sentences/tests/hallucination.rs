@@ -49,7 +49,7 @@ fn false_answers_are_said_where_they_are_shown_to_grow() {
     assert_eq!(say(FalseAnswer::No, &[]), None);
 }
 
-/// What a model answers most often: its share, its true share, and what a guess would give.
+/// The most frequent answer of a model: its share, its true share, and the share of a guess.
 fn collapse(share: f64, truth: f64, guess: f64) -> Collapse {
     Collapse {
         top: "living room".to_owned(),

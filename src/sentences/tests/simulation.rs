@@ -21,7 +21,7 @@ use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::Subject;
 
-/// What a simulated run asks, and what is true.
+/// The questions of a simulated run, and the truth.
 #[derive(Debug, Clone, Copy)]
 struct Design {
     models: usize,
@@ -189,7 +189,7 @@ fn is_claim(sentence: &Sentence) -> bool {
     matches!(sentence.tone, Tone::Better | Tone::Worse) || sentence.kind == "collapse"
 }
 
-/// What became of the runs of a design.
+/// Outcomes of the runs of a design.
 #[derive(Debug, Default)]
 struct Counts {
     runs: usize,
