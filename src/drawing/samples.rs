@@ -55,13 +55,13 @@ pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SamplePage> {
         let all: Vec<&Thumbnail> = all
             .filter(|of| of.condition.level().is_shown_on(on))
             .collect();
-        of_axis(&all, on)
+        axis_page(&all, on)
     });
     pages.collect()
 }
 
 /// The page of the thumbnails of one axis; `None` without any.
-fn of_axis(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
+fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
     let mut frames: Vec<&FrameId> = thumbnails
         .iter()
         .map(|thumbnail| &thumbnail.frame)

@@ -35,7 +35,7 @@ pub(super) struct Rows<'a>(&'a [Table]);
 
 impl<'a> Rows<'a> {
     /// The rows of one table.
-    pub(super) fn of(table: &'a Table) -> Self {
+    pub(super) fn new(table: &'a Table) -> Self {
         Self(std::slice::from_ref(table))
     }
 }
@@ -76,7 +76,7 @@ pub(super) fn document(
 ) -> Result<String> {
     let document = Document {
         head,
-        rows: (length != ReportLength::Findings).then(|| Rows::of(rows)),
+        rows: (length != ReportLength::Findings).then(|| Rows::new(rows)),
         tables: tables
             .chunk_by(|one, other| one.name == other.name)
             .filter(|parts| {
@@ -168,12 +168,12 @@ pub(crate) fn summary(
     let groups = strict_groups(report.findings);
     let head = Head {
         runs: runs.head("darkqa.summary/1"),
-        readings: LightReadings::of(&report.findings.grid.subjects),
+        readings: LightReadings::new(&report.findings.grid.subjects),
         unread: &report.findings.summary.unread,
         alerts: &report.alerts,
         findings: &report.sentences,
         groups: (!groups.is_empty()).then_some(Rows(&groups)),
-        baseline: tables.find(|table| table.name == BASELINE).map(Rows::of),
+        baseline: tables.find(|table| table.name == BASELINE).map(Rows::new),
     };
     document(
         head,

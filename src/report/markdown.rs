@@ -35,7 +35,7 @@ pub(crate) struct MarkdownReport<'a> {
 
 impl<'a> MarkdownReport<'a> {
     /// The report of questions with choices.
-    pub(crate) fn of_choices(
+    pub(crate) fn for_choices(
         report: &'a ChoiceReport<'a>,
         names: Vec<String>,
         length: ReportLength,
@@ -57,7 +57,7 @@ impl<'a> MarkdownReport<'a> {
     }
 
     /// The report of questions without true answers.
-    pub(crate) fn of_own_answers(
+    pub(crate) fn for_own_answers(
         report: &'a AgreementReport<'a>,
         names: Vec<String>,
         length: ReportLength,
@@ -75,7 +75,7 @@ impl<'a> MarkdownReport<'a> {
     }
 
     /// The report of open questions, with its tables.
-    pub(crate) fn of_open(
+    pub(crate) fn for_open(
         report: &'a OpenReport<'_>,
         all: &'a [Table],
         length: ReportLength,
@@ -136,7 +136,7 @@ impl<'a> MarkdownReport<'a> {
         }
         text += &self.findings();
         for table in &self.tables {
-            text += &of_table(table);
+            text += &markdown_table(table);
         }
         text + &format!("Made by darkqa-eval {}.\n", env!("CARGO_PKG_VERSION"))
     }
@@ -170,7 +170,7 @@ fn tables<'a>(tables: &'a [Table], name: &str, length: ReportLength) -> Vec<&'a 
 }
 
 /// A table with the columns and rows of the page. An interval stands behind its number.
-fn of_table(table: &Table) -> String {
+fn markdown_table(table: &Table) -> String {
     let columns: Vec<&Column> = table
         .columns
         .iter()
@@ -296,7 +296,7 @@ mod tests {
             .column(Text, "csv hidden", |_| "no")
             .build();
         assert_eq!(
-            of_table(&table),
+            markdown_table(&table),
             "Accuracy\n\n| model | L0 |\n| --- | ---: |\n| a\\|b \\`c\\` | 50.0 (25.0–75.0) |\n| plain | – |\n\n"
         );
     }

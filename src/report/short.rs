@@ -70,7 +70,7 @@ pub(crate) fn text(
 
 /// The open question of a single light reading; empty without noise or with several readings.
 fn open_question(report: &ChoiceReport<'_>) -> String {
-    let readings = LightReadings::of(&report.findings.grid.subjects);
+    let readings = LightReadings::new(&report.findings.grid.subjects);
     let open = readings.open_question();
     open.map_or_else(String::new, |open| wrapped(" ", &open, " "))
 }

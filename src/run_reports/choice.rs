@@ -113,5 +113,5 @@ pub(super) fn markdown(
     length: ReportLength,
 ) -> String {
     let names = runs.iter().map(|(_, folder)| name(folder)).collect();
-    MarkdownReport::of_choices(report, names, length).text()
+    MarkdownReport::for_choices(report, names, length).text()
 }

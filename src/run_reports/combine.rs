@@ -88,7 +88,7 @@ impl Combined {
             folder: typed(&run.folder),
             name: run.name.clone(),
             manifest: &run.manifest,
-            usage: page::RunUsage::of(self.trials_of(run), |model| {
+            usage: page::RunUsage::new(self.trials_of(run), |model| {
                 run.manifest.is_built_in(without_run(model))
             }),
             cost: run.cost.clone(),

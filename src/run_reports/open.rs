@@ -144,7 +144,7 @@ impl Scores {
         let tables = tables(&report);
         Ok(WholeReport {
             files: files(&report, &tables)?,
-            markdown: MarkdownReport::of_open(&report, &tables, ReportLength::Summary).text(),
+            markdown: MarkdownReport::for_open(&report, &tables, ReportLength::Summary).text(),
         })
     }
 
@@ -163,7 +163,7 @@ impl Scores {
         let folder = &self.run.folder;
         match show.syntax {
             Syntax::Json => summary_json(report, tables, Some(folder), show.length),
-            Syntax::Markdown => Ok(MarkdownReport::of_open(report, tables, show.length).text()),
+            Syntax::Markdown => Ok(MarkdownReport::for_open(report, tables, show.length).text()),
             Syntax::Text => Ok(render(report, tables, &self.run.folders())),
         }
     }

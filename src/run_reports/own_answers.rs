@@ -129,5 +129,5 @@ fn markdown(
     length: ReportLength,
 ) -> String {
     let names = runs.iter().map(|(_, folder)| name(folder)).collect();
-    MarkdownReport::of_own_answers(report, names, length).text()
+    MarkdownReport::for_own_answers(report, names, length).text()
 }

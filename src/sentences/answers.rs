@@ -24,7 +24,7 @@ pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
     if unread == 0 || share > MAX_UNREAD {
         return None;
     }
-    let mut numbers = Numbers::of(findings.unit);
+    let mut numbers = Numbers::new(findings.unit);
     let count = numbers.count("unread", unread);
     let noun = if unread == 1 { "reply" } else { "replies" };
     let percent = numbers.percent("share", share);
@@ -38,7 +38,7 @@ pub(super) fn unread(findings: &Findings<'_>) -> Option<Sentence> {
 pub(super) fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
     let fidelity = findings.fidelity.as_ref()?;
     let auc = fidelity.within[0]?;
-    let mut numbers = Numbers::of(findings.unit);
+    let mut numbers = Numbers::new(findings.unit);
     let estimate = auc.estimate;
     let is_detected = fidelity.p_report.is_some_and(|p| p < ALPHA);
     let (tone, text) = if is_detected && estimate.value > 0.5 {

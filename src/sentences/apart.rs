@@ -136,7 +136,7 @@ fn sentence(
     if found.is_empty() {
         return None;
     }
-    let mut numbers = Numbers::of(findings.unit);
+    let mut numbers = Numbers::new(findings.unit);
     let (mut own, mut beside, mut details) = (Vec::new(), Vec::new(), Vec::new());
     for same in &found {
         let level = same.level;

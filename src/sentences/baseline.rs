@@ -40,7 +40,7 @@ pub(crate) fn against_baseline(
 
 /// Why no verdict about these rows is possible.
 pub(crate) fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
-    too_few(rows, &mut Numbers::of(unit))
+    too_few(rows, &mut Numbers::new(unit))
 }
 
 /// Why no verdict is possible: too few questions are shared in every condition, or their clusters are too few for any p-value.
@@ -70,7 +70,7 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
 /// The sentence about the conditions of a model that have one verdict; `None` if there are none.
 fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<Sentence> {
     let largest = largest(rows, |row| row.paired.difference)?;
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let verdict = largest.significance;
     let word = if verdict == Significance::Worse {
         "worse"
@@ -90,7 +90,7 @@ fn shown_against(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<
 
 /// The sentence that no difference is shown, with the largest one; that no verdict is possible; or that nothing can be compared.
 fn nothing_shown(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     if rows.is_empty() {
         let text = format!("Nothing can be compared with {old}.");
         let detail = "no model answered the same question about the same image in both".to_owned();

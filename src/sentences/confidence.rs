@@ -71,7 +71,7 @@ pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Se
         let (a, b) = (above(a), above(b));
         a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
     })?;
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let (model, level) = (most.model, most.level);
     let sure = numbers.percent("confidence", most.dark.confidence.value);
     let right = numbers.percent("accuracy", most.dark.accuracy.value);

@@ -1,8 +1,8 @@
 //! Sentences about what darkness costs all models together, with each variant.
 
 use super::format::format_alone;
-use super::lights::{Topic, means_of_set, of_set};
-use super::pooled::{detail, mean_levels, of_verdict, reserved, runs};
+use super::lights::{Topic, findings_of_kind, means_of_set};
+use super::pooled::{detail, mean_levels, reserved, runs, with_verdict};
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
@@ -18,15 +18,17 @@ use darkqa_score::significance::Significance;
 /// The cost of darkness, or of another cause, in each topic.
 pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
     let topics = Topic::all(findings);
-    let sentences = topics.iter().flat_map(|topic| of_topic(findings, topic));
+    let sentences = topics
+        .iter()
+        .flat_map(|topic| topic_sentences(findings, topic));
     sentences.collect()
 }
 
 /// The cost of darkness with the last kind of degradation, in each of its lights; then with another kind, if the last
 /// does not show it. If the two differ, both are named.
-fn of_topic(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> {
+fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> {
     let Topic { lights, others, .. } = topic;
-    let levels = |variant: &KindReading| of_set(findings, PooledKind::Darkness, variant);
+    let levels = |variant: &KindReading| findings_of_kind(findings, PooledKind::Darkness, variant);
     let mean = |variant: &KindReading| {
         let means = means_of_set(findings, PooledKind::Darkness, variant);
         means.into_iter().next()
@@ -76,7 +78,7 @@ fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
         Significance::NotShown,
     ]
     .into_iter();
-    verdicts.find(|verdict| !of_verdict(levels, *verdict).is_empty())
+    verdicts.find(|verdict| !with_verdict(levels, *verdict).is_empty())
 }
 
 /// The verdict over several levels together; `None` if nothing is detected.
@@ -103,13 +105,13 @@ pub(super) fn with_variant(
     name: Option<&str>,
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let verdict = verdict(levels)?;
     let shown_mean = mean.and_then(|mean| Some((mean, mean_verdict(mean)?)));
     if let (Some((mean, of_mean)), false) = (shown_mean, verdict.is_shown()) {
         return Some(over_levels(mean, levels, of_mean, name, numbers));
     }
-    let found = of_verdict(levels, verdict);
+    let found = with_verdict(levels, verdict);
     let darkest = found.last()?;
     let size = darkest.strict.difference.value;
     let cause = darkest.level.axis().unwrap_or(Axis::LIGHT).cause;

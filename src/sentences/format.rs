@@ -32,7 +32,7 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
             light => format!("At {level} {light}"),
         },
     };
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let readable = numbers.size("format", largest.format[0] - largest.format[1]);
     let lenient = numbers.difference("_lenient", largest.lenient.difference);
     let text = format!(

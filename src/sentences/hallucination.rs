@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::pooled::{detail, of_verdict, runs};
+use super::pooled::{detail, runs, with_verdict};
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::words::family as family_name;
 use crate::types::{AxisLevel, Family, KindReading};
@@ -19,9 +19,9 @@ pub(super) fn false_answers(
     answer: FalseAnswer,
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let shown = of_verdict(levels, Significance::Worse);
+    let shown = with_verdict(levels, Significance::Worse);
     let worst = shown.last()?;
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let of_what = match answer {
         FalseAnswer::No => "that are there",
         FalseAnswer::Yes => "that are not there",
@@ -100,7 +100,7 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
     let collapsed = shown
         .clone()
         .filter(|answer| answer.family == largest.family);
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let (level, model, top) = (largest.level, largest.model, &largest.collapse.top);
     let name = family_name(Some(largest.family));
     let share = numbers.percent("share", largest.collapse.share.value);

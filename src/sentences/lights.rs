@@ -84,7 +84,7 @@ pub(super) fn means_of_set<'f>(
 
 /// The findings of one kind and variant over all families that the kind is about, in the order of enhancers and levels. Sets in which
 /// no verdict is possible are left out.
-pub(super) fn of_set<'f>(
+pub(super) fn findings_of_kind<'f>(
     findings: &'f Findings<'_>,
     kind: PooledKind,
     variant: &KindReading,

@@ -38,7 +38,7 @@ use std::collections::BTreeSet;
 
 use self::confidence::Confidence;
 use self::hallucination::TopAnswer;
-use self::lights::{in_each_light, means_of_set, of_set};
+use self::lights::{findings_of_kind, in_each_light, means_of_set};
 use crate::types::{Family, KindReading};
 use darkqa_score::confusion::FalseAnswer;
 use darkqa_score::findings::Findings;
@@ -86,7 +86,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
 /// Sentences about noise, enhancers and no images.
 fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> {
     let unit = findings.unit;
-    let of = |kind| of_set(findings, kind, variant);
+    let of = |kind| findings_of_kind(findings, kind, variant);
     let mut sentences = Vec::new();
     let means = |kind| means_of_set(findings, kind, variant);
     sentences.extend(pooled::noise(
@@ -114,7 +114,7 @@ fn about_clean(findings: &Findings<'_>) -> Vec<Sentence> {
         .filter(|finding| finding.kind == PooledKind::Enhancer && finding.variant.kind.is_none());
     let clean: BTreeSet<&KindReading> = clean.map(|finding| &finding.variant).collect();
     let sentences = clean.into_iter().flat_map(|variant| {
-        let levels = of_set(findings, PooledKind::Enhancer, variant);
+        let levels = findings_of_kind(findings, PooledKind::Enhancer, variant);
         pooled::enhancers(&levels, &[], findings.unit)
     });
     sentences.collect()
@@ -125,7 +125,7 @@ fn about_answers(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence
     let unit = findings.unit;
     let mut sentences = Vec::new();
     for answer in [FalseAnswer::No, FalseAnswer::Yes] {
-        let levels = of_set(findings, PooledKind::Hallucination(answer), variant);
+        let levels = findings_of_kind(findings, PooledKind::Hallucination(answer), variant);
         sentences.extend(hallucination::false_answers(&levels, answer, unit));
     }
     let mut answers = TopAnswer::all(findings, variant);

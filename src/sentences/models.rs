@@ -18,7 +18,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let best = findings.best.as_ref().filter(|best| best.is_possible())?;
     let lenient = findings.lenient_best.as_ref()?;
     let (leader, second) = (best.leader(), best.models.get(1)?);
-    let mut numbers = Numbers::of(findings.unit);
+    let mut numbers = Numbers::new(findings.unit);
     let over = dark_levels(best);
     let axis = best.variant.kind.map_or(Axis::LIGHT, Kind::axis);
     let place = axis.place;
@@ -135,7 +135,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option
     if !is_lost || most.strict.verdict != Significance::Worse || of_most.high >= of_least.low {
         return None;
     }
-    let mut numbers = Numbers::of(findings.unit);
+    let mut numbers = Numbers::new(findings.unit);
     let text = format!(
         "{} costs more in {} ({} points at {darkest}) than in {} ({}).",
         capitalised(darkest.axis().unwrap_or(Axis::LIGHT).cause),

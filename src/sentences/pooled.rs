@@ -25,7 +25,7 @@ struct Shown<'f> {
 impl<'f> Shown<'f> {
     /// The findings of levels with a verdict, if there are any.
     fn levels(levels: &[&'f PooledFinding], verdict: Significance) -> Option<Self> {
-        let shown = of_verdict(levels, verdict);
+        let shown = with_verdict(levels, verdict);
         Some(Self {
             largest: PooledFinding::largest(&shown)?,
             at: runs(&shown, levels),
@@ -39,12 +39,12 @@ impl<'f> Shown<'f> {
         means: &[&'f PooledFinding],
         verdict: Significance,
     ) -> Vec<Self> {
-        let shown = of_verdict(levels, verdict);
+        let shown = with_verdict(levels, verdict);
         let is_alone = |mean: &&PooledFinding| {
             let mut shown = shown.iter();
             !shown.any(|finding| mean.mean_over.contains(&finding.level))
         };
-        let means = of_verdict(means, verdict).into_iter().filter(is_alone);
+        let means = with_verdict(means, verdict).into_iter().filter(is_alone);
         let means = means.map(|mean| Self {
             largest: mean,
             at: mean_levels(mean, levels),
@@ -90,7 +90,7 @@ pub(super) fn mean_levels(mean: &PooledFinding, levels: &[&PooledFinding]) -> St
 fn unshown<'f>(levels: &[&'f PooledFinding], means: &[&PooledFinding]) -> Vec<&'f PooledFinding> {
     let is_detected = |mean: &&PooledFinding| matches!(mean.claim(), Claim::Detected(_));
     let means: Vec<&PooledFinding> = means.iter().copied().filter(is_detected).collect();
-    let mut unshown = of_verdict(levels, Significance::NotShown);
+    let mut unshown = with_verdict(levels, Significance::NotShown);
     unshown.retain(|finding| {
         !means
             .iter()
@@ -112,7 +112,7 @@ pub(super) fn noise(
         (Significance::Better, "higher"),
     ] {
         for shown in Shown::all(levels, means, verdict) {
-            let mut numbers = Numbers::of(unit);
+            let mut numbers = Numbers::new(unit);
             let size = shown
                 .size(&mut numbers)
                 .replace(" points", &format!(" points {word}"));
@@ -137,7 +137,7 @@ pub(super) fn noise(
     if let Some(format) = format_alone(levels, unit) {
         return vec![format];
     }
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let text = "No difference in accuracy between noise and the exposure drop alone was detected.";
     let more = format!(
         "; largest at {}{}",
@@ -177,7 +177,7 @@ pub(super) fn enhancers(
 fn enhancer(shown: &Shown<'_>, verdict: Significance, unit: ClusterUnit) -> Option<Sentence> {
     let name = shown.largest.enhancer.as_ref()?;
     let at = &shown.at;
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     numbers.about(name);
     let size = shown.size(&mut numbers);
     let is_better = verdict == Significance::Better;
@@ -207,7 +207,7 @@ fn no_effect(
     if let Some(format) = format_alone(unshown, unit) {
         return Some(format);
     }
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     numbers.about(name);
     let text = format!("{name} at {}: no effect detected.", runs(unshown, levels));
     let more = format!(
@@ -245,7 +245,7 @@ pub(super) fn reserved(finding: &PooledFinding, numbers: &mut Numbers) -> String
 
 /// The findings with a verdict in both parsings and after the correction over all sentences; those without one are
 /// [`Significance::NotShown`].
-pub(super) fn of_verdict<'f>(
+pub(super) fn with_verdict<'f>(
     levels: &[&'f PooledFinding],
     verdict: Significance,
 ) -> Vec<&'f PooledFinding> {

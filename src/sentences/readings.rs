@@ -25,7 +25,7 @@ pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<
         Robustness::Open,
     ]
     .map(of);
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let text = format!(
         "{} of {} findings about noise {} under all {} noise profiles.",
         numbers.count("all", all),

@@ -32,7 +32,7 @@ pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
 
 /// The cost of the dark for a model in photographs.
 fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let least = if pair.is_lower_bound { "≥ " } else { "" };
     let ev = numbers.number("ev", pair.ev[1], 1);
     let place = format!("Photographed in the dark ({}, {least}{ev} EV)", pair.name);
@@ -54,7 +54,7 @@ fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
 
 /// Whether synthetic images stand for photographs.
 fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let (model, synthetic) = (&row.first.model, light(&row.second.variant, None));
     let level = row.second.condition();
     let (name, size) = (row.first.condition(), row.strict.paired.difference.value);
@@ -77,7 +77,7 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
 
 /// The effect of an enhancer on photographs.
 fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let name = row.first.enhancer.as_ref().map_or("", |name| name.as_str());
     if let Some(enhancer) = &row.first.enhancer {
         numbers.about(enhancer);

@@ -71,7 +71,7 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
         least.push((best.pairs.len() as f64 * best.least_p, best.clusters));
     }
     let (p, clusters) = least.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let mut numbers = Numbers::of(findings.unit);
+    let mut numbers = Numbers::new(findings.unit);
     let text = format!(
         "With {} no verdict on {} is possible, however large the effect.",
         numbers.clusters(clusters),
@@ -104,7 +104,7 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
     if half(widest) <= WIDE {
         return None;
     }
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let mut points = |name, half: f64| numbers.number(name, 100.0 * half, 0);
     let [least, most] = [
         points("narrowest", narrowest),
@@ -145,7 +145,7 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
         }
     }
     let sentences = grouped.into_iter().map(|(set, topics)| {
-        let mut numbers = Numbers::of(findings.unit);
+        let mut numbers = Numbers::new(findings.unit);
         let is_one = set.models.len() == 1;
         let models = if set.models.len() > MAX_NAMED {
             format!("{} models", numbers.count("models", set.models.len()))

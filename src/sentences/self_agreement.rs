@@ -50,7 +50,7 @@ fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
         "Nothing is known about {model}: no answer could be read in any of its replies at L0, so that there is nothing to compare it with."
     );
     let detail = "--request constrain=choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
-    let numbers = Numbers::of(found.unit);
+    let numbers = Numbers::new(found.unit);
     numbers.sentence(
         "no_answer_in_the_light",
         Tone::Note,
@@ -61,7 +61,7 @@ fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
 
 /// The sentence in place of a verdict: all questions have one answer about nearly all images.
 fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
-    let mut numbers = Numbers::of(found.unit);
+    let mut numbers = Numbers::new(found.unit);
     let (_, all) = found.informative(model);
     let all = numbers.count("questions", all);
     let text = format!(
@@ -93,7 +93,7 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let pairs =
         pairs.filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
     let sentences = pairs.map(|pair| {
-        let mut numbers = Numbers::of(found.unit);
+        let mut numbers = Numbers::new(found.unit);
         let same = numbers.percent("same", pair.same.value);
         let text = format!(
             "At L0 {} and {} give the same answer to {same} % of the questions that both answer.",
@@ -150,7 +150,7 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &KindReading) -> Op
         .max_by_key(|cell| cell.subject.level)?;
     let level = dark.subject.level?;
     let agreement = dark.agreement?;
-    let mut numbers = Numbers::of(found.unit);
+    let mut numbers = Numbers::new(found.unit);
     let share = numbers.percent("agreement", agreement.value);
     let ceiling = cells.clone().find(|cell| cell.role() == CellRole::Ceiling);
     let floor = cells.find(|cell| cell.role() == CellRole::Floor);
@@ -269,11 +269,11 @@ fn enhanced(
     })?;
     let levels = (at(Significance::Better), at(Significance::Worse));
     let (tone, text) = if found.set.light == SetLight::Dark && *variant == KindReading::NONE {
-        of_photographs(enhancer, model, strongest.claim())
+        photograph_effects(enhancer, model, strongest.claim())
     } else {
-        of_levels(enhancer, model, &light(variant, None), levels)
+        level_effects(enhancer, model, &light(variant, None), levels)
     };
-    let mut numbers = Numbers::of(found.unit);
+    let mut numbers = Numbers::new(found.unit);
     numbers.about(enhancer);
     let level = strongest.first.level?;
     let difference = numbers.difference("", strongest.strict.paired.difference);
@@ -293,7 +293,7 @@ fn enhanced(
 
 /// The effect of an enhancer of images in the light of `of` on the answers of a model, with the levels at which it makes them more and less
 /// like those at L0.
-fn of_levels(
+fn level_effects(
     enhancer: &EnhancerName,
     model: &str,
     of: &str,
@@ -329,7 +329,7 @@ fn of_levels(
 
 /// The effect of an enhancer of photographs in the dark on the answers of a model. The answers at L0 were given in the dark themselves, so
 /// that a change is neither help nor harm.
-fn of_photographs(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
+fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
     match change {
         Claim::Detected(Significance::Worse) => (
             Tone::Note,
@@ -362,7 +362,7 @@ fn way_out(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
     });
     let dark = cells.max_by_key(|cell| cell.subject.level)?;
     let (level, share) = (dark.subject.level?, dark.cannot_tell?);
-    let mut numbers = Numbers::of(found.unit);
+    let mut numbers = Numbers::new(found.unit);
     let in_light = light.cannot_tell as f64 / light.replies().max(1) as f64;
     let in_light = numbers.percent("light", in_light);
     let here = numbers.percent("share", share.value);

@@ -133,7 +133,7 @@ pub(super) struct Numbers {
 
 impl Numbers {
     /// No numbers yet; clusters are of this unit.
-    pub(super) fn of(unit: ClusterUnit) -> Self {
+    pub(super) fn new(unit: ClusterUnit) -> Self {
         Self {
             values: BTreeMap::new(),
             unit,

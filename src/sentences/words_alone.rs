@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::format::format_alone;
-use super::pooled::{detail, of_verdict, runs};
+use super::pooled::{detail, runs, with_verdict};
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family as family_name;
 use crate::types::{Axis, AxisLevel, KindReading};
@@ -20,13 +20,13 @@ const WITHOUT: &str = "without images";
 
 /// Where the models are less often right than without images.
 pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
-    let shown = of_verdict(levels, Significance::Worse);
+    let shown = with_verdict(levels, Significance::Worse);
     let Some(largest) = PooledFinding::largest(&shown) else {
         let worse = levels.iter().copied();
         let worse = worse.filter(|of| of.claim() == Claim::StrictOnly(Significance::Worse));
         return format_alone(&worse.collect::<Vec<_>>(), unit);
     };
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let who = match &largest.models[..] {
         [one] => format!("{one} is"),
         _ => "the models are".to_owned(),
@@ -65,7 +65,7 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
             && finding.enhancer.is_none()
             && finding.level == AxisLevel::L0
     })?;
-    let mut numbers = Numbers::of(findings.unit);
+    let mut numbers = Numbers::new(findings.unit);
     if let Some(format) = format_alone(&[of], findings.unit) {
         return Some(format);
     }
@@ -122,7 +122,7 @@ pub(super) fn in_a_family(
     let below = all.iter().copied().filter(|of| is_below(of));
     let most = below.min_by(|a, b| difference(a).total_cmp(&difference(b)))?;
     let model = &most.first.model;
-    let said = of_verdict(pooled, Significance::Worse);
+    let said = with_verdict(pooled, Significance::Worse);
     if said.iter().any(|finding| finding.models == [&**model]) {
         return None;
     }
@@ -137,7 +137,7 @@ pub(super) fn in_a_family(
         let models: BTreeSet<&str> = of.iter().map(|of| &*of.first.model).collect();
         models.len()
     });
-    let mut numbers = Numbers::of(unit);
+    let mut numbers = Numbers::new(unit);
     let family = capitalised(family_name(most.family.as_ref()));
     let text = if fallen == 1 {
         let (than, at) = (than(most), levels_below(&of_family, most));

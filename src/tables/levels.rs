@@ -13,13 +13,13 @@ use darkqa_score::findings::Findings;
 
 /// The tables of all items and, if the models were not asked the same ones, those of the items that they share.
 pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
-    let mut tables = of_summary(findings, &findings.summary, "");
+    let mut tables = summary_tables(findings, &findings.summary, "");
     if let Some(common) = &findings.common {
         let what = format!(
             " on the {} questions that all models with images answered",
             common.shared_questions
         );
-        for mut table in of_summary(findings, &common.summary, &what) {
+        for mut table in summary_tables(findings, &common.summary, &what) {
             table.latex = Some(format!("Accuracy in \\%{what}."));
             tables.push(table);
         }
@@ -28,13 +28,13 @@ pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
 }
 
 /// The table of each axis; `what` says on which items, if not on all.
-fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) -> Vec<Table> {
+fn summary_tables(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) -> Vec<Table> {
     let strict = summary.family_cells(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).in_light_of(findings);
     let notes = notes(summary, &ladder);
     let ladders = ladder.by_axis().into_iter();
     let mut tables: Vec<Table> = ladders
-        .map(|(axis, ladder)| of_axis(findings, summary, what, axis, &ladder))
+        .map(|(axis, ladder)| axis_table(findings, summary, what, axis, &ladder))
         .collect();
     if let Some(last) = tables.last_mut() {
         last.notes = notes;
@@ -42,7 +42,7 @@ fn of_summary(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) ->
     tables
 }
 
-fn of_axis(
+fn axis_table(
     findings: &Findings<'_>,
     summary: &AccuracySummary,
     what: &str,

@@ -19,19 +19,19 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
         let curves: Vec<&Curve> = curves.filter(|curve| curve.axis() == axis).collect();
         // Only light has tables without a row: it is what a run is about.
         if !curves.is_empty() || axis == Axis::LIGHT {
-            tables.extend(of_axis(findings, axis, curves));
+            tables.extend(axis_tables(findings, axis, curves));
         }
     }
     tables
 }
 
 /// The tables of the curves over one axis.
-fn of_axis(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 3] {
+fn axis_tables(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 3] {
     let notes = notes(&curves);
-    let lenient = table(&Names::of(axis), "", &curves, ReadingMode::Lenient).in_files_only();
+    let lenient = table(&Names::new(axis), "", &curves, ReadingMode::Lenient).in_files_only();
     let (whole, by_family): (Vec<&Curve>, Vec<&Curve>) =
         curves.into_iter().partition(|curve| curve.family.is_none());
-    let names = Names::of(axis);
+    let names = Names::new(axis);
     let heading = format!(
         "{} in {} (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
         names.threshold, axis.unit, findings.unit
@@ -60,7 +60,7 @@ struct Names {
 }
 
 impl Names {
-    fn of(axis: Axis) -> Self {
+    fn new(axis: Axis) -> Self {
         if axis == Axis::MOTION {
             return Self {
                 file: "blur_thresholds",

@@ -24,7 +24,7 @@ pub(crate) struct Series<'a> {
 }
 
 impl<'a> Series<'a> {
-    fn of(subject: &'a Subject, place: usize) -> Self {
+    fn new(subject: &'a Subject, place: usize) -> Self {
         Self {
             place,
             model: &subject.model,
@@ -93,7 +93,7 @@ impl<'a, C> Ladder<'a, C> {
             match (subject.view, subject.level) {
                 (Some(View::Image), Some(level)) => {
                     ladder.levels.insert(level);
-                    let series = ladder.series.entry(Series::of(subject, place));
+                    let series = ladder.series.entry(Series::new(subject, place));
                     series.or_default().insert(level, cell);
                 }
                 _ => ladder.without_level.push((subject, cell)),

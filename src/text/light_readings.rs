@@ -13,7 +13,7 @@ use darkqa_score::subject::Subject;
 pub(crate) struct LightReadings(BTreeSet<ReadingName>);
 
 impl LightReadings {
-    pub(crate) fn of<'s>(subjects: impl IntoIterator<Item = &'s Subject>) -> Self {
+    pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s Subject>) -> Self {
         let subjects = subjects.into_iter();
         Self(
             subjects
@@ -47,7 +47,7 @@ mod tests {
             let conditions: Vec<Condition> = conditions.collect();
             let subjects = conditions.iter().map(|c| Subject::new("m", Some(c)));
             let subjects: Vec<Subject> = subjects.collect();
-            LightReadings::of(&subjects)
+            LightReadings::new(&subjects)
         };
         let one = of(&["L0", "L3-ev", "L3-noise@eld", "L5-noise@eld+lift"]);
         let said = one.open_question().unwrap();

@@ -73,10 +73,10 @@ impl ChartData {
     /// # Errors
     /// None in practice: a chart has no value that JSON cannot hold.
     pub(crate) fn json(chart: &Chart) -> Result<String> {
-        embedded(&Self::of(chart))
+        embedded(&Self::new(chart))
     }
 
-    fn of(chart: &Chart) -> Self {
+    fn new(chart: &Chart) -> Self {
         let panels = chart.panels.iter().map(|panel| {
             let levels = panel.levels();
             let axis = levels.iter().find_map(|level| level.axis());

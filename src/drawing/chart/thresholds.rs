@@ -15,7 +15,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    pub(crate) fn of(axis: Axis) -> Self {
+    pub(crate) fn new(axis: Axis) -> Self {
         let (end, step, title) = if axis == Axis::MOTION {
             (140.0, 20, "threshold of motion blur")
         } else {

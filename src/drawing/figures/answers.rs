@@ -61,7 +61,7 @@ impl Overview<'_> {
                 content: PanelContent::Flat(share),
                 model: None,
             });
-            let title = format!("{}, n {n}", self.names.of(family_name(Some(&family))));
+            let title = format!("{}, n {n}", self.names.shown(family_name(Some(&family))));
             Some(Panel {
                 title,
                 lines,

@@ -34,7 +34,7 @@ impl Overview<'_> {
                 };
                 let lines: Vec<PlotLine> = LINES.into_iter().enumerate().filter_map(line).collect();
                 if !lines.is_empty() {
-                    let name = self.names.of(model);
+                    let name = self.names.shown(model);
                     let title = format!("{name}, {}", self.light(&variant, None));
                     panels.push(Panel {
                         title,

@@ -172,7 +172,7 @@ impl<'a> Overview<'a> {
             let (name, style, of) = if cell.subject.view.is_none() {
                 (CHANCE.to_owned(), LineStyle::REFERENCE, None)
             } else {
-                let name = format!("{} without images", self.names.of(model));
+                let name = format!("{} without images", self.names.shown(model));
                 (name, self.style(model), Some(model.to_owned()))
             };
             let content = PanelContent::Flat(cell.accuracy?.value);
@@ -209,7 +209,7 @@ impl<'a> Overview<'a> {
 
     /// A variant in words, with its enhancer.
     fn light(&self, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
-        let enhancer = enhancer.map(|name| self.names.of(name.as_str()));
+        let enhancer = enhancer.map(|name| self.names.shown(name.as_str()));
         light_with(variant, enhancer.as_deref())
     }
 
@@ -232,7 +232,7 @@ impl<'a> Overview<'a> {
     ) -> Vec<PlotLine> {
         let models = self.models.iter();
         let lines = models.map(|model| PlotLine {
-            name: self.names.of(model),
+            name: self.names.shown(model),
             style: self.style(model),
             content: PanelContent::Curve(self.points(model, variant, None, &mut number)),
             model: Some((*model).to_owned()),
@@ -262,7 +262,7 @@ impl<'a> Overview<'a> {
                 let marks: Vec<DarkMark> = marks.collect();
                 if !marks.is_empty() {
                     lines.push(PlotLine {
-                        name: format!("{}, {} (real)", self.names.of(model), pair.name),
+                        name: format!("{}, {} (real)", self.names.shown(model), pair.name),
                         style: self.style(model),
                         content: PanelContent::Marks(marks),
                         model: Some((*model).to_owned()),
@@ -348,7 +348,7 @@ impl<'a> Overview<'a> {
     fn variants(&self) -> Option<(String, Chart)> {
         let models = self.averaged_models();
         let title = match &*models {
-            [single] => format!("{}, n {}", self.names.of(single), self.n(None)),
+            [single] => format!("{}, n {}", self.names.shown(single), self.n(None)),
             several => format!("mean of {} models, n {} each", several.len(), self.n(None)),
         };
         let all = self.tested_variants();
@@ -416,7 +416,7 @@ impl<'a> Overview<'a> {
                     let is_clean = points.first().is_some_and(|(at, _)| *at == AxisLevel::L0);
                     (points.len() > 1 || is_clean).then(|| PlotLine {
                         name: enhancer
-                            .map_or("raw".to_owned(), |name| self.names.of(name.as_str())),
+                            .map_or("raw".to_owned(), |name| self.names.shown(name.as_str())),
                         style: LineStyle(index),
                         content: PanelContent::Curve(points),
                         model: Some((*model).to_owned()),
@@ -425,7 +425,7 @@ impl<'a> Overview<'a> {
                 let lines = self.raw_and_enhanced().enumerate().filter_map(line);
                 let lines: Vec<PlotLine> = lines.collect();
                 if lines.len() > 1 {
-                    let (name, light) = (self.names.of(model), self.light(&variant, None));
+                    let (name, light) = (self.names.shown(model), self.light(&variant, None));
                     let title = format!("{name}, {light}, n {}", self.n(None));
                     panels.push(Panel {
                         title,
@@ -449,7 +449,7 @@ impl<'a> Overview<'a> {
         let panels = families.into_iter().map(|family| {
             let n = self.n(Some(family));
             Panel {
-                title: format!("{}, n {n}", self.names.of(family_name(Some(family)))),
+                title: format!("{}, n {n}", self.names.shown(family_name(Some(family)))),
                 lines: self.accuracies(variant, Some(family)),
                 model: None,
             }

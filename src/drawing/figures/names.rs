@@ -28,7 +28,7 @@ pub(crate) struct KnownNames {
 
 impl KnownNames {
     /// The names in these findings.
-    pub(crate) fn of(findings: &Findings<'_>) -> Self {
+    pub(crate) fn new(findings: &Findings<'_>) -> Self {
         let subjects = &findings.grid.subjects;
         let asked = subjects.iter().filter(|subject| subject.view.is_some());
         let enhancers = subjects.iter().filter_map(|of| of.enhancer.as_ref());
@@ -98,10 +98,10 @@ impl Names {
         for set in all {
             let mut shown = BTreeMap::new();
             for name in set {
-                if let Some(other) = shown.insert(names.of(name), name) {
+                if let Some(other) = shown.insert(names.shown(name), name) {
                     let problem = format!(
                         "{other:?} and {name:?} would both be called {:?}: give them different names",
-                        names.of(name)
+                        names.shown(name)
                     );
                     return Err(Error::usage("--label", problem));
                 }
@@ -141,7 +141,7 @@ impl Names {
     pub(crate) fn said(&self) -> String {
         let forms = self.shortened.iter();
         let forms: Vec<String> = forms
-            .map(|model| format!("{} is {model}", self.of(model)))
+            .map(|model| format!("{} is {model}", self.shown(model)))
             .collect();
         match &*forms {
             [] => String::new(),
@@ -150,7 +150,7 @@ impl Names {
     }
 
     /// The name that is shown.
-    pub(super) fn of(&self, name: &str) -> String {
+    pub(super) fn shown(&self, name: &str) -> String {
         self.labels
             .get(name)
             .map_or(name, String::as_str)
@@ -191,7 +191,7 @@ mod tests {
             families: BTreeSet::new(),
         };
         let names = Names::new(&[], &[], None, &known).unwrap();
-        let shown = |name: &str| names.of(name);
+        let shown = |name: &str| names.shown(name);
         assert_eq!(shown("script:sim-A.jsonl"), "sim-A");
         assert_eq!(shown("org/vlm-7b"), "vlm-7b");
         for name in ["a/same", "b/same", "x/lift", "folder/"] {
@@ -203,7 +203,7 @@ mod tests {
         );
         let labels = [("org/vlm-7b".to_owned(), "sim-A".to_owned())];
         let names = Names::new(&labels, &[], None, &known).unwrap();
-        assert_eq!(names.of("script:sim-A.jsonl"), "script:sim-A.jsonl");
+        assert_eq!(names.shown("script:sim-A.jsonl"), "script:sim-A.jsonl");
         assert_eq!(Names::default().said(), "");
     }
 }

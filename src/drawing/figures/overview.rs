@@ -34,7 +34,7 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
     let of_light = |variant: &KindReading| variant.kind.map(Kind::axis) == Some(Axis::LIGHT);
     let variant = overview.main_variant();
     let enhancer = overview.enhancers.first().map(|name| {
-        let shown = overview.names.of(name.as_str());
+        let shown = overview.names.shown(name.as_str());
         ((*name).clone(), shown)
     });
     let variants: Vec<KindReading> = overview.tested_variants();
@@ -92,7 +92,7 @@ impl Overview<'_> {
     /// "mean of 6 models", or the model.
     fn who(&self, models: &[&str]) -> String {
         match models {
-            [single] => self.names.of(single),
+            [single] => self.names.shown(single),
             several => format!("mean of {} models", several.len()),
         }
     }
@@ -158,7 +158,7 @@ impl Overview<'_> {
                 self.accuracy_of(subject, None)
             });
             lines.push(PlotLine {
-                name: self.names.of(model),
+                name: self.names.shown(model),
                 style: LineStyle::BLACK,
                 content: PanelContent::Curve(points),
                 model: None,
@@ -178,7 +178,7 @@ impl Overview<'_> {
             let points = super::mean(&curves.collect::<Vec<_>>());
             let raw = || "raw".to_owned();
             (!points.is_empty()).then(|| PlotLine {
-                name: enhancer.map_or_else(raw, |name| self.names.of(name.as_str())),
+                name: enhancer.map_or_else(raw, |name| self.names.shown(name.as_str())),
                 style: LineStyle(index),
                 content: PanelContent::Curve(points),
                 model: None,

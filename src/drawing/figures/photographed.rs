@@ -27,7 +27,7 @@ impl Overview<'_> {
                 let name = match &subject.enhancer {
                     None => "raw".to_owned(),
                     Some(name) => {
-                        let name = self.names.of(name.as_str());
+                        let name = self.names.shown(name.as_str());
                         format!("{name}{}", subject.variant.group_suffix())
                     }
                 };
@@ -44,7 +44,7 @@ impl Overview<'_> {
             BarPanel {
                 title: format!(
                     "{}: accuracy in %, n {}",
-                    self.names.of(model),
+                    self.names.shown(model),
                     self.n(None)
                 ),
                 bars: bars.collect(),

@@ -118,7 +118,7 @@ impl Overview<'_> {
                 .map(|level| cells.remove(level).unwrap_or(TableCell::Blank));
             TableRow {
                 is_best: self.is_best(model, variant),
-                ..row(self.names.of(model), None, numbers)
+                ..row(self.names.shown(model), None, numbers)
             }
         });
         let rows = rows.chain(self.without_images(levels.len())).collect();
@@ -153,7 +153,7 @@ impl Overview<'_> {
             };
             let mut numbers = vec![TableCell::Blank; columns];
             *numbers.first_mut()? = first;
-            let name = self.names.of(&cell.subject.model);
+            let name = self.names.shown(&cell.subject.model);
             Some(row(name, Some("without images"), numbers))
         })
     }
@@ -183,7 +183,7 @@ impl Overview<'_> {
             let numbers = families
                 .iter()
                 .map(|family| self.at(model, level, variant, family));
-            row(self.names.of(model), Some(&level.to_string()), numbers)
+            row(self.names.shown(model), Some(&level.to_string()), numbers)
         });
         let rows = rows.collect();
         let caption = format!(
@@ -195,7 +195,7 @@ impl Overview<'_> {
         );
         let heads = families
             .iter()
-            .map(|family| self.names.of(family_name(Some(family))));
+            .map(|family| self.names.shown(family_name(Some(family))));
         table(caption, heads, rows)
     }
 
@@ -260,12 +260,12 @@ impl Overview<'_> {
                 let at = points.iter().find(|(at, _)| at == level);
                 at.map_or(TableCell::Blank, |(_, of)| TableCell::Estimate(*of))
             });
-            row(self.names.of(model), Some(""), numbers)
+            row(self.names.shown(model), Some(""), numbers)
         });
         let rows = std::iter::once(effect).chain(own).collect();
         let caption = format!(
             "Effect of {} in points, and accuracy with it in %, {}. {} Bold: a difference that is shown (p < 0.05 after Holm's correction over the levels).",
-            self.names.of(enhancer.as_str()),
+            self.names.shown(enhancer.as_str()),
             self.light(variant, None),
             self.basis()
         );

@@ -49,7 +49,7 @@ impl Overview<'_> {
             let darkest = curve.summary.darkest.value();
             let light = self.light(&curve.variant, curve.enhancer.as_ref());
             Some(ThresholdRow {
-                name: format!("{}, {light}", self.names.of(&curve.model)),
+                name: format!("{}, {light}", self.names.shown(&curve.model)),
                 threshold,
                 words: format!(
                     "{} [{}, {}]",
@@ -81,7 +81,7 @@ impl Overview<'_> {
             caption: caption.to_owned(),
             chart: Drawn::Thresholds(ThresholdChart {
                 rows,
-                scale: Scale::of(axis),
+                scale: Scale::new(axis),
                 unit: self.findings.unit.to_string(),
             }),
         })

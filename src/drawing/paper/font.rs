@@ -81,7 +81,7 @@ impl Font {
             return text.to_owned();
         }
         let letters: Vec<char> = text.chars().collect();
-        let lengths = Lengths::of(&letters, &self.letters(text));
+        let lengths = Lengths::new(&letters, &self.letters(text));
         let rest = self.width("…", size);
         // A name of a stranger may be very long: a text is made of those letters alone that nearly fit. Sums differ by their rounding.
         let nearly = room * (1.0 + 1e-6) + 1e-6;
@@ -126,7 +126,7 @@ struct Lengths {
 }
 
 impl Lengths {
-    fn of(letters: &[char], widths: &[Letter]) -> Self {
+    fn new(letters: &[char], widths: &[Letter]) -> Self {
         let (mut starts, mut trimmed_starts) = (vec![0.0], vec![0.0]);
         let (mut ends, mut trimmed_ends) = (vec![0.0], vec![0.0]);
         let all = || letters.iter().zip(widths);

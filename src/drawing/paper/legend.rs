@@ -61,7 +61,7 @@ const START: f64 = 0.3;
 
 impl<'a> Legend<'a> {
     /// The legend of a chart of lines.
-    pub(super) fn of_chart(chart: &'a Chart, look: &Look) -> Self {
+    pub(super) fn for_chart(chart: &'a Chart, look: &Look) -> Self {
         let lines = chart.panels.iter().flat_map(|panel| &panel.lines);
         Self::new(lines.filter(|line| !line.is_empty()).map(Entry::from), look)
     }

@@ -23,7 +23,7 @@ const BAND: f64 = 0.16;
 
 /// The chart as a sheet. Each number is drawn where the axes say; the note of the chart is left to the caption.
 pub(crate) fn lines(chart: &Chart, look: &Look) -> Sheet {
-    let legend = Legend::of_chart(chart, look);
+    let legend = Legend::for_chart(chart, look);
     let most = (look.width / (LEAST * look.letters)) as usize;
     let columns = chart.columns.min(most).min(chart.panels.len()).max(1);
     let (first, next) = margins(look);

@@ -31,7 +31,7 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
     let beside = (FIRST + LAST) * look.letters + between * (columns - 1) as f64;
     // Written with one decimal, and never more than there is.
     let width = (10.0 * (look.width - beside) / columns as f64).floor() / 10.0;
-    let legend = Legend::of_chart(chart, look);
+    let legend = Legend::for_chart(chart, look);
     let mut text = format!(
         "% Made by darkqa-eval. In the preamble: \\usepackage{{pgfplots}}\n\
          % \\usepgfplotslibrary{{groupplots,fillbetween}} \\pgfplotsset{{compat=1.17}}\n\

@@ -259,7 +259,7 @@ mod tests {
         AxisLevel::new(Kind::ALL[0], severity)
     }
 
-    fn of(size: [usize; 2], levels: &[AxisLevel]) -> Story {
+    fn made_story(size: [usize; 2], levels: &[AxisLevel]) -> Story {
         let cell = |mark| StoryCell {
             image: Rgb::new(size[0], size[1], vec![90; size[0] * size[1] * 3]).unwrap(),
             marks: vec![("observer".to_owned(), mark)],
@@ -311,11 +311,11 @@ mod tests {
     #[test]
     fn images_marks_and_curves_are_drawn() {
         let levels = [AxisLevel::L0, level(Severity::L3), level(Severity::L5)];
-        let sheet = story(&of([60, 80], &levels));
+        let sheet = story(&made_story([60, 80], &levels));
         assert!(has(&sheet, [90; 3]) > 6 * 60 * 80);
         assert!(has(&sheet, GREEN) > 30 && has(&sheet, RED) > 30);
         let curve = has(&sheet, LineStyle(0).rgb());
-        let mut without = of([60, 80], &levels);
+        let mut without = made_story([60, 80], &levels);
         without.lines.remove(0);
         assert!(curve > 1000 && has(&story(&without), LineStyle(0).rgb()) == 0);
     }
@@ -327,7 +327,7 @@ mod tests {
             .collect();
         for size in [[1, 1], [3, 500], [500, 3], [720, 1280]] {
             for levels in [&all[..1], &all] {
-                assert!(story(&of(size, levels)).width() <= WIDTH + CELL);
+                assert!(story(&made_story(size, levels)).width() <= WIDTH + CELL);
             }
         }
     }

@@ -44,7 +44,7 @@ impl OpenReport<'_> {
 
     /// The light readings of the noisy images.
     pub(super) fn light_readings(&self) -> LightReadings {
-        LightReadings::of(self.answers.iter().map(|answer| &answer.subject))
+        LightReadings::new(self.answers.iter().map(|answer| &answer.subject))
     }
 }
 

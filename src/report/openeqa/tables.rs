@@ -95,7 +95,7 @@ fn levels(report: &OpenReport<'_>) -> Vec<Table> {
     let whole = ladder(report.summary, &Group::All);
     let ladders = whole.by_axis().into_iter();
     let mut tables: Vec<Table> = ladders
-        .map(|(axis, ladder)| of_axis(report, axis, &ladder))
+        .map(|(axis, ladder)| axis_table(report, axis, &ladder))
         .collect();
     if let Some(last) = tables.last_mut() {
         last.notes = without_images(report.summary, &whole);
@@ -103,7 +103,7 @@ fn levels(report: &OpenReport<'_>) -> Vec<Table> {
     tables
 }
 
-fn of_axis(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>) -> Table {
+fn axis_table(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>) -> Table {
     let summary = report.summary;
     let of = if axis == Axis::LIGHT {
         String::new()

@@ -159,7 +159,7 @@ enum Why {
 }
 
 impl Why {
-    fn of(trial: Option<TrialRef<'_>>) -> Self {
+    fn new(trial: Option<TrialRef<'_>>) -> Self {
         let unread = trial.and_then(|trial| trial.strict()?.why);
         let failed = trial.and_then(TrialRef::failure);
         match (unread, failed) {
@@ -186,7 +186,7 @@ fn reasons(grid: &Grid<'_>) -> (Vec<String>, Vec<Vec<usize>>) {
     let mut indices = Vec::new();
     for subject in 0..grid.subjects.len() {
         let why =
-            (0..grid.items.len()).map(|item| reasons.index_of(Why::of(grid.trial(subject, item))));
+            (0..grid.items.len()).map(|item| reasons.index_of(Why::new(grid.trial(subject, item))));
         indices.push(why.collect());
     }
     (reasons.list.into_iter().map(Why::words).collect(), indices)

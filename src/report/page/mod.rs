@@ -276,7 +276,7 @@ fn title(who: &str, inputs: &PageInputs<'_>) -> String {
 fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
     let grid = &report.findings.grid;
     let size = format!("{} (95 %) · strict parsing", head(report));
-    let readings = LightReadings::of(&grid.subjects);
+    let readings = LightReadings::new(&grid.subjects);
     std::iter::once(size)
         .chain(readings.open_question())
         .collect()

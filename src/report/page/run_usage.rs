@@ -23,7 +23,7 @@ pub struct RunUsage {
 
 impl RunUsage {
     /// The sums over some trials; `is_built_in` says of a model's name whether it is asked at no endpoint.
-    pub(crate) fn of<'t>(
+    pub(crate) fn new<'t>(
         trials: impl Iterator<Item = TrialRef<'t, ChoiceDetail>>,
         is_built_in: impl Fn(&str) -> bool,
     ) -> Self {

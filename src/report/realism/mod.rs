@@ -137,7 +137,7 @@ impl RealismSummary {
                 kl_rule: rules.named(rules.empty),
                 kl_other_rule: (rules.bins == Bins::Fu).then(|| rules.named(rules.empty.other())),
                 drop: Mean::from_values(&drops)?,
-                exposure: MethodRow::of(&exposures)?,
+                exposure: MethodRow::new(&exposures)?,
                 noise: NoiseRow::all(pairs),
                 source,
                 fits,

@@ -18,7 +18,7 @@ pub(super) struct MethodRow {
 
 impl MethodRow {
     /// Means over images; `None` without any.
-    pub(super) fn of(images: &[&ImageComparison]) -> Option<Self> {
+    pub(super) fn new(images: &[&ImageComparison]) -> Option<Self> {
         let mean = |number: fn(&ImageComparison) -> f64| {
             let numbers: Vec<f64> = images.iter().map(|image| number(image)).collect();
             Mean::from_values(&numbers)
@@ -65,12 +65,12 @@ impl NoiseRow {
                 Some((&pair.exposure, noise))
             });
             let of_pairs: Vec<(&ImageComparison, &NoiseComparison)> = of_pairs.collect();
-            Self::of(&first.method, &of_pairs)
+            Self::new(&first.method, &of_pairs)
         });
         rows.collect()
     }
 
-    fn of(method: &NoiseMethod, pairs: &[(&ImageComparison, &NoiseComparison)]) -> Option<Self> {
+    fn new(method: &NoiseMethod, pairs: &[(&ImageComparison, &NoiseComparison)]) -> Option<Self> {
         let images: Vec<&ImageComparison> = pairs.iter().map(|(_, noise)| &noise.image).collect();
         let clean: Vec<f64> = pairs.iter().map(|(_, noise)| noise.clean_psnr).collect();
         let differences = pairs
@@ -83,7 +83,7 @@ impl NoiseRow {
         };
         Some(Self {
             method: method.clone(),
-            images: MethodRow::of(&images)?,
+            images: MethodRow::new(&images)?,
             clean_psnr: Mean::from_values(&clean)?,
             differences: Differences {
                 psnr: mean(0)?,

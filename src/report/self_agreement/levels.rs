@@ -144,7 +144,7 @@ pub(super) fn levels(found: &SelfAgreement<'_>) -> Vec<Table> {
         .into_iter()
         .enumerate()
         .map(|(index, (axis, ladder))| {
-            let mut table = of_axis(found, axis, &ladder);
+            let mut table = axis_table(found, axis, &ladder);
             if index == last {
                 table.notes = notes(found);
             }
@@ -153,7 +153,7 @@ pub(super) fn levels(found: &SelfAgreement<'_>) -> Vec<Table> {
     tables.collect()
 }
 
-fn of_axis(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementCell>) -> Table {
+fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementCell>) -> Table {
     // L0 stands at the front even if nothing was asked again there.
     let mut levels: BTreeSet<AxisLevel> = ladder.levels.clone();
     levels.insert(AxisLevel::L0);

@@ -72,7 +72,7 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
         found.grid.subjects.len(),
         found.grid.clusters
     );
-    let readings = LightReadings::of(&found.grid.subjects);
+    let readings = LightReadings::new(&found.grid.subjects);
     std::iter::once(facts)
         .chain(readings.open_question())
         .collect()
@@ -129,10 +129,10 @@ pub(crate) fn summary(
     let head = Head {
         runs: runs.head("darkqa.self-agreement/1"),
         measure: AGREEMENT,
-        readings: LightReadings::of(&report.found.grid.subjects),
+        readings: LightReadings::new(&report.found.grid.subjects),
         alerts: &report.alerts,
         findings: &report.sentences,
-        own_answers: own_answers.map(Rows::of),
+        own_answers: own_answers.map(Rows::new),
     };
     document(head, &tables::summary(report.found), &report.tables, length)
 }

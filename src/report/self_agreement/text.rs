@@ -30,7 +30,7 @@ pub(crate) fn text(
         ReportLength::Summary => text += &short_tables(report),
         ReportLength::Full => text += &render(&report.tables),
     }
-    let readings = LightReadings::of(&report.found.grid.subjects);
+    let readings = LightReadings::new(&report.found.grid.subjects);
     let open = readings.open_question();
     text += &open.map_or_else(String::new, |open| wrapped(" ", &open, " "));
     for (_, folder) in runs {

@@ -50,7 +50,7 @@ impl BoardCell {
     }
 
     /// A cell of a table, whose interval stands beneath it.
-    pub(super) fn of(kind: ColumnKind, cell: &TableCell) -> Self {
+    pub(super) fn new(kind: ColumnKind, cell: &TableCell) -> Self {
         let share = interval(kind, cell).or(match (kind, cell) {
             (ColumnKind::Share, TableCell::Estimate(share)) => Some(*share),
             _ => None,

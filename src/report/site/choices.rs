@@ -248,7 +248,7 @@ pub(super) fn board(rows: &[ChoiceRow]) -> BoardTable {
 }
 
 fn board_row(row: &ChoiceRow) -> BoardRow {
-    let share = |share: Option<Estimate>| BoardCell::of(Share, &TableCell::from(share));
+    let share = |share: Option<Estimate>| BoardCell::new(Share, &TableCell::from(share));
     let rank = row.rank.map(|rank| rank.first * 1000 + rank.last);
     let rank = BoardCell::text(&row.rank_text())
         .keyed(rank.map_or_else(String::new, |rank| rank.to_string()));
@@ -262,22 +262,22 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
         (Some((change, verdict)), Some(darkest)) => {
             difference(*change, *verdict, &darkest.to_string())
         }
-        _ => BoardCell::of(Points, &TableCell::Missing),
+        _ => BoardCell::new(Points, &TableCell::Missing),
     };
     let gain = match &row.gain {
         Some((enhancer, level, gain, verdict)) => {
             difference(*gain, *verdict, &format!("{enhancer}, {level}"))
         }
-        None => BoardCell::of(Points, &TableCell::Missing),
+        None => BoardCell::new(Points, &TableCell::Missing),
     };
     let why = match &row.threshold {
         Some(Err(reason)) => why(reason),
         _ => String::new(),
     };
     let threshold = if why.is_empty() {
-        BoardCell::of(Threshold, &threshold(row))
+        BoardCell::new(Threshold, &threshold(row))
     } else {
-        BoardCell::of(Threshold, &TableCell::Missing).small(&why)
+        BoardCell::new(Threshold, &TableCell::Missing).small(&why)
     };
     let [unread, replies] = row.unread;
     let part = unread as f64 / replies.max(1) as f64;
@@ -293,14 +293,14 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
             BoardCell::text(&row.model)
                 .small(&run)
                 .header(row.run.path()),
-            BoardCell::of(Count, &TableCell::from(n)),
+            BoardCell::new(Count, &TableCell::from(n)),
             share(row.clean),
             share(row.area),
             change,
             threshold,
             gain,
             below.class(if row.below.is_empty() { "" } else { "below" }),
-            BoardCell::of(ColumnKind::Percent, &TableCell::Number(part))
+            BoardCell::new(ColumnKind::Percent, &TableCell::Number(part))
                 .small(&format!("{unread} of {replies}")),
             BoardCell::text(&row.run.date),
             BoardCell::text(&row.run.version),

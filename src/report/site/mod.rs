@@ -86,7 +86,7 @@ fn data(site: &Site, tables: &[Table]) -> Result<Vec<u8>> {
             shared: shared.map(|(name, value)| [&**name, &**value]).collect(),
             differs: group.differs.as_ref(),
             ranking,
-            rows: Rows::of(table),
+            rows: Rows::new(table),
         }
     });
     let data = SiteData {

@@ -109,7 +109,7 @@ pub(super) fn board(rows: &[OpenRow]) -> BoardTable {
         let [scored, due] = row.levels.values().fold([0, 0], |[scored, due], cell| {
             [scored + cell.1, due + cell.2]
         });
-        let share = |score: Option<Estimate>| BoardCell::of(Share, &TableCell::from(score));
+        let share = |score: Option<Estimate>| BoardCell::new(Share, &TableCell::from(score));
         let mut cells = vec![
             BoardCell::text(&row.model)
                 .small(&row.run.name)
@@ -121,7 +121,7 @@ pub(super) fn board(rows: &[OpenRow]) -> BoardTable {
         ];
         cells.extend(levels.iter().map(|level| match row.levels.get(level) {
             Some((score, ..)) => share(*score),
-            None => BoardCell::of(Share, &TableCell::Absent),
+            None => BoardCell::new(Share, &TableCell::Absent),
         }));
         if has_blind {
             cells.push(share(row.blind));

@@ -126,7 +126,7 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
         &args.label,
         &args.order,
         args.reference.as_ref(),
-        &KnownNames::of(findings),
+        &KnownNames::new(findings),
     )?;
     let mut output = String::new();
     for alert in runs.alerts(&all) {
