@@ -1,4 +1,5 @@
-//! The enhancers that darkqa-eval carries: [`BUILT_IN`]. `README.md` beside this file tells what each one does.
+//! The networks that darkqa-eval carries: the enhancers, [`BUILT_IN`], and a model that answers from the pixels, [`ROOM_NET`].
+//! `README.md` beside this file describes them.
 
 /// An ONNX model with its sidecar.
 #[derive(Debug)]
@@ -24,3 +25,7 @@ pub const BUILT_IN: [BuiltIn; 2] = [
         sidecar: include_str!("gray-gain.onnx.toml"),
     },
 ];
+
+/// The network of `--model room-net`: ONNX, with an input `image` of 1×3×144×192 floats from 0 to 1, and the outputs `classes`
+/// (1×144×192, numbers of mpcat40), `distance` (1×144×192, in metres) and `rooms` (1×6, shares of the room types).
+pub const ROOM_NET: &[u8] = include_bytes!("room-net.onnx");
