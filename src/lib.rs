@@ -95,8 +95,8 @@
 //! | `python_light` | | the Python module `darkqa_light`: what `light` does, on arrays; the program does not use it |
 //! | `picture` | `picture` | image files with their colour profiles and orientation, maps of numbers, scaling, and images encoded for a request |
 //! | `scenes` | `rooms` | the built-in rooms, drawn by a seed with all their maps |
-//! | `questions` | `darkqa_questions` | a frame with its maps → questions with one true answer, by rule; and the observer: what the rules could still answer from given pixels |
-//! | `enhance` | `darkqa_enhance` | a degraded image → an enhanced one, by the user's ONNX model; `models` has the enhancers that the program carries |
+//! | `questions` | `darkqa_questions` | a frame with its maps → questions with one true answer, by rule; the observer: what the rules could still answer from given pixels; and answers from maps that a network predicted |
+//! | `enhance` | `darkqa_enhance` | a degraded image → an enhanced one, by the user's ONNX model; `models` has the networks that the program carries |
 //! | `choice` | `darkqa_score::choice` | a reply → a choice or a mark |
 //! | `statistics` | `darkqa_score` | estimates with intervals, tests and thresholds of clustered replies |
 //! | `score` | `darkqa_score` | records → numbers with their intervals |

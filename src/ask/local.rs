@@ -8,7 +8,10 @@ use super::call::Call;
 use super::failure::AskError;
 use super::random::Random;
 use crate::types::question::letter;
-use crate::types::{Digest, FailureKind, Observed, Question, Reply};
+use crate::types::{Digest, FailureKind, Finish, Observed, Question, Reply};
+
+/// Reason for the end of a reply that is a guess.
+const GUESS: &str = "guess";
 
 /// The answer of a function.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -17,6 +20,8 @@ pub(crate) struct LocalAnswer {
     pub(crate) choice: Option<usize>,
     /// The observation, for the record; `None` without an image.
     pub(crate) observed: Option<Observed>,
+    /// Whether the record calls the answer a guess.
+    pub(crate) guessed: bool,
 }
 
 /// A function that answers a question.
@@ -64,10 +69,16 @@ impl Local {
             Some(choice) => letter(choice).to_string(),
             None => self.prior.answer(question, call),
         };
+        let reply = Reply::local(text);
         Ok(Reply {
+            finish: if answer.guessed {
+                Finish::Other(GUESS.to_owned())
+            } else {
+                reply.finish
+            },
             observed: answer.observed,
             chances: None,
-            ..Reply::local(text)
+            ..reply
         })
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         }
         Some(Command::Export(args)) => {
             idle.light(&args.light);
-            idle.enhancement(&args.enhancers);
+            idle.enhancement(&args.enhancers, false);
         }
         Some(Command::Questions(args))
             if args.shard.as_deref().is_some_and(|shard| shard != "none") =>
@@ -125,14 +125,9 @@ fn without(name: &str, mut ids: Vec<String>) -> Vec<String> {
     ids
 }
 
+/// The flags that decide only enhanced images, without those of ONNX Runtime.
 fn enhancement() -> Vec<String> {
-    [
-        ids::<EnhancerArgs>(),
-        ids::<SizeArgs>(),
-        ids::<ProbeArgs>(),
-        ids::<RuntimeArgs>(),
-    ]
-    .concat()
+    [ids::<EnhancerArgs>(), ids::<SizeArgs>(), ids::<ProbeArgs>()].concat()
 }
 
 /// The flags that were typed, and the warnings about those without effect.
@@ -263,7 +258,8 @@ impl NoEffect {
             self.because("no file of models is named", &["trust_models".into()]);
         }
         self.light(&args.light);
-        self.enhancement(&args.enhancers);
+        let may_run = models.models.is_some() || models.model.contains(&ModelName::RoomNet);
+        self.enhancement(&args.enhancers, may_run);
         let mut names = models.model.iter().chain(&models.blind_model).chain(judge);
         if models.models.is_none() && !names.any(|name| matches!(name, ModelName::Remote(_))) {
             let sent = [
@@ -322,12 +318,17 @@ impl NoEffect {
         }
     }
 
-    /// Checks the flags of enhancement. Enhancers that no condition uses are an error.
-    fn enhancement(&mut self, args: &EnhancerArgs) {
+    /// Checks the flags of enhancement. Enhancers that no condition uses are an error. The model `room-net` needs ONNX Runtime, too.
+    fn enhancement(&mut self, args: &EnhancerArgs, may_run_room_net: bool) {
+        let mut runtime = ids::<RuntimeArgs>();
+        runtime.retain(|id| !(may_run_room_net && ["ort_lib", "offline"].contains(&&**id)));
         if args.is_empty() {
-            self.because("no --llie is named", &enhancement());
+            let mut idle = enhancement();
+            idle.extend(runtime);
+            self.because("no --llie is named", &idle);
         } else if args.llie.is_empty() {
-            let mut idle = [ids::<SizeArgs>(), ids::<RuntimeArgs>()].concat();
+            let mut idle = ids::<SizeArgs>();
+            idle.extend(runtime);
             idle.retain(|id| id != "enhanced");
             self.because("no --llie is named, and --enhanced runs no model", &idle);
         }
@@ -509,6 +510,7 @@ mod tests {
             "--model m --blind --seed 3 --temperature 1",
             "--model random --seed 3 --shuffle-options",
             "--model observer --observer-controls",
+            "--model room-net --offline",
             "openeqa --questions q --frames f --model script:a --judge j --judge-temperature 1 --rpm 9",
             "synthesize a --out b --sheet levels --profile eld",
             "synthesize a --out b --sheet levels --variant ev",

@@ -29,6 +29,7 @@ pub(crate) mod open_run;
 pub(crate) mod plan_costs;
 pub(crate) mod planned_images;
 pub(crate) mod prompt_bounds;
+pub(crate) mod room_net;
 pub(crate) mod settings;
 pub(crate) mod suspects;
 pub(crate) mod truncation;

@@ -118,7 +118,7 @@ pub(crate) fn open_all(
     let mut models: Vec<ModelUnderTest> = Vec::new();
     for settings in &ask.models {
         let model = match &settings.id {
-            name @ (ModelName::Random | ModelName::Observer(_)) => built_in(name)?,
+            name if name.is_of_experiment() => built_in(name)?,
             name => {
                 let endpoint = endpoints.get(settings.server.as_ref())?;
                 open(name, endpoint.as_ref(), &settings.parameters)?
@@ -219,7 +219,7 @@ pub(crate) fn open(
             let model = Remote::open(Arc::clone(endpoint), parameters)?;
             Ok(Model::Remote(Box::new(model)))
         }
-        ModelName::Random | ModelName::Observer(_) => Err(Error::usage(
+        ModelName::Random | ModelName::Observer(_) | ModelName::RoomNet => Err(Error::usage(
             "--model",
             "a model that can answer open questions expected",
         )),

@@ -123,6 +123,7 @@ impl Observer {
         Ok(LocalAnswer {
             choice,
             observed: Some(observed(&observation, choice)),
+            guessed: false,
         })
     }
 }

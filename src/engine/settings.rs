@@ -10,7 +10,7 @@ use clap::Args;
 
 use crate::ask::{AccessArgs, Bounds, Constrain, Parameters, RequestArgs, Sending};
 use crate::engine::models::{
-    AskSettings, AskingArgs, KeyUse, ModelArgs, ResolveContext, TextBaseline,
+    AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline,
 };
 use crate::engine::money::{MoneyArgs, MoneySettings};
 use crate::error::{Error, Result};
@@ -189,8 +189,8 @@ impl JobSettings {
         models.any(|model| model.view == View::Image)
     }
 
-    /// The files of the enhancement models, each of which works on some images of the run. ONNX Runtime is opened, too, so that an
-    /// error is found before anything that takes time. An existing run may not need the runtime any more.
+    /// The files of the enhancement models, each of which works on some images of the run. If they or the model `room-net` need ONNX
+    /// Runtime, it is opened, too, so that an error is found before anything that takes time. An existing run may not need it any more.
     pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
         check_used(&self.light, &self.enhancers)?;
         let files = enhancers::read(&self.enhancers.llie)?;
@@ -198,7 +198,8 @@ impl JobSettings {
             RunPlace::Automatic => false,
             RunPlace::Named(path) | RunPlace::Resume(path) => path.exists(),
         };
-        if !files.is_empty() && !exists {
+        let needs_runtime = !files.is_empty() || self.ask.shows_images_to(&ModelName::RoomNet);
+        if needs_runtime && !exists {
             self.loading.runtime.search().open()?;
         }
         Ok(files)
@@ -211,7 +212,7 @@ impl JobArgs {
         let remedy = if self.output.resume.is_some() {
             "--resume takes the same flags as the run had, the model's name among them"
         } else {
-            "a model's name at the endpoint, or observer or random to try without one; it would be asked about 48 built-in rooms from \
+            "a model's name at the endpoint, or room-net, observer or random to try without one; it would be asked about 48 built-in rooms from \
              L0 to L5, and --help lists what can be set"
         };
         Error::usage("--model", format_args!("no model is named: {remedy}"))

@@ -66,6 +66,7 @@ mod replicas;
 mod report;
 mod report_head;
 mod report_of_parts;
+mod room_net;
 mod rooms;
 mod same_bytes;
 mod scenes;

@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use serde_json::Value;
 
-use super::name::ModelName;
 use super::settings::{AskSettings, ModelSettings};
 use super::{endpoint, open};
 use crate::ask::{Message, Model};
@@ -64,7 +63,7 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
 
 /// The model at its endpoint; `None` if it is built in and has no replies of its own.
 pub(super) fn opened(model: &ModelSettings) -> Result<Option<Model>> {
-    if matches!(model.id, ModelName::Random | ModelName::Observer(_)) {
+    if model.id.is_of_experiment() {
         return Ok(None);
     }
     let endpoint = model.server.as_deref().map(endpoint).transpose()?;

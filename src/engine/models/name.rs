@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use crate::ask::Prices;
-use crate::engine::observer;
+use crate::engine::{observer, room_net};
 use crate::error::{Error, Result};
 use crate::types::Control;
 use crate::types::near_name::is_nearly;
@@ -16,6 +16,8 @@ pub(crate) enum ModelName {
     Random,
     /// Built-in model that answers what can still be read from the pixels by one who knows the frame; or one of its controls.
     Observer(Option<Control>),
+    /// Built-in network that answers from the pixels of the image alone.
+    RoomNet,
     /// Built-in model that answers from this file.
     Script(PathBuf),
     /// Model of this name at the endpoint.
@@ -23,9 +25,14 @@ pub(crate) enum ModelName {
 }
 
 /// The words that begin the names of built-in models.
-const BUILT_IN: [&str; 3] = ["random", "observer", "script"];
+const BUILT_IN: [&str; 4] = ["random", "observer", room_net::NAME, "script"];
 
 impl ModelName {
+    /// Whether an experiment makes it: built-in models that can only choose.
+    pub(super) fn is_of_experiment(&self) -> bool {
+        matches!(self, Self::Random | Self::Observer(_) | Self::RoomNet)
+    }
+
     /// Checks that the model can answer an open question.
     ///
     /// # Errors
@@ -34,6 +41,7 @@ impl ModelName {
         let name = match self {
             Self::Random => "random",
             Self::Observer(_) => "observer",
+            Self::RoomNet => room_net::NAME,
             Self::Script(_) | Self::Remote(_) => return Ok(()),
         };
         let problem = format_args!("{name} can only choose, and these questions are open");
@@ -83,6 +91,7 @@ impl ModelName {
         match self {
             Self::Random => "random".to_owned(),
             Self::Observer(control) => observer::name(*control),
+            Self::RoomNet => room_net::NAME.to_owned(),
             Self::Script(path) => path.file_stem().map_or_else(
                 || "script".to_owned(),
                 |stem| stem.to_string_lossy().into_owned(),
@@ -107,6 +116,7 @@ impl FromStr for ModelName {
             "" => Err("the name of a model is empty".to_owned()),
             "random" => Ok(Self::Random),
             "observer" => Ok(Self::Observer(None)),
+            room_net::NAME => Ok(Self::RoomNet),
             "script" => Err("script:FILE expected, a file of replies".to_owned()),
             name => match name.strip_prefix("script:") {
                 Some(path) => Ok(Self::Script(path.into())),

@@ -23,6 +23,7 @@ pub mod generate;
 pub mod look;
 pub mod observer;
 pub mod pick;
+pub mod predicted;
 mod presence;
 pub mod reason;
 mod relative;

@@ -198,11 +198,11 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
     let models = &job.ask.models;
     if let Some(observer) = models
         .iter()
-        .find(|model| matches!(model.id, ModelName::Observer(_)))
+        .find(|model| matches!(model.id, ModelName::Observer(_) | ModelName::RoomNet))
     {
         let problem = format_args!(
-            "{} cannot be asked with --ask: it answers by the maps of a frame and the rules that made its question, and these questions have \
-             neither; models at an endpoint, random and script:FILE can",
+            "{} cannot be asked with --ask: it answers by the rules that make questions, and none made these; models \
+             at an endpoint, random and script:FILE can",
             observer.name
         );
         return Err(Error::usage("--model", problem));

@@ -1,6 +1,7 @@
 //! The data and models of an evaluation, opened and checked: [`ChoiceSetup`].
 
 use std::collections::HashMap;
+use std::path::Path;
 use std::sync::Arc;
 
 use super::controls::{AddedControls, is_other_room};
@@ -13,6 +14,7 @@ use crate::dataset::Dataset;
 use crate::engine::dark_already;
 use crate::engine::models::{self, ModelName, ModelUnderTest};
 use crate::engine::observer::Observer;
+use crate::engine::room_net::RoomNet;
 use crate::error::Result;
 use crate::images::conditions::{check_enhanced, conditions};
 use crate::images::photographs;
@@ -24,6 +26,8 @@ use crate::runs::part::part;
 use crate::types::manifest::PartPlace;
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 use darkqa_enhance::ModelFile;
+use darkqa_questions::observer::understood;
+use darkqa_questions::rules::Rules;
 
 /// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
 pub(super) struct ChoiceSetup<'a> {
@@ -147,6 +151,7 @@ impl<'a> ChoiceSetup<'a> {
         }
         setup.recipe.check(&setup.sources, &setup.conditions)?;
         controls.print(progress);
+        print_training(config, progress);
         Ok((setup, files))
     }
 
@@ -183,6 +188,41 @@ impl<'a> ChoiceSetup<'a> {
         self.with_other_rooms = all;
         Ok(())
     }
+}
+
+/// Warns of questions that `room-net` guesses because the rules did not make them.
+fn warn_of_guesses(questions: &[Question], rules: &Rules) {
+    let unknown = questions
+        .iter()
+        .filter(|question| !understood(question, rules))
+        .count();
+    if unknown > 0 {
+        tracing::warn!(
+            "room-net guesses {unknown} of {} questions, because no rule made them",
+            questions.len()
+        );
+    }
+}
+
+/// Prints the training data of `room-net`, if it is asked, and of the enhancer `lift`.
+fn print_training(config: &Evaluation, progress: &Progress) {
+    let job = &config.job;
+    if !job.ask.shows_images_to(&ModelName::RoomNet) {
+        return;
+    }
+    let lift = if job
+        .enhancers
+        .llie
+        .iter()
+        .any(|word| word == Path::new("lift"))
+    {
+        "; lift was trained on such rooms in the dark"
+    } else {
+        ""
+    };
+    progress.say(&format!(
+        "room-net is a small network trained on well-lit drawn rooms: a demonstration, no vision-language model{lift}"
+    ));
 }
 
 /// The data, and the questions about them that are asked. Those of a plan are taken from there, so that no frame is measured.
@@ -247,10 +287,16 @@ fn open_models(
         Observer::open(dataset, &config.place, questions, rules)
     };
     let observer = observer.then(open).transpose()?;
+    let runtime = config.job.loading.runtime.search();
     models::open_all(ask, &controls.names, |name| {
         Ok(match (name, &observer) {
             (ModelName::Observer(control), Some(observer)) => {
                 Model::Local(observer.model(*control, prior))
+            }
+            (ModelName::RoomNet, _) => {
+                warn_of_guesses(questions, &config.rules);
+                let net = RoomNet::new(runtime.clone(), config.rules.clone())?;
+                Model::Local(net.model(prior))
             }
             _ => Model::Random(prior),
         })

@@ -34,12 +34,12 @@ mod channel;
 pub mod controls;
 mod local;
 mod outlines;
-mod resample;
+pub mod resample;
 mod shade;
 #[cfg(test)]
 mod tests;
 mod tiles;
-mod wording;
+pub(crate) mod wording;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use darkqa_ground::types::Rgb;
 
 /// The image in a given width and height. Each pixel is the mean of the area that it covers, rounded half up.
-pub(super) fn area_mean(image: &Rgb, [width, height]: [usize; 2]) -> Cow<'_, Rgb> {
+#[must_use]
+pub fn area_mean(image: &Rgb, [width, height]: [usize; 2]) -> Cow<'_, Rgb> {
     if [image.width(), image.height()] == [width, height] {
         return Cow::Borrowed(image);
     }

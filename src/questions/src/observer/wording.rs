@@ -6,8 +6,8 @@ use darkqa_ground::types::Question;
 
 /// The word by which a question calls a thing, with the class that the word belongs to.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct ThingWord {
-    class: String,
+pub(crate) struct ThingWord {
+    pub(crate) class: String,
     word: String,
 }
 
@@ -20,7 +20,7 @@ impl ThingWord {
 
 /// Subject of a question of the rulebook.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum QuestionTopic {
+pub(crate) enum QuestionTopic {
     /// The type of the room.
     Room,
     /// Whether the room suits an activity, given by its index in the rulebook.
@@ -35,7 +35,7 @@ pub(super) enum QuestionTopic {
 
 impl QuestionTopic {
     /// Compares the text of a question with the templates of the rulebook. The evidence, which holds the answer, is not read.
-    pub(super) fn from_question(question: &Question, book: &RuleBook) -> Option<Self> {
+    pub(crate) fn from_question(question: &Question, book: &RuleBook) -> Option<Self> {
         let text = question.text.trim();
         if text == book.room_type.text {
             return Some(Self::Room);
