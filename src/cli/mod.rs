@@ -51,7 +51,7 @@ const LOGGED: &str = "darkqa_=warn";
 
 /// Printed after the error of a call without any word.
 const FIRST_STEPS: &str = "
-  darkqa-eval --model observer --llie lift                    try it, without key or data
+  darkqa-eval --model room-net --llie lift                    try it, without key or data
   darkqa-eval --model gpt-4o --data my-frames/ --dry-run      your own images: the requests, tokens and dollars it would take
   darkqa-eval --help                                          every flag and command
   https://github.com/darkqa-eval/darkqa-eval                  the documentation";
