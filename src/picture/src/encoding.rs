@@ -11,7 +11,7 @@ use image::{ExtendedColorType, ImageEncoder as _};
 
 use crate::payload_format::Quality;
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::{Light, Rgb};
+use darkqa_ground::types::{Codes16, Light, Rgb};
 
 /// An error about an image that has no name here.
 pub(crate) fn image_error(problem: impl fmt::Display) -> Error {
@@ -36,6 +36,21 @@ pub fn png(image: &Rgb) -> Result<Vec<u8>> {
     let mut file = Vec::new();
     PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
         .write_image(image.samples(), width, height, ExtendedColorType::Rgb8)
+        .map_err(image_error)?;
+    Ok(file)
+}
+
+/// An image of 16-bit codes as a lossless PNG file.
+///
+/// # Errors
+/// If a side is too long for the format.
+pub(crate) fn png_16(image: &Codes16) -> Result<Vec<u8>> {
+    let (width, height) = (side(image.width())?, side(image.height())?);
+    let samples = image.samples().iter();
+    let samples: Vec<u8> = samples.flat_map(|code| code.to_ne_bytes()).collect();
+    let mut file = Vec::new();
+    PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(&samples, width, height, ExtendedColorType::Rgb16)
         .map_err(image_error)?;
     Ok(file)
 }

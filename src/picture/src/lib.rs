@@ -5,7 +5,7 @@
 //! Rgb ─ Scaling ─ PayloadFormat ─ Payload ─ data URL         what a model receives
 //! ```
 //!
-//! Maps of numbers, which are not to be shown, are read as they are stored: [`raw_png`], [`npy`] and [`hdf5`].
+//! An image without a file format, as a camera driver sends it, is a [`raw_image`]. Maps of numbers, which are not to be shown, are read as they are stored: [`raw_png`], [`npy`] and [`hdf5`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -19,6 +19,7 @@ pub mod npy;
 mod payload;
 mod payload_format;
 mod plain_png;
+pub mod raw_image;
 pub mod raw_png;
 pub mod reading_rule;
 mod scaling;

@@ -78,7 +78,7 @@ pub use flaw::Flaw;
 #[cfg(feature = "program")]
 pub use frame::Frame;
 pub use frame::{DepthKind, FrameId, Intrinsics, Segmentation};
-pub use image::{Codes16, Image, Light, Rgb};
+pub use image::{Codes16, Image, Light, Rgb, Sample};
 pub use image_notes::{ImageFidelity, ObjectCrop, Thumbnail};
 pub use input_note::{ColourHandling, ColourNote, DepthNote, InputNote, InputSummary};
 pub use kind_set::KindSet;
