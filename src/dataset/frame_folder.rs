@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::files::write;
 use crate::labels;
 use crate::picture::grey_png;
-use crate::types::{DepthKind, Labels, Rgb, SegmentName, Segmentation};
+use crate::types::{DepthKind, Labels, SegmentName, Segmentation};
 
 /// The file that lists the frames.
 pub(crate) const FRAMES: &str = "frames.jsonl";
@@ -28,12 +28,12 @@ type ListLine = Map<String, Value>;
 
 impl FramePaths<'_> {
     /// The first fields of the line of the frame: scene, frame, width and height.
-    pub(crate) fn line(&self, rgb: &Rgb) -> ListLine {
+    pub(crate) fn line(&self, (width, height): (usize, usize)) -> ListLine {
         let facts = [
             ("scene", json!(self.scene)),
             ("frame", json!(self.frame)),
-            ("width", json!(rgb.width())),
-            ("height", json!(rgb.height())),
+            ("width", json!(width)),
+            ("height", json!(height)),
         ];
         facts
             .map(|(key, value)| (key.to_owned(), value))

@@ -2,6 +2,7 @@
 //!
 //! An [`Adapter`] lists the frames of one kind of data set and reads their maps one frame at a time. Maps have the units of the
 //! interface: millimetres, numbers of a label space, segments from 1. `src/docs/importing.md` shows the layouts.
+//! A recording of a robot has no maps, and is no data set: [`recording`] reads it.
 
 mod adapter;
 mod files;
@@ -17,6 +18,7 @@ mod map_files;
 mod mp3d;
 mod nyu;
 mod polygons;
+pub(crate) mod recording;
 mod renders;
 mod replica;
 mod scannet;

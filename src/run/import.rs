@@ -1,5 +1,11 @@
 //! `import`: writing the frames of another data set in the common interface.
 
+mod camera_facts;
+mod frame_writer;
+mod recording;
+mod topic_list;
+mod video;
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Component, Path, PathBuf};
@@ -24,7 +30,7 @@ use crate::picture::png;
 use crate::runs::Outcome;
 use crate::text::words::counted;
 use crate::types::manifest::Status;
-use crate::types::{Decides, FrameId, InputNote, Rgb};
+use crate::types::{Decides, FrameId, InputNote, Rgb, shell_word};
 
 /// Plausible median depths of a frame in millimetres (chosen). Outside this range the scale is wrong, or it shows a wall.
 const ROOM: std::ops::RangeInclusive<u32> = 300..=15_000;
@@ -56,6 +62,16 @@ enum ImportForm {
         #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
         kind: DataSetKind,
     },
+    /// Take frames of a recording of a robot (ROS 2, Foxglove); without --out, list its topics with images
+    Mcap(Box<recording::McapArgs>),
+    /// Show how a bag of ROS 1 is converted into a file that `import mcap` reads
+    Rosbag {
+        /// The bag
+        #[arg(value_name = "FILE", add = Decides::Nothing)]
+        file: PathBuf,
+    },
+    /// Take frames of a video, decoded by ffmpeg; without --out, describe it
+    Video(Box<video::VideoArgs>),
 }
 
 /// The flags of `import`.
@@ -100,6 +116,9 @@ struct ImportArgs {
 pub(crate) fn import(command: &ImportCommand, progress: &Progress) -> Result<Outcome> {
     match (&command.form, &command.import) {
         (Some(ImportForm::Script { kind }), _) => script(*kind),
+        (Some(ImportForm::Mcap(args)), _) => recording::import(args, progress),
+        (Some(ImportForm::Rosbag { file }), _) => Err(rosbag(file)),
+        (Some(ImportForm::Video(args)), _) => video::import(args, progress),
         (None, Some(args)) => import_frames(args, progress),
         (None, None) => Err(Error::usage("KIND", "a kind of data set is missing")),
     }
@@ -111,6 +130,16 @@ fn script(kind: DataSetKind) -> Result<Outcome> {
         return Err(Error::usage("KIND", problem));
     }
     Ok(Outcome::text(Status::Complete, HM3D_SCRIPT.to_owned()))
+}
+
+/// The conversion of a bag of ROS 1. The crate rosbag (0.6.3) maps whole files into memory, and needs bzip2 and lz4 in C.
+fn rosbag(file: &Path) -> Error {
+    let new = file.with_extension("");
+    let [old, new] = [file, &*new].map(|path| shell_word(&path.to_string_lossy()).into_owned());
+    let problem = format_args!(
+        "bags of ROS 1 are not read; convert it, which changes no image:\n  pip install rosbags\n  rosbags-convert --src {old} --dst {new} --dst-storage mcap\n  darkqa-eval import mcap {new}"
+    );
+    Error::data(file.display(), problem)
 }
 
 /// If one frame fails, the error is logged and counted, and the others continue.
@@ -258,7 +287,7 @@ fn write_frame(
         scene: &frame.scene,
         frame: &frame.frame,
     };
-    let mut line = paths.line(&rgb);
+    let mut line = paths.line((rgb.width(), rgb.height()));
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
     // All but plain PNG files are copied as they are, so that they are read here as anywhere else.

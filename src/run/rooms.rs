@@ -96,7 +96,7 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
         scene: &frame.scene,
         frame: room.view(),
     };
-    let mut line = paths.line(&frame.rgb);
+    let mut line = paths.line((frame.rgb.width(), frame.rgb.height()));
     let codes = paths.write("rgb", "png", &png(&frame.rgb)?)?;
     // The frame is its light; the PNG file beside it is for looking at.
     let image = match room.light() {

@@ -62,6 +62,7 @@ mod questions;
 mod ready_made;
 mod realism;
 mod record_table;
+mod recordings;
 mod replicas;
 mod report;
 mod report_head;

@@ -21,6 +21,7 @@ pub mod made;
 pub mod onnx;
 pub mod parquet_file;
 pub mod process;
+pub mod recording;
 pub mod rooms;
 pub mod run;
 pub mod table;

@@ -79,6 +79,7 @@ fn sample(arg: &Arg) -> String {
         "crop" => "0,0,256,256",
         "width" => "neurips",
         "columns" => "2",
+        "at" => "3",
         "label" => "abc=name",
         "font_size" | "images_cache_size" | "llie_max_memory" => "9",
         "top_p" => "0.9",
@@ -87,7 +88,7 @@ fn sample(arg: &Arg) -> String {
             Some([name])
                 if [
                     "N", "SECONDS", "PIXELS", "MB", "DOLLARS", "EV", "K", "R", "METRES", "DEGREES",
-                    "CODE", "HOURS",
+                    "CODE", "CODES", "HOURS",
                 ]
                 .contains(&name.as_str()) =>
             {

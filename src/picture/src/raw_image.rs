@@ -3,11 +3,13 @@
 mod layout;
 mod mosaic;
 
+use std::borrow::Cow;
+
 use darkqa_ground::error::Error;
 use darkqa_ground::types::{Codes16, Image, Rgb};
 
 use self::layout::{Depth, Layout, Order};
-use self::mosaic::demosaic;
+use self::mosaic::{RawSample, demosaic};
 use super::encoding::{png, png_16};
 use super::reading_rule::MOST_PIXELS;
 
@@ -25,7 +27,7 @@ pub struct RawImage<'a> {
     /// Whether samples of 16 bits have their high byte first.
     pub is_big_endian: bool,
     /// The rows.
-    pub data: &'a [u8],
+    pub data: Cow<'a, [u8]>,
 }
 
 /// The pixels of a raw image, in the depth of its samples.
@@ -110,7 +112,7 @@ impl RawImage<'_> {
             width,
             height,
             step,
-            data,
+            ref data,
             ..
         } = *self;
         let pixels = (width as u64).saturating_mul(height as u64);
@@ -169,12 +171,6 @@ impl RawImage<'_> {
     }
 }
 
-/// A sample of a raw image.
-trait RawSample: darkqa_ground::types::Sample + Into<u32> + TryFrom<u32> {}
-
-impl RawSample for u8 {}
-impl RawSample for u16 {}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -186,7 +182,7 @@ mod tests {
             step,
             encoding: encoding.to_owned(),
             is_big_endian: false,
-            data,
+            data: data.into(),
         }
     }
 

@@ -2,9 +2,9 @@
 //!
 //! A block with the fence `sh` is run, one with `sh no-run` is only parsed: it needs large data, another machine or an installer.
 //! All blocks of a page are run by one shell in an empty folder, with a mock endpoint, which has batches, at `OPENAI_BASE_URL`, few and small rooms
-//! where no data are named, and the folder `models` at `$MODELS`. A comment `<!-- test: … -->` is a command that readers do not
-//! see. A block with the fence `text` shows what commands of its page print, `text first-command` what the first command of the README
-//! prints, digit for digit; `text no-run` shows what others print.
+//! where no data are named, the folder `models` at `$MODELS`, and a recording of a robot at `$DRIVE`. A comment `<!-- test: … -->` is a
+//! command that readers do not see. A block with the fence `text` shows what commands of its page print, `text first-command` what the
+//! first command of the README prints, digit for digit; `text no-run` shows what others print.
 
 mod faq;
 mod first_command;
@@ -18,6 +18,7 @@ use std::process::{Command, Output, Stdio};
 
 use crate::support::batches::{Course, MockBatches};
 use crate::support::endpoint::Answer;
+use crate::support::recording::{Compression, drive};
 use crate::support::rooms::rooms;
 use crate::support::run::{Bench, PROGRAM};
 use crate::support::table::check_rows;
@@ -26,7 +27,9 @@ use page::{Block, BlockKind, Page, files, pages, root};
 use regex::Regex;
 
 /// Flags of other programs that pages name: `sbatch`, `pip`, `cargo`, `inspect eval`, and servers of models.
-const OF_OTHERS: [&str; 20] = [
+const OF_OTHERS: [&str; 22] = [
+    "--dst",
+    "--dst-storage",
     "--array",
     "--no-deps",
     "--release",
@@ -121,8 +124,14 @@ fn the_commands_of_every_page_run_and_print_what_it_shows() {
 /// The file with all that the commands of a page print.
 const PRINTED: &str = "printed.txt";
 
+/// The file with a recording of a robot.
+const DRIVE: &str = "recording.mcap";
+
 /// Runs the commands of a page in a folder.
 fn run(page: &Page, folder: &Path) -> Output {
+    if page.text.contains("$DRIVE") {
+        std::fs::write(folder.join(DRIVE), drive(12, Compression::Zstd)).unwrap();
+    }
     let mock = MockBatches::start([Course::of("in_progress completed").text("A")]);
     mock.chat(|body| {
         let is_judge = body.to_string().contains("Your mark");
@@ -146,6 +155,7 @@ fn run(page: &Page, folder: &Path) -> Output {
         .env("OPENAI_BASE_URL", mock.base_url())
         .env("DARKQA_DATA", rooms(2, "96x64"))
         .env("MODELS", root().join("models"))
+        .env("DRIVE", folder.join(DRIVE))
         .stdin(Stdio::null())
         .output()
         .unwrap()

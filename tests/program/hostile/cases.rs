@@ -343,6 +343,12 @@ pub(crate) const CASES: &[Case] = &[
         &[],
     ),
     Case::new("import folder --src frames --out out", &["frames"], &[]),
+    Case::new("import mcap drive.mcap", &["drive.mcap"], &[]),
+    Case::new(
+        "import mcap drive.mcap --topic /front/image_raw --max-frames 3 --out out",
+        &["drive.mcap"],
+        &[],
+    ),
     Case::new(
         "import script habitat --config plain.toml",
         &["plain.toml"],

@@ -64,7 +64,7 @@ impl Layout {
             "bayer_bggr" => (1, Order::Mosaic([1, 1])),
             "16UC1" | "32FC1" => {
                 return Err(format!(
-                    "encoding {encoding:?} is depth or another measure, not an image; choose a topic of a camera"
+                    "encoding {encoding:?} is depth or another measure, not an image"
                 ));
             }
             _ => {

@@ -3,7 +3,13 @@
 //! The synthesis of `light` interpolates linear light in lanes of floats, from a mosaic that begins with red. Here codes of a camera
 //! are interpolated, in whole numbers, from any of the four mosaics.
 
-use super::RawSample;
+use darkqa_ground::types::Sample;
+
+/// A sample of a raw image.
+pub(super) trait RawSample: Sample + Into<u32> + TryFrom<u32> {}
+
+impl RawSample for u8 {}
+impl RawSample for u16 {}
 
 /// Appends the RGB samples of a mosaic. A colour that a site lacks is the rounded mean of the two or four nearest sites of that colour;
 /// beyond an edge, rows and columns are mirrored. `red` is the row and column (0 or 1) of the first red site.

@@ -3,12 +3,14 @@
 use image::{GrayImage, ImageBuffer, ImageFormat, Luma, Rgb, RgbImage};
 
 use crate::support::image_files::{jpeg, png};
+use crate::support::recording::{Compression, drive};
 use crate::support::run::Bench;
 
 const WIDTH: u32 = 8;
 const HEIGHT: u32 = 6;
 
 pub(super) fn make(bench: &Bench) {
+    bench.file("drive.mcap", drive(2, Compression::Zstd));
     habitat(bench);
     scannet(bench);
     let at = |name: &str| format!("nyu/{name}/00001.png");

@@ -1,0 +1,148 @@
+//! A message with the intrinsics of a camera: [`CameraInfo`].
+
+use serde::Deserialize;
+
+use super::encoding::Encoding;
+use super::fields::FieldReader;
+use super::image_message::skip_sequence;
+use super::protobuf::fields;
+use crate::types::Intrinsics;
+
+/// The intrinsics of a camera for images of one size.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct CameraInfo {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Camera of the images as they are taken: the matrix K.
+    pub(crate) raw: Option<Intrinsics>,
+    /// Camera of rectified images: the matrix P.
+    pub(crate) rectified: Option<Intrinsics>,
+}
+
+impl CameraInfo {
+    /// Reads a `sensor_msgs/CameraInfo` or `foxglove.CameraCalibration`.
+    ///
+    /// # Errors
+    /// If it is not a message of this type.
+    pub(crate) fn parse(schema: &str, encoding: Encoding, bytes: &[u8]) -> Result<Self, String> {
+        match encoding {
+            Encoding::Cdr => Self::from_fields(schema, encoding, FieldReader::cdr(bytes)?),
+            Encoding::Ros1 => Self::from_fields(schema, encoding, FieldReader::unaligned(bytes)),
+            Encoding::Protobuf => {
+                let (mut size, mut k, mut p) = ([0; 2], Vec::new(), Vec::new());
+                for field in fields(bytes) {
+                    match field? {
+                        (2, value) => size[0] = value.number() as usize,
+                        (3, value) => size[1] = value.number() as usize,
+                        (6, value) => k.extend(value.doubles()),
+                        (8, value) => p.extend(value.doubles()),
+                        _ => {}
+                    }
+                }
+                Ok(Self::new(size, &k, &p))
+            }
+            Encoding::Json => {
+                let message: JsonCamera =
+                    serde_json::from_slice(bytes).map_err(|e| e.to_string())?;
+                Ok(Self::new(
+                    [message.width, message.height],
+                    &message.k,
+                    &message.p,
+                ))
+            }
+        }
+    }
+
+    fn from_fields(
+        schema: &str,
+        encoding: Encoding,
+        mut reader: FieldReader<'_>,
+    ) -> Result<Self, String> {
+        skip_sequence(schema, encoding, &mut reader)?;
+        let _stamp = reader.time()?;
+        let _frame_id = reader.text()?;
+        let [first, second] = [reader.u32()?, reader.u32()?].map(|side| side as usize);
+        // Foxglove has the width first, ROS the height.
+        let size = if schema.starts_with("foxglove") {
+            [first, second]
+        } else {
+            [second, first]
+        };
+        let _model = reader.text()?;
+        let _distortion = reader.doubles()?;
+        let mut matrix = |count: usize| {
+            (0..count)
+                .map(|_| reader.f64())
+                .collect::<Result<Vec<f64>, _>>()
+        };
+        let (k, _rotation, p) = (matrix(9)?, matrix(9)?, matrix(12)?);
+        Ok(Self::new(size, &k, &p))
+    }
+
+    fn new([width, height]: [usize; 2], k: &[f64], p: &[f64]) -> Self {
+        let camera = |matrix: &[f64], row: usize| {
+            let [fx, cx, fy, cy] =
+                [0, 2, row + 1, row + 2].map(|i| matrix.get(i).copied().unwrap_or_default());
+            let is_camera =
+                [fx, cx, fy, cy].iter().all(|number| number.is_finite()) && fx > 0.0 && fy > 0.0;
+            is_camera.then_some(Intrinsics { fx, fy, cx, cy })
+        };
+        Self {
+            width,
+            height,
+            raw: camera(k, 3),
+            rectified: camera(p, 4),
+        }
+    }
+
+    /// The camera of an image of a topic; `None` if it is unknown, or of images of another size.
+    pub(crate) fn of_image(&self, topic: &str, size: (usize, usize)) -> Option<Intrinsics> {
+        if (self.width, self.height) != size {
+            return None;
+        }
+        if topic.contains("rect") {
+            self.rectified
+        } else {
+            self.raw
+        }
+    }
+}
+
+/// A `foxglove.CameraCalibration` in JSON.
+#[derive(Deserialize)]
+struct JsonCamera {
+    width: usize,
+    height: usize,
+    #[serde(rename = "K", default)]
+    k: Vec<f64>,
+    #[serde(rename = "P", default)]
+    p: Vec<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rectified_topics_have_the_camera_of_p() {
+        let k = [500.0, 0.0, 320.0, 0.0, 501.0, 240.0, 0.0, 0.0, 1.0];
+        let p = [
+            400.0, 0.0, 300.0, 0.0, 0.0, 401.0, 200.0, 0.0, 0.0, 0.0, 1.0, 0.0,
+        ];
+        let info = CameraInfo::new([640, 480], &k, &p);
+        let focal = |topic: &str, size| {
+            info.of_image(topic, size)
+                .map(|camera| (camera.fx, camera.fy, camera.cx, camera.cy))
+        };
+        assert_eq!(
+            focal("/c/image_raw", (640, 480)),
+            Some((500.0, 501.0, 320.0, 240.0))
+        );
+        assert_eq!(
+            focal("/c/image_rect", (640, 480)),
+            Some((400.0, 401.0, 300.0, 200.0))
+        );
+        assert_eq!(focal("/c/image_raw", (320, 240)), None);
+        assert_eq!(CameraInfo::new([640, 480], &[0.0; 9], &[]).raw, None);
+    }
+}

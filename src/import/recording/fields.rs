@@ -1,0 +1,194 @@
+//! Fields of serialized messages in the order of their definition: [`FieldReader`].
+//!
+//! CDR is that of OMG DDSI-RTPS 2.3, section 10, with the alignment of XCDR1, or of XCDR2 (DDS-XTypes 1.3, section 7.4.3); ROS 1
+//! and the records of MCAP have neither alignment nor a choice of byte order.
+
+use super::Nanoseconds;
+
+/// A reader of fields.
+#[derive(Debug, Clone)]
+pub(super) struct FieldReader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    form: Form,
+}
+
+/// The rules of a serialization.
+#[derive(Debug, Clone, Copy)]
+struct Form {
+    is_big_endian: bool,
+    /// The greatest alignment of a number in bytes; 1 for none.
+    alignment: usize,
+    /// Whether texts end with a byte 0 that their length counts.
+    has_terminator: bool,
+}
+
+impl<'a> FieldReader<'a> {
+    /// A reader of fields without alignment, low byte first: messages of ROS 1 and records of MCAP.
+    pub(super) fn unaligned(bytes: &'a [u8]) -> Self {
+        let form = Form {
+            is_big_endian: false,
+            alignment: 1,
+            has_terminator: false,
+        };
+        Self { bytes, at: 0, form }
+    }
+
+    /// A reader of a CDR message, which begins with its four bytes of encapsulation.
+    ///
+    /// # Errors
+    /// If it is not plain CDR.
+    pub(super) fn cdr(message: &'a [u8]) -> Result<Self, String> {
+        let Some((&[zero, kind, _, _], bytes)) = message.split_first_chunk() else {
+            return Err(ends_early());
+        };
+        let (is_big_endian, alignment) = match (zero, kind) {
+            (0, 0) => (true, 8),
+            (0, 1) => (false, 8),
+            (0, 6) => (true, 4),
+            (0, 7) => (false, 4),
+            _ => {
+                return Err(format!(
+                    "CDR representation {zero:#04x}{kind:02x}; plain CDR (0 or 1) or CDR2 (6 or 7) expected"
+                ));
+            }
+        };
+        let form = Form {
+            is_big_endian,
+            alignment,
+            has_terminator: true,
+        };
+        Ok(Self { bytes, at: 0, form })
+    }
+
+    /// The next bytes.
+    pub(super) fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
+        let end = self.at.checked_add(count);
+        let taken = end
+            .and_then(|end| self.bytes.get(self.at..end))
+            .ok_or_else(ends_early)?;
+        self.at += count;
+        Ok(taken)
+    }
+
+    fn align(&mut self, size: usize) {
+        self.at = self.at.next_multiple_of(size.min(self.form.alignment));
+    }
+
+    fn number<const N: usize>(&mut self) -> Result<[u8; N], String> {
+        self.align(N);
+        let mut bytes: [u8; N] = self.take(N)?.try_into().map_err(|_| ends_early())?;
+        if self.form.is_big_endian {
+            bytes.reverse();
+        }
+        Ok(bytes)
+    }
+
+    pub(super) fn u8(&mut self) -> Result<u8, String> {
+        self.number().map(u8::from_le_bytes)
+    }
+
+    pub(super) fn u16(&mut self) -> Result<u16, String> {
+        self.number().map(u16::from_le_bytes)
+    }
+
+    pub(super) fn u32(&mut self) -> Result<u32, String> {
+        self.number().map(u32::from_le_bytes)
+    }
+
+    pub(super) fn u64(&mut self) -> Result<u64, String> {
+        self.number().map(u64::from_le_bytes)
+    }
+
+    pub(super) fn f32(&mut self) -> Result<f32, String> {
+        self.number().map(f32::from_le_bytes)
+    }
+
+    pub(super) fn f64(&mut self) -> Result<f64, String> {
+        self.number().map(f64::from_le_bytes)
+    }
+
+    /// A sequence of bytes.
+    pub(super) fn bytes(&mut self) -> Result<&'a [u8], String> {
+        let count = self.u32()?;
+        self.take(count as usize)
+    }
+
+    /// A text; bytes that are not UTF-8 are replaced.
+    pub(super) fn text(&mut self) -> Result<String, String> {
+        let mut bytes = self.bytes()?;
+        if self.form.has_terminator {
+            bytes = bytes.strip_suffix(&[0]).unwrap_or(bytes);
+        }
+        Ok(String::from_utf8_lossy(bytes).into_owned())
+    }
+
+    /// A sequence of numbers of 8 bytes.
+    pub(super) fn doubles(&mut self) -> Result<Vec<f64>, String> {
+        let count = self.u32()?;
+        // A count that the message cannot hold ends with the first missing number.
+        (0..count).map(|_| self.f64()).collect()
+    }
+
+    /// A time in seconds and nanoseconds. Seconds are signed in ROS 2 and unsigned in ROS 1, which differ from 2038 on.
+    pub(super) fn time(&mut self) -> Result<Nanoseconds, String> {
+        let (seconds, rest) = (self.u32()?, self.u32()?);
+        Ok(i64::from(seconds.cast_signed()) * 1_000_000_000 + i64::from(rest))
+    }
+}
+
+/// The problem of a message that is shorter than its fields.
+pub(super) fn ends_early() -> String {
+    "the message ends before its last field".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_aligned_as_the_representation_says() {
+        // A byte, then a double at 8 in XCDR1 and at 4 in XCDR2.
+        let mut first = vec![0, 1, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0];
+        first.extend(2.5_f64.to_le_bytes());
+        let mut reader = FieldReader::cdr(&first).unwrap();
+        assert_eq!((reader.u8(), reader.f64()), (Ok(7), Ok(2.5)));
+        let mut second = vec![0, 6, 0, 0, 7, 0, 0, 0];
+        second.extend(2.5_f64.to_be_bytes());
+        let mut reader = FieldReader::cdr(&second).unwrap();
+        assert_eq!((reader.u8(), reader.f64()), (Ok(7), Ok(2.5)));
+    }
+
+    #[test]
+    fn texts_end_with_a_zero_in_cdr_alone() {
+        let text = [0, 0, 0, 0, 0, 0, 0, 3, b'a', b'b', 0];
+        assert_eq!(FieldReader::cdr(&text).unwrap().text().unwrap(), "ab");
+        let text = [2, 0, 0, 0, b'a', b'b'];
+        assert_eq!(FieldReader::unaligned(&text).text().unwrap(), "ab");
+    }
+
+    #[test]
+    fn lengths_beyond_the_message_are_refused() {
+        for length in [4_u32, u32::MAX] {
+            let bytes = [&length.to_le_bytes()[..], b"abc"].concat();
+            assert!(FieldReader::unaligned(&bytes).bytes().is_err());
+            assert!(FieldReader::unaligned(&bytes).doubles().is_err());
+        }
+        assert!(FieldReader::cdr(&[0, 1]).is_err());
+        assert!(
+            FieldReader::cdr(&[0, 3, 0, 0])
+                .unwrap_err()
+                .contains("plain CDR")
+        );
+    }
+
+    #[test]
+    fn times_may_be_negative_and_late() {
+        let time = |seconds: i32, rest: u32| {
+            let bytes = [seconds.to_le_bytes(), rest.to_le_bytes()].concat();
+            FieldReader::unaligned(&bytes).time().unwrap()
+        };
+        assert_eq!(time(-1, 500_000_000), -500_000_000);
+        assert_eq!(time(i32::MAX, 999_999_999), 2_147_483_647_999_999_999);
+    }
+}

@@ -1,0 +1,232 @@
+//! A message with an image: [`ImageMessage`].
+
+use std::borrow::Cow;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde::Deserialize;
+
+use super::Nanoseconds;
+use super::encoding::Encoding;
+use super::fields::FieldReader;
+use super::protobuf::fields;
+use crate::picture::raw_image::RawImage;
+
+/// An image with the facts of its message.
+#[derive(Debug)]
+pub(crate) struct ImageMessage<'a> {
+    /// Time at which it was taken; `None` if the message has 0.
+    pub(crate) stamp: Option<Nanoseconds>,
+    /// Name of the frame of reference of the camera.
+    pub(crate) frame_id: String,
+    pub(crate) image: MessageImage<'a>,
+}
+
+/// The image of a message.
+#[derive(Debug)]
+pub(crate) enum MessageImage<'a> {
+    /// Rows of samples.
+    Raw(RawImage<'a>),
+    /// A JPEG or PNG file.
+    File {
+        /// The format as the message states it.
+        format: String,
+        bytes: Cow<'a, [u8]>,
+    },
+}
+
+impl<'a> ImageMessage<'a> {
+    /// Reads a message of a type that [`Content::Image`](super::Content) stands for.
+    ///
+    /// # Errors
+    /// If it is not a message of this type, or its image is compressed depth.
+    pub(crate) fn parse(schema: &str, encoding: Encoding, bytes: &'a [u8]) -> Result<Self, String> {
+        let message = match encoding {
+            Encoding::Cdr => Self::from_fields(schema, encoding, FieldReader::cdr(bytes)?),
+            Encoding::Ros1 => Self::from_fields(schema, encoding, FieldReader::unaligned(bytes)),
+            Encoding::Protobuf => Self::from_protobuf(schema, bytes),
+            Encoding::Json => Self::from_json(schema, bytes),
+        }?;
+        if let MessageImage::File { format, .. } = &message.image
+            && format.contains("compressedDepth")
+        {
+            return Err(format!("format {format:?} is depth, not an image"));
+        }
+        Ok(message)
+    }
+
+    fn from_fields(
+        schema: &str,
+        encoding: Encoding,
+        mut reader: FieldReader<'a>,
+    ) -> Result<Self, String> {
+        skip_sequence(schema, encoding, &mut reader)?;
+        let (stamp, frame_id) = (reader.time()?, reader.text()?);
+        let image = match schema {
+            "sensor_msgs/Image" => {
+                let [height, width] = [reader.u32()?, reader.u32()?].map(|side| side as usize);
+                MessageImage::Raw(RawImage {
+                    width,
+                    height,
+                    encoding: reader.text()?,
+                    is_big_endian: reader.u8()? != 0,
+                    step: reader.u32()? as usize,
+                    data: reader.bytes()?.into(),
+                })
+            }
+            "sensor_msgs/CompressedImage" => MessageImage::File {
+                format: reader.text()?,
+                bytes: reader.bytes()?.into(),
+            },
+            _ if schema.ends_with("RawImage") => {
+                let [width, height] = [reader.u32()?, reader.u32()?].map(|side| side as usize);
+                MessageImage::Raw(RawImage {
+                    width,
+                    height,
+                    encoding: reader.text()?,
+                    is_big_endian: false,
+                    step: reader.u32()? as usize,
+                    data: reader.bytes()?.into(),
+                })
+            }
+            _ => {
+                let bytes = reader.bytes()?.into();
+                let format = reader.text()?;
+                MessageImage::File { format, bytes }
+            }
+        };
+        Ok(Self {
+            stamp: (stamp != 0).then_some(stamp),
+            frame_id,
+            image,
+        })
+    }
+
+    /// The field numbers are those of `foxglove/RawImage.proto` and `foxglove/CompressedImage.proto`.
+    fn from_protobuf(schema: &str, bytes: &'a [u8]) -> Result<Self, String> {
+        let is_raw = schema.ends_with("RawImage");
+        let (mut stamp, mut frame_id, mut format) = (0, String::new(), String::new());
+        let mut data: &[u8] = &[];
+        let [mut width, mut height, mut step] = [0_usize; 3];
+        for field in fields(bytes) {
+            let (number, value) = field?;
+            let size = || usize::try_from(value.number()).unwrap_or(usize::MAX);
+            match (is_raw, number) {
+                (_, 1) => stamp = value.time()?,
+                (true, 2) => width = size(),
+                (true, 3) => height = size(),
+                (true, 4) | (false, 3) => format = value.text(),
+                (true, 5) => step = size(),
+                (true, 6) | (false, 2) => data = value.bytes(),
+                (true, 7) | (false, 4) => frame_id = value.text(),
+                _ => {}
+            }
+        }
+        let image = if is_raw {
+            MessageImage::Raw(RawImage {
+                width,
+                height,
+                step,
+                encoding: format,
+                is_big_endian: false,
+                data: data.into(),
+            })
+        } else {
+            MessageImage::File {
+                format,
+                bytes: data.into(),
+            }
+        };
+        Ok(Self {
+            stamp: (stamp != 0).then_some(stamp),
+            frame_id,
+            image,
+        })
+    }
+
+    fn from_json(schema: &str, bytes: &[u8]) -> Result<Self, String> {
+        let message: JsonImage<'_> =
+            serde_json::from_slice(bytes).map_err(|e| format!("not a {schema}: {e}"))?;
+        let data = STANDARD
+            .decode(&*message.data)
+            .map_err(|e| format!("data in base64 expected: {e}"))?;
+        let image = if schema.ends_with("RawImage") {
+            MessageImage::Raw(RawImage {
+                width: message.width,
+                height: message.height,
+                step: message.step,
+                encoding: message.encoding,
+                is_big_endian: false,
+                data: data.into(),
+            })
+        } else {
+            MessageImage::File {
+                format: message.format,
+                bytes: data.into(),
+            }
+        };
+        let JsonTime { sec, nsec } = message.timestamp;
+        let stamp = sec.saturating_mul(1_000_000_000).saturating_add(nsec);
+        Ok(Self {
+            stamp: (stamp != 0).then_some(stamp),
+            frame_id: message.frame_id,
+            image,
+        })
+    }
+}
+
+/// A `foxglove.RawImage` or `foxglove.CompressedImage` in JSON.
+#[derive(Deserialize)]
+struct JsonImage<'a> {
+    #[serde(default)]
+    timestamp: JsonTime,
+    #[serde(default)]
+    frame_id: String,
+    #[serde(default)]
+    width: usize,
+    #[serde(default)]
+    height: usize,
+    #[serde(default)]
+    step: usize,
+    #[serde(default)]
+    encoding: String,
+    #[serde(default)]
+    format: String,
+    #[serde(borrow)]
+    data: Cow<'a, str>,
+}
+
+#[derive(Default, Deserialize)]
+struct JsonTime {
+    sec: i64,
+    nsec: i64,
+}
+
+/// The header of ROS 1 begins with a number that ROS 2 dropped; messages of Foxglove have no header.
+pub(super) fn skip_sequence(
+    schema: &str,
+    encoding: Encoding,
+    reader: &mut FieldReader<'_>,
+) -> Result<(), String> {
+    if encoding == Encoding::Ros1 && !schema.starts_with("foxglove") {
+        reader.u32()?;
+    }
+    Ok(())
+}
+
+/// The stamp at the start of a message; `None` if it must be read as a whole.
+pub(crate) fn stamp(schema: &str, encoding: Encoding, start: &[u8]) -> Option<Nanoseconds> {
+    match encoding {
+        Encoding::Cdr => FieldReader::cdr(start).ok()?.time().ok(),
+        Encoding::Ros1 => {
+            let mut reader = FieldReader::unaligned(start);
+            skip_sequence(schema, encoding, &mut reader).ok()?;
+            reader.time().ok()
+        }
+        Encoding::Protobuf => match fields(start).next()?.ok()? {
+            (1, value) => value.time().ok(),
+            _ => None,
+        },
+        Encoding::Json => None,
+    }
+}

@@ -1,0 +1,45 @@
+//! Recordings of robots: MCAP files → images with their times, cameras and exposures.
+//!
+//! ```text
+//! file ─ McapReader ─ Channel + bytes ─ ImageMessage ─ RawImage, or the bytes of an image file
+//!                                     └ CameraInfo, Exposure
+//! times ─ Sampling: the frames that are taken ─ Stretches: their scenes
+//! ```
+//!
+//! All of it reads untrusted bytes: nothing is allocated for a length that a file states before the bytes were read.
+
+mod camera_info;
+mod channel;
+mod chunk;
+mod encoding;
+mod exposure;
+mod fields;
+mod image_message;
+mod mcap;
+mod overview;
+mod protobuf;
+mod sampling;
+mod stretches;
+#[cfg(test)]
+mod tests;
+mod thumbnail;
+pub(crate) mod video;
+
+pub(crate) use camera_info::CameraInfo;
+pub(crate) use channel::{Channel, Content, camera_of};
+pub(crate) use encoding::Encoding;
+pub(crate) use exposure::Exposure;
+pub(crate) use image_message::{ImageMessage, MessageImage, stamp};
+pub(crate) use mcap::{Event, LARGEST_MESSAGE, McapReader, Message};
+pub(crate) use overview::{Overview, TopicOverview};
+pub(crate) use sampling::{Sampler, SamplingArgs};
+pub(crate) use stretches::{Place, Stretches};
+pub(crate) use thumbnail::Thumbnail;
+
+/// A time in nanoseconds, usually since 1970.
+pub(crate) type Nanoseconds = i64;
+
+/// A time in seconds.
+pub(crate) fn seconds(time: Nanoseconds) -> f64 {
+    time as f64 / 1e9
+}

@@ -1,0 +1,137 @@
+//! The topics of a recording: [`Overview`].
+
+use std::collections::BTreeMap;
+use std::io::{Read, Seek};
+
+use super::channel::Content;
+use super::image_message::{ImageMessage, MessageImage};
+use super::mcap::{Event, LARGEST_MESSAGE, McapReader, Message};
+use super::{Nanoseconds, seconds};
+
+/// Start of the form of images that cannot be read; the reason follows.
+const UNREAD: &str = "not read: ";
+
+/// All topics of a recording.
+#[derive(Debug, Default)]
+pub(crate) struct Overview {
+    pub(crate) topics: BTreeMap<String, TopicOverview>,
+    /// Damage, with its place.
+    pub(crate) problems: Vec<String>,
+}
+
+/// One topic of a recording.
+#[derive(Debug)]
+pub(crate) struct TopicOverview {
+    pub(crate) schema: String,
+    /// Number of messages.
+    pub(crate) count: usize,
+    /// The least and the greatest time of a message.
+    pub(crate) times: [Nanoseconds; 2],
+    /// Size and encoding of the first image, or its problem; empty for other topics.
+    pub(crate) form: String,
+}
+
+impl TopicOverview {
+    /// Whether its first message has an image that can be read.
+    pub(crate) fn has_images(&self) -> bool {
+        !self.form.is_empty() && !self.form.starts_with(UNREAD)
+    }
+
+    /// Seconds from the first message to the last.
+    pub(crate) fn duration(&self) -> f64 {
+        seconds(self.times[1].saturating_sub(self.times[0]))
+    }
+
+    /// Messages per second; `None` for a single one.
+    pub(crate) fn rate(&self) -> Option<f64> {
+        let duration = self.duration();
+        (duration > 0.0).then(|| (self.count - 1) as f64 / duration)
+    }
+}
+
+impl Overview {
+    /// Adds the messages of a file. `size` finds the width and height of an image file.
+    pub(crate) fn add<R: Read + Seek>(
+        &mut self,
+        place: &str,
+        mut reader: McapReader<R>,
+        size: impl Fn(&[u8]) -> Result<(u32, u32), String>,
+    ) {
+        while let Some(event) = reader.next() {
+            match event {
+                Event::Message(message) => {
+                    let is_new = self.count(&message);
+                    if is_new
+                        && let Some(form) = form(&mut reader, &message, &size)
+                        && let Some(topic) = self.topics.get_mut(&message.channel.topic)
+                    {
+                        topic.form = form;
+                    }
+                }
+                Event::ChunkRead => {}
+                Event::ChunkDamaged { problem, .. } => {
+                    self.problems
+                        .push(format!("{place}: a damaged chunk: {problem}"));
+                }
+                Event::Cut(problem) => {
+                    self.problems
+                        .push(format!("{place}: the recording is cut off: {problem}"));
+                }
+            }
+        }
+    }
+
+    /// Counts a message; `true` if it is the first one of its topic.
+    fn count(&mut self, message: &Message) -> bool {
+        let channel = &message.channel;
+        let time = message.log_time;
+        if let Some(topic) = self.topics.get_mut(&channel.topic) {
+            topic.count += 1;
+            topic.times = [topic.times[0].min(time), topic.times[1].max(time)];
+            return false;
+        }
+        let topic = TopicOverview {
+            schema: channel.schema.clone(),
+            count: 1,
+            times: [time; 2],
+            form: String::new(),
+        };
+        self.topics.insert(channel.topic.clone(), topic);
+        true
+    }
+
+    /// The names of the topics with images.
+    pub(crate) fn image_topics(&self) -> Vec<&str> {
+        let topics = self.topics.iter().filter(|(_, topic)| topic.has_images());
+        topics.map(|(name, _)| &**name).collect()
+    }
+}
+
+/// Size and encoding of an image, or its problem; `None` for other messages.
+fn form<R: Read + Seek>(
+    reader: &mut McapReader<R>,
+    message: &Message,
+    size: impl Fn(&[u8]) -> Result<(u32, u32), String>,
+) -> Option<String> {
+    let channel = &message.channel;
+    let encoding = match &channel.content {
+        Content::Image(encoding) => *encoding,
+        Content::Unread(reason) => return Some(format!("{UNREAD}{reason}")),
+        _ => return None,
+    };
+    if message.length > LARGEST_MESSAGE {
+        return Some(format!("{UNREAD}messages of {} MB", message.length >> 20));
+    }
+    let parsed = ImageMessage::parse(&channel.schema, encoding, reader.body()?);
+    let form = parsed.and_then(|message| match message.image {
+        MessageImage::Raw(image) => {
+            let (width, height) = image.decode()?.size();
+            Ok(format!("{width}×{height} {}", image.encoding))
+        }
+        MessageImage::File { format, bytes } => {
+            let (width, height) = size(&bytes)?;
+            Ok(format!("{width}×{height} {format}"))
+        }
+    });
+    Some(form.unwrap_or_else(|problem| format!("{UNREAD}{problem}")))
+}

@@ -1,0 +1,254 @@
+//! The choice of frames from a recording or video: [`SamplingArgs`] and [`Sampler`].
+
+use std::num::NonZeroUsize;
+
+use clap::Args;
+
+use super::stretches::Place;
+use super::thumbnail::Thumbnail;
+use super::{Nanoseconds, seconds};
+use crate::types::Decides;
+use crate::types::flag::positive;
+
+/// Seconds between two frames that are taken, if no flag chooses others: the interval of DarkQA.
+const INTERVAL: f64 = 2.0;
+
+/// Flags that choose the frames of each topic.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Key frames")]
+pub(crate) struct SamplingArgs {
+    /// One frame of each topic every N seconds; 0 takes every frame; default: 2, or every frame if another flag chooses
+    #[arg(long, value_name = "SECONDS", value_parser = interval, add = Decides::Trials)]
+    pub every: Option<f64>,
+    /// The first frame at each of these times or later, in seconds from the first frame; default: by --every
+    #[arg(long, value_name = "SECONDS,…", value_delimiter = ',', value_parser = interval, conflicts_with_all = ["every", "max_frames"], add = Decides::Trials)]
+    pub at: Vec<f64>,
+    /// At most N frames of each topic, evenly spread over its duration; default: no limit
+    #[arg(long, value_name = "N", add = Decides::Trials)]
+    pub max_frames: Option<NonZeroUsize>,
+    /// Of the frames chosen otherwise, those that differ from the last one taken by more than this many 8-bit codes: the mean absolute
+    /// difference of the grey means of 16 × 16 blocks; default: all of them
+    #[arg(long, value_name = "CODES", value_parser = positive, add = Decides::Trials)]
+    pub changed: Option<f64>,
+}
+
+/// Parses a number of seconds from 0 to a billion.
+fn interval(text: &str) -> Result<f64, String> {
+    let seconds = text.trim().parse().ok();
+    seconds
+        .filter(|seconds| (0.0..=1e9).contains(seconds))
+        .ok_or_else(|| "a number of seconds from 0 to 1e9 expected".to_owned())
+}
+
+impl SamplingArgs {
+    /// Seconds between two frames, by `--every` and its default.
+    pub(crate) fn interval(&self) -> f64 {
+        let chooses = !self.at.is_empty() || self.max_frames.is_some() || self.changed.is_some();
+        self.every.unwrap_or(if chooses { 0.0 } else { INTERVAL })
+    }
+
+    /// The sampler of a topic of this many seconds.
+    pub(crate) fn sampler(&self, duration: f64) -> Sampler {
+        let most = self.max_frames.map_or(usize::MAX, NonZeroUsize::get);
+        // Frames at 0, D / N, 2 D / N, … are N, also if the duration has a little more than the last frame.
+        let spread = self
+            .max_frames
+            .map_or(0.0, |most| duration / most.get() as f64);
+        let mut at: Vec<Nanoseconds> = self
+            .at
+            .iter()
+            .map(|seconds| nanoseconds(*seconds))
+            .collect();
+        at.sort_unstable();
+        at.dedup();
+        Sampler {
+            interval: nanoseconds(self.interval().max(spread)),
+            at,
+            passed: 0,
+            most,
+            taken: 0,
+            start: None,
+            next: 0,
+            changed: self.changed,
+            last: None,
+        }
+    }
+
+    /// The choice in words.
+    pub(crate) fn words(&self) -> String {
+        let mut words = Vec::new();
+        if !self.at.is_empty() {
+            words.push(format!("at {} times", self.at.len()));
+        } else if self.interval() > 0.0 {
+            words.push(format!("one every {} s", self.interval()));
+        }
+        if let Some(most) = self.max_frames {
+            words.push(format!("at most {most}, evenly spread"));
+        }
+        if let Some(codes) = self.changed {
+            words.push(format!("changed by more than {codes} codes"));
+        }
+        if words.is_empty() {
+            words.push("every frame".to_owned());
+        }
+        words.join(", ")
+    }
+}
+
+fn nanoseconds(seconds: f64) -> Nanoseconds {
+    (seconds * 1e9).round() as Nanoseconds
+}
+
+/// The choice of frames of one topic, in the order in which they come.
+#[derive(Debug)]
+pub(crate) struct Sampler {
+    /// Time between two frames; 0 for none.
+    interval: Nanoseconds,
+    /// Chosen times from the start, sorted; empty if the interval decides.
+    at: Vec<Nanoseconds>,
+    /// Number of chosen times that are past.
+    passed: usize,
+    most: usize,
+    taken: usize,
+    /// Start of the clock of the frames seen last.
+    start: Option<Nanoseconds>,
+    /// Time from the start at which the next frame is due.
+    next: Nanoseconds,
+    changed: Option<f64>,
+    last: Option<Thumbnail>,
+}
+
+impl Sampler {
+    /// Whether a frame is chosen by its time. If [`Self::compares`], its pixels decide then.
+    pub(crate) fn is_due(&mut self, place: Place) -> bool {
+        let since = place.time.saturating_sub(place.start);
+        if self.taken >= self.most {
+            return false;
+        }
+        if !self.at.is_empty() {
+            let passed = self.at.partition_point(|time| *time <= since);
+            let is_due = passed > self.passed;
+            self.passed = self.passed.max(passed);
+            self.taken += usize::from(is_due);
+            return is_due;
+        }
+        if self.start.replace(place.start) != Some(place.start) {
+            self.next = 0;
+        }
+        // A frame may be a little earlier than the start, if its clock is not the recorder's.
+        let is_due = self.interval == 0 || since.max(0) >= self.next;
+        if is_due && self.interval > 0 {
+            self.next = (since.max(0) / self.interval + 1).saturating_mul(self.interval);
+        }
+        self.taken += usize::from(is_due);
+        is_due
+    }
+
+    /// Whether pixels decide about due frames.
+    pub(crate) fn compares(&self) -> bool {
+        self.changed.is_some()
+    }
+
+    /// Whether a due frame differs enough from the last one taken; if so, it is the last one taken.
+    pub(crate) fn has_changed(&mut self, thumbnail: Thumbnail) -> bool {
+        let limit = self.changed.unwrap_or(0.0);
+        let has_changed = self
+            .last
+            .as_ref()
+            .is_none_or(|last| last.difference(&thumbnail) > limit);
+        if has_changed {
+            self.last = Some(thumbnail);
+        } else {
+            self.taken -= 1;
+        }
+        has_changed
+    }
+
+    /// The chosen times in seconds at which no frame came.
+    pub(crate) fn missed(&self) -> Vec<f64> {
+        self.at
+            .iter()
+            .skip(self.passed)
+            .map(|time| seconds(*time))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The indexes of the frames that are chosen from frames at these times in seconds.
+    fn chosen(args: &SamplingArgs, times: &[f64]) -> Vec<usize> {
+        let duration = times.last().unwrap() - times[0];
+        let mut sampler = args.sampler(duration);
+        let mut due = |time: f64| {
+            sampler.is_due(Place {
+                start: nanoseconds(times[0]),
+                time: nanoseconds(time),
+                stretch: 0,
+            })
+        };
+        (0..times.len()).filter(|i| due(times[*i])).collect()
+    }
+
+    #[test]
+    fn one_frame_for_each_interval() {
+        let times = [100.0, 100.5, 101.9, 102.0, 102.1, 107.0, 107.5, 108.0];
+        assert_eq!(chosen(&SamplingArgs::default(), &times), [0, 3, 5, 7]);
+        let every = SamplingArgs {
+            every: Some(0.0),
+            ..SamplingArgs::default()
+        };
+        assert_eq!(chosen(&every, &times).len(), times.len());
+    }
+
+    #[test]
+    fn the_first_frame_at_each_time() {
+        let at = SamplingArgs {
+            at: vec![5.0, 0.0, 1.95, 1.96, 99.0],
+            ..SamplingArgs::default()
+        };
+        assert_eq!(
+            chosen(&at, &[10.0, 11.0, 11.9, 12.0, 14.9, 15.1]),
+            [0, 3, 5]
+        );
+    }
+
+    #[test]
+    fn at_most_n_frames_are_evenly_spread() {
+        let times: Vec<f64> = (0..=100).map(|i| f64::from(i) * 0.1).collect();
+        let most = |n: usize| SamplingArgs {
+            max_frames: NonZeroUsize::new(n),
+            ..SamplingArgs::default()
+        };
+        assert_eq!(chosen(&most(5), &times), [0, 20, 40, 60, 80]);
+        assert_eq!(chosen(&most(1), &times), [0]);
+        assert_eq!(chosen(&most(1000), &times).len(), 101);
+    }
+
+    #[test]
+    fn frames_that_did_not_change_do_not_count() {
+        let args = SamplingArgs {
+            changed: Some(5.0),
+            max_frames: NonZeroUsize::new(2),
+            ..SamplingArgs::default()
+        };
+        let mut sampler = args.sampler(0.0);
+        let grey = |code: u8| Thumbnail::new(&crate::types::Rgb::new(1, 1, vec![code; 3]).unwrap());
+        let mut takes = |i: i64, code: u8| {
+            let place = Place {
+                start: 0,
+                time: i,
+                stretch: 0,
+            };
+            sampler.is_due(place) && sampler.has_changed(grey(code))
+        };
+        let found: Vec<bool> = (0..)
+            .zip([10, 14, 15, 16, 200])
+            .map(|(i, code)| takes(i, code))
+            .collect();
+        // 15 differs from the last one taken, 10, by 5, and 16 by 6.
+        assert_eq!(found, [true, false, false, true, false]);
+    }
+}

@@ -1,0 +1,380 @@
+//! Writing frames of a recording or video, several at once: [`FrameWriter`].
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use rayon::ThreadPool;
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+
+use crate::dataset::frame_folder::{self, FramePaths};
+use crate::error::{Error, Result};
+use crate::images::input_tally::InputTally;
+use crate::import::recording::{
+    Channel, Content, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
+};
+use crate::picture::ImageFile;
+use crate::picture::raw_image::RawPixels;
+use crate::picture::reading_rule::ReadingRule;
+use crate::text::words::counted;
+use crate::types::{FrameId, Labels, Rgb};
+
+/// The most bytes of frames that wait to be written (chosen). Writing takes two to three times as many.
+const MOST_WAITING: usize = 32 << 20;
+
+/// Frames that wait for each thread (chosen).
+const WAITING_PER_THREAD: usize = 4;
+
+/// Image files that are copied from messages, by the endings of their names.
+const COPIED: [&str; 3] = ["jpg", "png", "webp"];
+
+/// A frame that was chosen.
+pub(super) struct ChosenFrame {
+    pub(super) topic: String,
+    /// Name of the frame in its scene.
+    pub(super) name: String,
+    pub(super) place: Place,
+    pub(super) log_time: Nanoseconds,
+    pub(super) source: FrameSource,
+}
+
+/// The image of a chosen frame.
+pub(super) enum FrameSource {
+    /// A message of a channel, not decoded.
+    Message {
+        channel: Arc<Channel>,
+        bytes: Vec<u8>,
+    },
+    Image(Rgb),
+}
+
+impl ChosenFrame {
+    fn bytes(&self) -> usize {
+        match &self.source {
+            FrameSource::Message { bytes, .. } => bytes.len(),
+            FrameSource::Image(image) => image.samples().len(),
+        }
+    }
+
+    /// The topic and time, for messages.
+    fn words(&self) -> String {
+        let since = seconds(self.place.time.saturating_sub(self.place.start));
+        format!("{} at {since:.3} s", self.topic)
+    }
+}
+
+/// A frame that was written.
+pub(super) struct WrittenFrame {
+    pub(super) topic: String,
+    pub(super) time: Nanoseconds,
+    pub(super) log_time: Nanoseconds,
+    /// Width and height in pixels, after a turn that its file states.
+    pub(super) size: (usize, usize),
+    /// Whether its file states a turn, so that the camera's intrinsics are not those of the image.
+    pub(super) is_turned: bool,
+    /// The greatest sample of an image of 16 bits.
+    peak_16: Option<u16>,
+    /// The line of the frame in `frames.jsonl`.
+    pub(super) line: Map<String, Value>,
+}
+
+/// An image as it is written.
+struct EncodedFrame {
+    bytes: Vec<u8>,
+    ending: &'static str,
+    size: (usize, usize),
+    is_turned: bool,
+    peak_16: Option<u16>,
+    frame_id: String,
+}
+
+/// Writes frames, and keeps the facts about them.
+pub(super) struct FrameWriter<'a> {
+    out: &'a Path,
+    /// Name of the drive, with which the names of scenes begin.
+    drive: String,
+    /// The code of white in images of 16 bits.
+    white: u16,
+    pool: ThreadPool,
+    tally: InputTally,
+    waiting: Vec<ChosenFrame>,
+    /// Number of waiting frames that are known to be intact.
+    intact: usize,
+    pub(super) written: Vec<WrittenFrame>,
+    /// Number of frames that could not be written, by topic.
+    failed: BTreeMap<String, usize>,
+}
+
+impl<'a> FrameWriter<'a> {
+    pub(super) fn new(out: &'a Path, drive: String, white: u16, pool: ThreadPool) -> Self {
+        Self {
+            out,
+            drive,
+            white,
+            pool,
+            tally: InputTally::default(),
+            waiting: Vec::new(),
+            intact: 0,
+            written: Vec::new(),
+            failed: BTreeMap::new(),
+        }
+    }
+
+    /// Takes a frame, and writes the waiting ones if they are many. A frame of a chunk is not known to be intact before the chunk was
+    /// read, unless the chunk is larger than the memory for waiting frames.
+    pub(super) fn push(&mut self, frame: ChosenFrame, is_intact: bool) {
+        let bytes: usize = self.waiting.iter().map(ChosenFrame::bytes).sum();
+        let most = WAITING_PER_THREAD * self.pool.current_num_threads();
+        let is_many = self.waiting.len() >= most && self.intact == self.waiting.len();
+        if bytes + frame.bytes() > MOST_WAITING || is_many {
+            self.write_waiting();
+        }
+        self.waiting.push(frame);
+        if is_intact {
+            self.intact = self.waiting.len();
+        }
+    }
+
+    /// Marks all waiting frames as intact.
+    pub(super) fn keep_waiting(&mut self) {
+        self.intact = self.waiting.len();
+    }
+
+    /// Drops the waiting frames that are not known to be intact, and returns their number.
+    pub(super) fn drop_doubtful(&mut self) -> usize {
+        let doubtful = self.waiting.len() - self.intact;
+        self.waiting.truncate(self.intact);
+        doubtful
+    }
+
+    /// Writes all waiting frames. Each that fails is counted, and the first of each topic is logged.
+    pub(super) fn write_waiting(&mut self) {
+        let waiting = std::mem::take(&mut self.waiting);
+        self.intact = 0;
+        let results: Vec<Result<WrittenFrame, String>> = self
+            .pool
+            .install(|| waiting.par_iter().map(|frame| self.write(frame)).collect());
+        for (frame, result) in waiting.iter().zip(results) {
+            match result {
+                Ok(written) => self.written.push(written),
+                Err(problem) => self.fail(&frame.topic, &format!("{}: {problem}", frame.words())),
+            }
+        }
+    }
+
+    /// Counts a frame that cannot be written.
+    pub(super) fn fail(&mut self, topic: &str, problem: &str) {
+        let count = self.failed.entry(topic.to_owned()).or_default();
+        *count += 1;
+        if *count == 1 {
+            tracing::error!("{}: {problem}", self.drive);
+        }
+    }
+
+    /// Warns of the topics of which several frames failed, and returns the number of all frames that failed.
+    pub(super) fn warn_of_failures(&self) -> usize {
+        for (topic, count) in self.failed.iter().filter(|(_, count)| **count > 1) {
+            tracing::warn!("{}: {topic}: {count} frames could not be read", self.drive);
+        }
+        self.failed.values().sum()
+    }
+
+    fn write(&self, frame: &ChosenFrame) -> Result<WrittenFrame, String> {
+        let encoded = match &frame.source {
+            FrameSource::Message { channel, bytes } => {
+                self.encode_message(frame, channel, bytes)?
+            }
+            FrameSource::Image(image) => EncodedFrame {
+                bytes: crate::picture::png(image).map_err(|e| e.to_string())?,
+                ending: "png",
+                size: (image.width(), image.height()),
+                is_turned: false,
+                peak_16: None,
+                frame_id: String::new(),
+            },
+        };
+        let scene = format!("{}-{:04}", self.drive, frame.place.stretch);
+        let paths = FramePaths {
+            out: self.out,
+            scene: &scene,
+            frame: &frame.name,
+        };
+        let mut line = paths.line(encoded.size);
+        let path = paths
+            .write("rgb", encoded.ending, &encoded.bytes)
+            .map_err(|e| e.to_string())?;
+        line.insert("rgb".to_owned(), json!(path));
+        line.insert("t".to_owned(), json!(seconds(frame.place.time)));
+        line.insert("topic".to_owned(), json!(frame.topic));
+        if !encoded.frame_id.is_empty() {
+            line.insert("frame_id".to_owned(), json!(encoded.frame_id));
+        }
+        Ok(WrittenFrame {
+            topic: frame.topic.clone(),
+            time: frame.place.time,
+            log_time: frame.log_time,
+            size: encoded.size,
+            is_turned: encoded.is_turned,
+            peak_16: encoded.peak_16,
+            line,
+        })
+    }
+
+    fn encode_message(
+        &self,
+        frame: &ChosenFrame,
+        channel: &Channel,
+        bytes: &[u8],
+    ) -> Result<EncodedFrame, String> {
+        let message = parse(channel, bytes)?;
+        match message.image {
+            MessageImage::Raw(image) => {
+                let pixels = image.decode()?;
+                let peak_16 = pixels.peak_16();
+                let pixels = pixels.with_white(self.white);
+                Ok(EncodedFrame {
+                    bytes: pixels.png().map_err(|e| e.to_string())?,
+                    ending: "png",
+                    size: pixels.size(),
+                    is_turned: false,
+                    peak_16,
+                    frame_id: message.frame_id,
+                })
+            }
+            MessageImage::File { format, bytes } => {
+                let file =
+                    ImageFile::new(bytes.into_owned(), frame.words(), ReadingRule::default());
+                let ending = file.ending();
+                if !COPIED.contains(&ending) {
+                    return Err(format!(
+                        "format {format:?}; a JPEG, PNG or WebP file expected"
+                    ));
+                }
+                // The message of the file names its place, which the caller does, too.
+                let (width, height) = file.check().map_err(|e| match e {
+                    Error::Data { problem, .. } => problem,
+                    other => other.to_string(),
+                })?;
+                let note = file.note();
+                self.tally.add(&FrameId(frame.words()), &note);
+                Ok(EncodedFrame {
+                    size: (width as usize, height as usize),
+                    is_turned: note.orientation.is_some(),
+                    peak_16: None,
+                    ending,
+                    bytes: file.bytes().to_vec(),
+                    frame_id: message.frame_id,
+                })
+            }
+        }
+    }
+
+    /// Writes what is waiting and the files about all frames, with `info` in `dataset.json`. Returns the number of scenes.
+    ///
+    /// # Errors
+    /// If there is no frame, or the files cannot be written.
+    pub(super) fn finish(&mut self, place: &str, info: &Value) -> Result<usize> {
+        self.write_waiting();
+        if self.written.is_empty() {
+            return Err(Error::data(place, "no frame of it could be taken"));
+        }
+        std::mem::take(&mut self.tally).warn();
+        self.warn_of_white();
+        let key = |written: &WrittenFrame| {
+            let name = |key: &str| written.line[key].as_str().map(str::to_owned);
+            (name("scene"), name("frame"))
+        };
+        self.written.sort_by_cached_key(key);
+        let lines = self.written.iter().map(|written| &written.line);
+        frame_folder::finish(self.out, &Labels::default(), info, lines)?;
+        let mut scenes: Vec<&Value> = self
+            .written
+            .iter()
+            .map(|written| &written.line["scene"])
+            .collect();
+        scenes.dedup();
+        Ok(scenes.len())
+    }
+
+    /// Warns if 16-bit images use fewer bits, so that they are too dark.
+    fn warn_of_white(&self) {
+        let peak = self
+            .written
+            .iter()
+            .filter_map(|written| written.peak_16)
+            .max();
+        if let Some(peak) =
+            peak.filter(|peak| *peak > 0 && *peak < 1 << 14 && self.white == u16::MAX)
+        {
+            let white = (u32::from(peak) + 1).next_power_of_two() - 1;
+            tracing::warn!(
+                "the greatest code of the images of 16 bits is {peak}: they are dark, unless their white is less than 65535; for a sensor of {} bits set --white {white}",
+                (white + 1).ilog2()
+            );
+        }
+    }
+}
+
+/// The small copy of a message's image.
+///
+/// # Errors
+/// If the message has no image that can be decoded.
+pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<Thumbnail, String> {
+    match parse(channel, bytes)?.image {
+        MessageImage::Raw(image) => match image.decode()?.with_white(white) {
+            RawPixels::Codes8(image) => Ok(Thumbnail::new(&image)),
+            RawPixels::Codes16(image) => {
+                let high = image
+                    .samples()
+                    .iter()
+                    .map(|code| (code >> 8) as u8)
+                    .collect();
+                let image = Rgb::new(image.height(), image.width(), high);
+                image
+                    .map(|image| Thumbnail::new(&image))
+                    .map_err(|e| e.to_string())
+            }
+        },
+        MessageImage::File { bytes, .. } => {
+            let file = ImageFile::new(bytes.into_owned(), String::new(), ReadingRule::default());
+            file.decode()
+                .map(|image| Thumbnail::new(&image))
+                .map_err(|e| e.to_string())
+        }
+    }
+}
+
+fn parse<'a>(channel: &Channel, bytes: &'a [u8]) -> Result<ImageMessage<'a>, String> {
+    match channel.content {
+        Content::Image(encoding) => ImageMessage::parse(&channel.schema, encoding, bytes),
+        _ => Err(format!("a message of {}, not an image", channel.schema)),
+    }
+}
+
+/// The scenes and frames that were written, in words.
+pub(super) fn summary(
+    out: &Path,
+    frames: usize,
+    scenes: usize,
+    stretch: f64,
+    seen: usize,
+    failed: usize,
+) -> String {
+    let failed = if failed == 0 {
+        String::new()
+    } else {
+        format!(", {failed} failed")
+    };
+    let chosen = if seen == frames {
+        String::new()
+    } else {
+        format!(", chosen from {seen}")
+    };
+    format!(
+        "{}: {} of {} ({stretch} s each){chosen}{failed}\n",
+        out.display(),
+        counted(frames, "frame"),
+        counted(scenes, "scene"),
+    )
+}

@@ -1,0 +1,537 @@
+//! `import mcap`: frames of a recording, or the list of its topics.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::fs::File;
+use std::num::NonZeroU16;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::Args;
+use serde_json::json;
+
+use super::camera_facts::{Cameras, Exposures};
+use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
+use super::topic_list::{listing, no_images};
+use crate::error::{Error, Result};
+use crate::files::reading::{entries, open};
+use crate::images::progress::{Progress, StepBar};
+use crate::images::workers::{ThreadArgs, pool};
+use crate::import::recording::{
+    CameraInfo, Content, Encoding, Event, ImageMessage, LARGEST_MESSAGE, McapReader, Message,
+    Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicOverview, camera_of, seconds,
+    stamp,
+};
+use crate::picture::ImageFile;
+use crate::picture::reading_rule::ReadingRule;
+use crate::runs::Outcome;
+use crate::text::words::counted;
+use crate::types::Decides;
+use crate::types::flag::positive;
+
+/// Bytes at the start of a message that hold its time.
+const STAMP: u64 = 64;
+
+/// The flags of `import mcap`.
+#[derive(Debug, Args)]
+pub(crate) struct McapArgs {
+    /// MCAP files of one recording in their order, or the folder of a bag of ROS 2
+    #[arg(value_name = "FILE", required = true, add = Decides::Pixels)]
+    files: Vec<PathBuf>,
+    /// A topic whose images are taken, repeatable; default: the only topic with images
+    #[arg(long, value_name = "TOPIC", add = Decides::Trials)]
+    topic: Vec<String>,
+    /// Where the frames go; default: nowhere, the topics with images are listed
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    out: Option<PathBuf>,
+    /// The flags that choose frames.
+    #[command(flatten)]
+    sampling: SamplingArgs,
+    /// The code of white in images of 16 bits; default: 65535
+    #[arg(long, value_name = "CODE", add = Decides::Pixels)]
+    white: Option<NonZeroU16>,
+    /// How frames are written.
+    #[command(flatten)]
+    written: WrittenArgs,
+}
+
+/// The flags about the frames of a drive that are written.
+#[derive(Debug, Args)]
+pub(super) struct WrittenArgs {
+    /// The name the data set gives itself; default: the name of the recording
+    #[arg(long, value_name = "NAME", add = Decides::Reply)]
+    pub(super) name: Option<String>,
+    /// Seconds of a drive that are one scene: intervals are clustered by scene
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 30.0, add = Decides::Trials)]
+    pub(super) stretch: f64,
+    /// Write into a folder that holds frames already
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
+    pub(super) force: bool,
+    /// The number of threads.
+    #[command(flatten)]
+    pub(super) threads: ThreadArgs,
+}
+
+impl WrittenArgs {
+    /// Refuses a folder that holds frames already.
+    pub(super) fn check(&self, out: &Path) -> Result<()> {
+        let list = out.join("frames.jsonl");
+        if self.force || !list.exists() {
+            return Ok(());
+        }
+        let problem =
+            "the folder has frames already; --force overwrites them, another --out keeps both";
+        Err(Error::data(list.display(), problem))
+    }
+}
+
+/// Lists the topics of a recording, or imports frames of them.
+///
+/// # Errors
+/// If a file is not an MCAP file, no topic has images, several have and none is named, or no frame could be read.
+pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
+    let files = files(&args.files)?;
+    if let Some(out) = &args.out {
+        args.written.check(out)?;
+    }
+    let needs_overview =
+        args.out.is_none() || args.topic.is_empty() || args.sampling.max_frames.is_some();
+    let overview = needs_overview
+        .then(|| overview(&files, progress))
+        .transpose()?;
+    let Some(out) = &args.out else {
+        return listing(&overview.unwrap_or_default());
+    };
+    let topics = topics(args, overview.as_ref())?;
+    let drive = drive_name(&files[0]);
+    let mut import = Import::new(args, out, drive, &topics, overview.as_ref())?;
+    let mut problems = Vec::new();
+    let bar = progress.bar("MB", bytes(&files) as usize >> 20);
+    for file in &files {
+        import.read(file, &bar, &mut problems)?;
+    }
+    drop(bar);
+    for problem in &problems {
+        tracing::warn!("{problem}");
+    }
+    import.finish(args, &files, problems.is_empty())
+}
+
+/// The MCAP files that paths stand for: a folder for the files in it, in the order of their numbers.
+fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let mut inside = entries(path)?;
+        inside.retain(|file| file.extension().is_some_and(|ending| ending == "mcap"));
+        if inside.is_empty() {
+            return Err(Error::data(path.display(), "no .mcap file in this folder"));
+        }
+        inside.sort_by_cached_key(|file| {
+            let stem = file
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            let name = stem
+                .trim_end_matches(|c: char| c.is_ascii_digit())
+                .to_owned();
+            let number: u64 = stem[name.len()..].parse().unwrap_or(0);
+            (name, number, stem)
+        });
+        files.extend(inside);
+    }
+    Ok(files)
+}
+
+/// Bytes of the files.
+fn bytes(files: &[PathBuf]) -> u64 {
+    let lengths = files.iter().filter_map(|file| file.metadata().ok());
+    lengths.map(|facts| facts.len()).sum()
+}
+
+fn reader(path: &Path) -> Result<McapReader<File>> {
+    let file = open(path).map_err(|e| Error::file(path, "read", e))?;
+    McapReader::open(file).map_err(|problem| Error::data(path.display(), problem))
+}
+
+/// The topics of all files.
+fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overview> {
+    let bar = progress.bar("files", files.len());
+    let mut overview = Overview::default();
+    for file in files {
+        overview.add(&file.display().to_string(), reader(file)?, |bytes| {
+            let file = ImageFile::new(
+                bytes.to_vec(),
+                "the first image".to_owned(),
+                ReadingRule::default(),
+            );
+            file.check().map_err(|e| e.to_string())
+        });
+        bar.inc();
+    }
+    Ok(overview)
+}
+
+/// The topics whose images are taken: those that are named, or the only one.
+fn topics(args: &McapArgs, overview: Option<&Overview>) -> Result<Vec<String>> {
+    let known = overview.map(Overview::image_topics);
+    let topics = match (known, overview) {
+        (Some(known), Some(overview)) if known.is_empty() => return Err(no_images(overview)),
+        (Some(known), _) if args.topic.is_empty() && known.len() > 1 => {
+            let problem = format_args!(
+                "several topics have images; choose one or more of {}",
+                known.join(", ")
+            );
+            return Err(Error::usage("--topic", problem));
+        }
+        (Some(known), _) if args.topic.is_empty() => vec![known[0].to_owned()],
+        _ => args.topic.clone(),
+    };
+    let slugs: BTreeSet<String> = topics.iter().map(|topic| slug(topic)).collect();
+    if slugs.len() < topics.len() {
+        let problem =
+            "two of the topics give their frames the same names; import them into two folders";
+        return Err(Error::usage("--topic", problem));
+    }
+    Ok(topics)
+}
+
+/// A topic as a part of a file's name.
+fn slug(topic: &str) -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '.');
+    let name: String = topic
+        .chars()
+        .map(|c| if is_plain(c) { c } else { '_' })
+        .collect();
+    name.trim_matches(['_', '.']).to_owned()
+}
+
+/// The name of a drive, from its first file: without the number of a file of a bag.
+pub(super) fn drive_name(file: &Path) -> String {
+    let stem = file
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let name = slug(stem.strip_suffix("_0").unwrap_or(&stem));
+    if name.is_empty() {
+        "drive".to_owned()
+    } else {
+        name
+    }
+}
+
+/// A topic whose images are taken.
+struct TakenTopic {
+    sampler: Sampler,
+    /// Start of the names of its frames, if several topics are taken.
+    prefix: String,
+    /// Messages so far.
+    seen: usize,
+}
+
+/// The import of a recording.
+struct Import<'a> {
+    topics: BTreeMap<String, TakenTopic>,
+    stretches: Stretches,
+    writer: FrameWriter<'a>,
+    white: u16,
+    cameras: Cameras,
+    exposures: Exposures,
+    /// Frames whose message has no time.
+    without_stamp: usize,
+    /// Number of frames that were earlier than the one before of their topic, and the first of them in words.
+    backwards: usize,
+    first_backwards: Option<String>,
+    /// Time of the last frame of each topic.
+    latest: BTreeMap<String, Nanoseconds>,
+}
+
+impl<'a> Import<'a> {
+    fn new(
+        args: &McapArgs,
+        out: &'a Path,
+        drive: String,
+        topics: &[String],
+        overview: Option<&Overview>,
+    ) -> Result<Self> {
+        let white = args.white.map_or(u16::MAX, NonZeroU16::get);
+        let duration = |topic: &str| {
+            overview
+                .and_then(|overview| overview.topics.get(topic))
+                .map_or(0.0, TopicOverview::duration)
+        };
+        let taken = |topic: &String| TakenTopic {
+            sampler: args.sampling.sampler(duration(topic)),
+            prefix: if topics.len() > 1 {
+                slug(topic) + "-"
+            } else {
+                String::new()
+            },
+            seen: 0,
+        };
+        Ok(Self {
+            topics: topics
+                .iter()
+                .map(|topic| (topic.clone(), taken(topic)))
+                .collect(),
+            stretches: Stretches::new(args.written.stretch),
+            writer: FrameWriter::new(out, drive, white, pool(args.written.threads.threads)?),
+            white,
+            cameras: Cameras::default(),
+            exposures: Exposures::default(),
+            without_stamp: 0,
+            backwards: 0,
+            first_backwards: None,
+            latest: BTreeMap::new(),
+        })
+    }
+
+    /// Takes the frames of one file. Damage is added to `problems`; frames before it are kept.
+    fn read(&mut self, path: &Path, bar: &StepBar, problems: &mut Vec<String>) -> Result<()> {
+        let mut reader = reader(path)?;
+        let place = path.display();
+        let mut megabytes = 0;
+        let mut last = None;
+        while let Some(event) = reader.next() {
+            match event {
+                Event::Message(message) => {
+                    self.take(&mut reader, &message);
+                    if self.topics.contains_key(&message.channel.topic) {
+                        last = Some(message);
+                    }
+                }
+                Event::ChunkRead => self.writer.keep_waiting(),
+                Event::ChunkDamaged { times, problem } => {
+                    let dropped = self.writer.drop_doubtful();
+                    let [from, to] = times.map(|time| self.since_start(time));
+                    problems.push(format!(
+                        "{place}: a damaged chunk, {from:.3} s to {to:.3} s: {problem}; {} of it left out",
+                        counted(dropped, "frame")
+                    ));
+                }
+                Event::Cut(problem) => {
+                    self.writer.keep_waiting();
+                    let last = last
+                        .take()
+                        .map_or("before the first image".to_owned(), |message| {
+                            let since = self.since_start(message.log_time);
+                            format!("after {} at {since:.3} s", message.channel.topic)
+                        });
+                    problems.push(format!("{place}: the recording is cut off {last}: {problem}; frames up to there are kept"));
+                }
+            }
+            let position = reader.position() as usize >> 20;
+            bar.advance(position - megabytes);
+            megabytes = position;
+        }
+        if reader.without_channel > 0 {
+            problems.push(format!(
+                "{place}: {} of topics that are not described",
+                counted(reader.without_channel as usize, "message")
+            ));
+        }
+        self.writer.write_waiting();
+        Ok(())
+    }
+
+    /// Seconds from the first frame.
+    fn since_start(&self, time: Nanoseconds) -> f64 {
+        seconds(time.saturating_sub(self.stretches.start().unwrap_or(time)))
+    }
+
+    /// Takes what is needed of a message.
+    fn take(&mut self, reader: &mut McapReader<File>, message: &Message) {
+        let channel = &message.channel;
+        if let Some(taken) = self.topics.get_mut(&channel.topic)
+            && !matches!(channel.content, Content::Image(_))
+        {
+            taken.seen += 1;
+            let problem = match &channel.content {
+                Content::Unread(reason) => format!("{}: {reason}", channel.topic),
+                _ => format!(
+                    "{}: messages of {} are no images",
+                    channel.topic, channel.schema
+                ),
+            };
+            self.writer.fail(&channel.topic, &problem);
+        }
+        match &channel.content {
+            Content::Camera(encoding) if message.length <= LARGEST_MESSAGE => {
+                if let Some(bytes) = reader.body()
+                    && let Ok(info) = CameraInfo::parse(&channel.schema, *encoding, bytes)
+                {
+                    self.cameras
+                        .add(camera_of(&channel.topic), message.log_time, info);
+                }
+            }
+            Content::Exposure(fields) if message.length <= LARGEST_MESSAGE => {
+                if let Some(bytes) = reader.body()
+                    && let Ok(Some(exposure)) = fields.parse(bytes)
+                {
+                    self.exposures.add(camera_of(&channel.topic), exposure);
+                }
+            }
+            Content::Image(encoding) if self.topics.contains_key(&channel.topic) => {
+                self.take_image(reader, message, *encoding);
+            }
+            _ => {}
+        }
+    }
+
+    fn take_image(&mut self, reader: &mut McapReader<File>, message: &Message, encoding: Encoding) {
+        let topic = message.channel.topic.clone();
+        let schema = &message.channel.schema;
+        if message.length > LARGEST_MESSAGE {
+            let since = self.since_start(message.log_time);
+            let problem = format!(
+                "{topic} at {since:.3} s: a message of {} MB; {} MB at most are read",
+                message.length >> 20,
+                LARGEST_MESSAGE >> 20
+            );
+            self.writer.fail(&topic, &problem);
+            return;
+        }
+        // If the body is cut off, the next event says so.
+        let Some(start) = reader.start_of_body(STAMP) else {
+            return;
+        };
+        let stated = stamp(schema, encoding, start).or_else(|| {
+            let message = ImageMessage::parse(schema, encoding, reader.body()?).ok()?;
+            message.stamp
+        });
+        let stated = stated.filter(|stamp| *stamp != 0);
+        self.without_stamp += usize::from(stated.is_none());
+        let time = stated.unwrap_or(message.log_time);
+        self.note_backwards(&topic, time);
+        let place = self.stretches.place(time);
+        let Some(taken) = self.topics.get_mut(&topic) else {
+            return;
+        };
+        let number = taken.seen;
+        taken.seen += 1;
+        if !taken.sampler.is_due(place) || reader.body().is_none() {
+            return;
+        }
+        let bytes = reader.take_body();
+        if taken.sampler.compares() {
+            // The writer finds the problem of an image that cannot be decoded, too, and counts it.
+            if let Ok(thumbnail) = thumbnail(&message.channel, &bytes, self.white)
+                && !taken.sampler.has_changed(thumbnail)
+            {
+                return;
+            }
+        }
+        let name = format!("{}{number:06}", taken.prefix);
+        self.exposures.want(camera_of(&topic), time);
+        let frame = ChosenFrame {
+            topic,
+            name,
+            place,
+            log_time: message.log_time,
+            source: FrameSource::Message {
+                channel: Arc::clone(&message.channel),
+                bytes,
+            },
+        };
+        self.writer.push(frame, !message.is_in_chunk);
+    }
+
+    /// Counts a frame that is earlier than the one before of its topic.
+    fn note_backwards(&mut self, topic: &str, time: Nanoseconds) {
+        let latest = self.latest.entry(topic.to_owned()).or_insert(time);
+        if time < *latest {
+            let back = seconds(latest.saturating_sub(time));
+            self.backwards += 1;
+            let since = self.since_start(time);
+            let first =
+                || format!("{topic} at {since:.3} s, {back:.3} s before the frame in front of it");
+            self.first_backwards.get_or_insert_with(first);
+        }
+        self.latest.insert(topic.to_owned(), time);
+    }
+
+    /// Writes the list of frames, and what is printed.
+    fn finish(mut self, args: &McapArgs, files: &[PathBuf], is_whole: bool) -> Result<Outcome> {
+        let place = files[0].display().to_string();
+        let names: Vec<String> = self.topics.keys().cloned().collect();
+        for (topic, taken) in &self.topics {
+            if taken.seen == 0 {
+                let problem = format_args!(
+                    "no messages of {topic}; without --topic and --out, its topics are listed"
+                );
+                return Err(Error::data(&place, problem));
+            }
+            if let [first, ..] = taken.sampler.missed()[..] {
+                tracing::warn!(
+                    "{topic}: no frame at {first} s or later; {} of --at",
+                    counted(taken.sampler.missed().len(), "time")
+                );
+            }
+        }
+        self.writer.write_waiting();
+        let [mut with_camera, mut with_exposure] = [0; 2];
+        for written in &mut self.writer.written {
+            let camera = camera_of(&written.topic);
+            let intrinsics =
+                self.cameras
+                    .intrinsics(camera, &written.topic, written.log_time, written.size);
+            if let Some(intrinsics) = intrinsics.filter(|_| !written.is_turned) {
+                written
+                    .line
+                    .insert("intrinsics".to_owned(), json!(intrinsics));
+                with_camera += 1;
+            }
+            if let Some(exposure) = self.exposures.found.get(&(camera.to_owned(), written.time)) {
+                written.line.insert("exposure".to_owned(), json!(exposure));
+                with_exposure += 1;
+            }
+        }
+        let out = args.out.as_deref().unwrap_or(Path::new(""));
+        let info = json!({
+            "schema": "darkqa.dataset/1",
+            "name": args.written.name.clone().unwrap_or_else(|| drive_name(&files[0])),
+            "source": "mcap",
+            "topics": names,
+            "stretch": args.written.stretch,
+        });
+        let scenes = self.writer.finish(&place, &info)?;
+        let failed = self.writer.warn_of_failures();
+        if let Some(first) = &self.first_backwards {
+            tracing::warn!(
+                "{place}: time goes back {}, first {first}",
+                counted(self.backwards, "time")
+            );
+        }
+        let seen = self.topics.values().map(|taken| taken.seen).sum();
+        let frames = self.writer.written.len();
+        let mut output = summary(out, frames, scenes, args.written.stretch, seen, failed);
+        let _ = writeln!(
+            output,
+            "topics: {}; {}",
+            names.join(", "),
+            args.sampling.words()
+        );
+        let _ = writeln!(
+            output,
+            "intrinsics: {with_camera} of {}; exposure: {with_exposure}",
+            counted(frames, "frame")
+        );
+        if self.without_stamp > 0 {
+            let _ = writeln!(
+                output,
+                "without a time of their own, with that of the recorder: {}",
+                counted(self.without_stamp, "message")
+            );
+        }
+        Ok(Outcome::wrote(
+            out,
+            Outcome::complete_if(failed == 0 && is_whole),
+            output,
+        ))
+    }
+}

@@ -1,0 +1,88 @@
+//! The topics of a recording in words: [`listing`].
+
+use std::fmt::Write as _;
+
+use crate::error::{Error, Result};
+use crate::import::recording::{Overview, TopicOverview};
+use crate::runs::Outcome;
+use crate::text::words::counted;
+
+/// The list of the topics with images.
+pub(super) fn listing(overview: &Overview) -> Result<Outcome> {
+    if overview.image_topics().is_empty() {
+        return Err(no_images(overview));
+    }
+    for problem in &overview.problems {
+        tracing::warn!("{problem}");
+    }
+    let status = Outcome::complete_if(overview.problems.is_empty());
+    Ok(Outcome::text(status, lines(overview)))
+}
+
+/// One line for each topic that has images, and the number of others.
+fn lines(overview: &Overview) -> String {
+    let width = |text: fn(&str, &TopicOverview) -> usize| {
+        let topics = overview
+            .topics
+            .iter()
+            .filter(|(_, topic)| !topic.form.is_empty());
+        topics
+            .map(|(name, topic)| text(name, topic))
+            .max()
+            .unwrap_or(0)
+    };
+    let names = width(|name, _| name.chars().count());
+    let forms = width(|_, topic| topic.form.chars().count());
+    let schemas = width(|_, topic| topic.schema.chars().count());
+    let mut lines = String::new();
+    let mut others = 0;
+    for (name, topic) in &overview.topics {
+        if topic.form.is_empty() {
+            others += 1;
+            continue;
+        }
+        let rate = topic
+            .rate()
+            .map_or(String::new(), |rate| format!("{rate:.1} Hz, "));
+        let TopicOverview {
+            schema,
+            form,
+            count,
+            ..
+        } = topic;
+        let (messages, duration) = (counted(*count, "message"), topic.duration());
+        let _ = writeln!(
+            lines,
+            "{name:names$}  {schema:schemas$}  {form:forms$}  {messages}, {rate}{duration:.1} s"
+        );
+    }
+    let _ = writeln!(lines, "{} without images", counted(others, "further topic"));
+    lines
+}
+
+/// The error for a recording without images, with the topics that it has.
+pub(super) fn no_images(overview: &Overview) -> Error {
+    let unread = overview
+        .topics
+        .iter()
+        .find(|(_, topic)| !topic.form.is_empty());
+    let topics: Vec<String> = overview
+        .topics
+        .iter()
+        .take(8)
+        .map(|(name, topic)| format!("{name} ({})", topic.schema))
+        .collect();
+    let problem = match (unread, topics.is_empty()) {
+        (Some((name, topic)), _) => format!("{name} ({}) is {}", topic.schema, topic.form),
+        (None, true) => overview
+            .problems
+            .first()
+            .cloned()
+            .unwrap_or_else(|| "it has no messages".to_owned()),
+        (None, false) => format!("its topics are {}", topics.join(", ")),
+    };
+    Error::data(
+        "the recording",
+        format_args!("no topic with images: {problem}"),
+    )
+}

@@ -1,0 +1,132 @@
+//! `import video`: frames of a video, decoded by ffmpeg.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
+use super::recording::{WrittenArgs, drive_name};
+use crate::error::{Error, Result};
+use crate::images::progress::Progress;
+use crate::images::workers::pool;
+use crate::import::recording::video::Video;
+use crate::import::recording::{SamplingArgs, Stretches, Thumbnail, seconds};
+use crate::runs::Outcome;
+use crate::types::Decides;
+
+/// The flags of `import video`.
+#[derive(Debug, Args)]
+pub(crate) struct VideoArgs {
+    /// A video that ffmpeg reads, such as .mp4, .mkv or .webm
+    #[arg(value_name = "FILE", add = Decides::Pixels)]
+    file: PathBuf,
+    /// Where the frames go; default: nowhere, the video is described
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    out: Option<PathBuf>,
+    /// The flags that choose frames.
+    #[command(flatten)]
+    sampling: SamplingArgs,
+    /// How frames are written.
+    #[command(flatten)]
+    written: WrittenArgs,
+}
+
+/// Describes a video, or imports frames of it.
+///
+/// # Errors
+/// If ffmpeg is not on PATH or cannot decode the file, or there is no frame.
+pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
+    let video = Video::open(&args.file)?;
+    let Some(out) = &args.out else {
+        let duration = video
+            .duration
+            .map_or("unknown duration".to_owned(), |duration| {
+                format!("{duration} s")
+            });
+        return Ok(Outcome::text(
+            Outcome::complete_if(true),
+            format!("{}; {duration}\n", video.stream),
+        ));
+    };
+    args.written.check(out)?;
+    let duration = match (args.sampling.max_frames, video.duration) {
+        (Some(_), None) => {
+            let problem = "the video does not state its duration, over which frames would be spread; use --every";
+            return Err(Error::usage("--max-frames", problem));
+        }
+        (_, duration) => duration.unwrap_or(0.0),
+    };
+    let place = args.file.display().to_string();
+    let drive = drive_name(&args.file);
+    let mut sampler = args.sampling.sampler(duration);
+    let mut stretches = Stretches::new(args.written.stretch);
+    let mut writer = FrameWriter::new(
+        out,
+        drive.clone(),
+        u16::MAX,
+        pool(args.written.threads.threads)?,
+    );
+    let bar = progress.bar("seconds", duration as usize);
+    let mut frames = video.frames(args.sampling.interval())?;
+    let (mut seen, mut passed, mut problem) = (0, 0, None);
+    loop {
+        let frame = match frames.next() {
+            Ok(Some(frame)) => frame,
+            Ok(None) => break,
+            Err(e) => {
+                problem = Some(e);
+                break;
+            }
+        };
+        let at = stretches.place(frame.time);
+        let name = format!("{seen:06}");
+        seen += 1;
+        let now = seconds(frame.time).max(0.0) as usize;
+        bar.advance(now.saturating_sub(passed));
+        passed = passed.max(now);
+        let is_taken = sampler.is_due(at)
+            && (!sampler.compares() || sampler.has_changed(Thumbnail::new(&frame.image)));
+        if is_taken {
+            let frame = ChosenFrame {
+                topic: place.clone(),
+                name,
+                place: at,
+                log_time: frame.time,
+                source: FrameSource::Image(frame.image),
+            };
+            writer.push(frame, true);
+        }
+    }
+    drop(bar);
+    if let Some(first) = sampler.missed().first() {
+        tracing::warn!("{place}: no frame at {first} s or later");
+    }
+    let is_whole = problem.is_none();
+    if let Some(problem) = problem {
+        tracing::warn!("{problem}; frames up to there are kept");
+    }
+    let info = json!({
+        "schema": "darkqa.dataset/1",
+        "name": args.written.name.as_ref().unwrap_or(&drive),
+        "source": "video",
+        "stretch": args.written.stretch,
+    });
+    let scenes = writer.finish(&place, &info)?;
+    let failed = writer.warn_of_failures();
+    let mut output = summary(
+        out,
+        writer.written.len(),
+        scenes,
+        args.written.stretch,
+        seen,
+        failed,
+    );
+    let _ = writeln!(output, "video: {}; {}", video.stream, args.sampling.words());
+    Ok(Outcome::wrote(
+        out,
+        Outcome::complete_if(failed == 0 && is_whole),
+        output,
+    ))
+}

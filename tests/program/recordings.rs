@@ -1,0 +1,467 @@
+//! `import mcap`, `import rosbag` and `import video`: frames of recordings that the tests write.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::support::recording::{Compression, Records, SIZE, compressed, drive, image, picture};
+use crate::support::run::{Bench, Called};
+
+/// A folder with the recording `drive.mcap`.
+fn with_recording(file: impl AsRef<[u8]>) -> Bench {
+    let bench = Bench::new();
+    bench.file("drive.mcap", file);
+    bench
+}
+
+fn import(bench: &Bench, line: &str) -> Called {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    bench.call(&[&["import", "mcap", "drive.mcap"], &words[..]].concat())
+}
+
+/// The lines of `out/frames.jsonl`.
+fn frames(bench: &Bench) -> Vec<Value> {
+    let text = fs::read_to_string(bench.path("out/frames.jsonl")).unwrap();
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+fn names(bench: &Bench) -> Vec<String> {
+    let name = |line: &Value| {
+        format!(
+            "{}/{}",
+            line["scene"].as_str().unwrap(),
+            line["frame"].as_str().unwrap()
+        )
+    };
+    frames(bench).iter().map(name).collect()
+}
+
+#[test]
+fn topics_are_listed_without_a_folder() {
+    let bench = with_recording(drive(4, Compression::Zstd));
+    let listed = import(&bench, "").ended(0);
+    let lines: Vec<Vec<&str>> = listed
+        .stdout
+        .lines()
+        .map(|line| line.split_whitespace().collect())
+        .collect();
+    assert_eq!(
+        lines[0].join(" "),
+        "/front/image_raw sensor_msgs/Image 96×64 bgr8 8 messages, 2.0 Hz, 3.5 s"
+    );
+    assert_eq!(
+        lines[1].join(" "),
+        "/rear/image_raw/compressed sensor_msgs/CompressedImage 96×64 bgr8; jpeg compressed bgr8 4 messages, 1.0 Hz, 3.0 s"
+    );
+    assert_eq!(lines[2].join(" "), "3 further topics without images");
+    assert!(!bench.path("out").exists());
+    let refused = import(&bench, "--out out").ended(2);
+    assert!(
+        refused
+            .stderr
+            .contains("choose one or more of /front/image_raw, /rear/"),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn frames_have_their_pixels_times_cameras_and_exposures() {
+    for compression in Compression::ALL {
+        let bench = with_recording(drive(4, compression));
+        let called = import(&bench, "--topic /front/image_raw --every 0 --out out").ended(0);
+        assert!(
+            called.stdout.contains("8 frames of 1 scene (30 s each)\n"),
+            "{called:?}"
+        );
+        let frames = frames(&bench);
+        for (i, line) in frames.iter().enumerate() {
+            let found = image::open(bench.path("out").join(line["rgb"].as_str().unwrap())).unwrap();
+            assert_eq!(found.into_rgb8(), picture(i as u8, SIZE), "{i}");
+            assert_eq!(line["t"], 1_700_000_000.0 + i as f64 * 0.5);
+            assert_eq!(line["frame_id"], "cam");
+            assert_eq!(
+                line["intrinsics"],
+                serde_json::json!({"fx": 80.0, "fy": 81.0, "cx": 47.5, "cy": 31.5})
+            );
+            assert_eq!(
+                line["exposure"],
+                serde_json::json!({"exposure_time": 10_000 + i / 2, "gain": 2.5})
+            );
+        }
+    }
+}
+
+#[test]
+fn compressed_images_are_copied() {
+    let bench = with_recording(drive(2, Compression::None));
+    import(&bench, "--topic /rear/image_raw/compressed --out out").ended(0);
+    let lines = frames(&bench);
+    assert_eq!(lines.len(), 1);
+    assert_eq!(lines[0]["rgb"], "scenes/drive-0000/rgb/000000.jpg");
+    let file = fs::read(bench.path("out/scenes/drive-0000/rgb/000000.jpg")).unwrap();
+    let recording = fs::read(bench.path("drive.mcap")).unwrap();
+    assert!(recording.windows(file.len()).any(|part| part == file));
+}
+
+#[test]
+fn stretches_are_scenes_whatever_is_taken() {
+    let bench = with_recording(drive(6, Compression::None));
+    import(
+        &bench,
+        "--topic /front/image_raw --every 1.5 --stretch 2 --out out",
+    )
+    .ended(0);
+    assert_eq!(
+        names(&bench),
+        [
+            "drive-0000/000000",
+            "drive-0000/000003",
+            "drive-0001/000006",
+            "drive-0002/000009"
+        ]
+    );
+    import(
+        &bench,
+        "--topic /front/image_raw --at 5,2.1 --stretch 2 --out out --force",
+    )
+    .ended(0);
+    assert_eq!(names(&bench), ["drive-0001/000005", "drive-0002/000010"]);
+    import(
+        &bench,
+        "--topic /front/image_raw --max-frames 3 --stretch 2 --out out --force",
+    )
+    .ended(0);
+    assert_eq!(names(&bench).len(), 3);
+    let missed = import(
+        &bench,
+        "--topic /front/image_raw --at 1,99 --out out --force",
+    )
+    .ended(0);
+    assert!(
+        missed.stderr.contains("no frame at 99 s or later"),
+        "{missed:?}"
+    );
+}
+
+#[test]
+fn frames_that_did_not_change_are_left_out() {
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
+    for (i, shade) in [10, 12, 60, 61, 13].into_iter().enumerate() {
+        let at = i as f64;
+        records.message(1, at, &image(at, "mono8", [8, 8], &[shade; 64], 0));
+    }
+    let bench = with_recording(records.file());
+    import(&bench, "--changed 5 --out out").ended(0);
+    assert_eq!(
+        names(&bench),
+        [
+            "drive-0000/000000",
+            "drive-0000/000002",
+            "drive-0000/000004"
+        ]
+    );
+}
+
+#[test]
+fn two_cameras_share_scenes() {
+    let bench = with_recording(drive(4, Compression::Zstd));
+    let line = "--topic /front/image_raw --topic /rear/image_raw/compressed --every 2 --stretch 2 --out out";
+    import(&bench, line).ended(0);
+    assert_eq!(
+        names(&bench),
+        [
+            "drive-0000/front_image_raw-000000",
+            "drive-0000/rear_image_raw_compressed-000000",
+            "drive-0001/front_image_raw-000004",
+            "drive-0001/rear_image_raw_compressed-000002",
+        ]
+    );
+}
+
+#[test]
+fn a_cut_recording_gives_its_frames() {
+    let mut file = drive(4, Compression::Zstd);
+    file.truncate(file.len() * 7 / 10);
+    let bench = with_recording(file);
+    let called = import(&bench, "--topic /front/image_raw --every 0 --out out").ended(1);
+    assert!(
+        called
+            .stderr
+            .contains("the recording is cut off after /front/image_raw at "),
+        "{called:?}"
+    );
+    let frames = frames(&bench).len();
+    assert!((4..8).contains(&frames), "{frames}");
+}
+
+#[test]
+fn a_damaged_chunk_is_left_out() {
+    let mut file = drive(4, Compression::None);
+    // The end of a row of the second second.
+    let row = file.len() / 4 + file.len() / 8;
+    file[row] ^= 0x10;
+    let bench = with_recording(file);
+    let called = import(&bench, "--topic /front/image_raw --every 0 --out out").ended(1);
+    assert!(
+        called
+            .stderr
+            .contains("its checksum differs; 2 frames of it left out"),
+        "{called:?}"
+    );
+    assert_eq!(frames(&bench).len(), 6);
+}
+
+#[test]
+fn time_that_goes_back_starts_a_scene_and_is_reported() {
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
+    for at in [100.0, 101.0, 102.0, 5.0, 6.0, 7.0] {
+        records.message(1, at, &image(at, "mono8", [2, 2], &[9; 4], 0));
+    }
+    let bench = with_recording(records.file());
+    let called = import(&bench, "--out out").ended(0);
+    assert!(
+        called
+            .stderr
+            .contains("time goes back 1 time, first /c at -95.000 s, 97.000 s before"),
+        "{called:?}"
+    );
+    assert_eq!(
+        names(&bench),
+        [
+            "drive-0000/000000",
+            "drive-0000/000002",
+            "drive-0001/000003",
+            "drive-0001/000005"
+        ]
+    );
+}
+
+#[test]
+fn images_that_cannot_be_read_are_named() {
+    let mut records = Records::default();
+    records.topic(1, "/good", "sensor_msgs/msg/Image", "cdr", "");
+    records.topic(2, "/odd", "sensor_msgs/msg/Image", "cdr", "");
+    records.topic(3, "/depth", "sensor_msgs/msg/CompressedImage", "cdr", "");
+    records.topic(4, "/flat", "foxglove.RawImage", "flatbuffer", "");
+    for at in [0.0, 3.0] {
+        records.message(1, at, &image(at, "mono8", [2, 2], &[9; 4], 0));
+        records.message(2, at, &image(at, "nv12", [2, 2], &[9; 6], 0));
+        records.message(3, at, &compressed(at, "16UC1; compressedDepth png", b"x"));
+        records.message(4, at, b"x");
+    }
+    let bench = with_recording(records.file());
+    let listed = import(&bench, "").ended(0);
+    for expected in [
+        "unknown encoding \"nv12\"",
+        "compressedDepth png\" is depth",
+        "serialization \"flatbuffer\"",
+    ] {
+        assert!(listed.stdout.contains(expected), "{expected}: {listed:?}");
+    }
+    // The only topic that can be read is taken.
+    import(&bench, "--out out").ended(0);
+    assert_eq!(frames(&bench)[0]["topic"], "/good");
+    let named = import(&bench, "--topic /good --topic /odd --out out --force").ended(1);
+    assert!(
+        named
+            .stderr
+            .contains("/odd at 0.000 s: unknown encoding \"nv12\"; rgb8"),
+        "{named:?}"
+    );
+    assert!(
+        named.stderr.contains("/odd: 2 frames could not be read"),
+        "{named:?}"
+    );
+    let flat = import(&bench, "--topic /flat --out out --force").ended(2);
+    assert!(
+        flat.stderr
+            .contains("/flat: serialization \"flatbuffer\"; cdr,"),
+        "{flat:?}"
+    );
+    let none = import(&bench, "--topic /nothing --out out --force").ended(2);
+    assert!(none.stderr.contains("no messages of /nothing"), "{none:?}");
+}
+
+#[test]
+fn codes_of_sixteen_bits_are_kept_and_scaled() {
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
+    let codes: Vec<u8> = [0_u16, 1000, 4095, 2000]
+        .iter()
+        .flat_map(|code| code.to_le_bytes())
+        .collect();
+    records.message(1, 0.0, &image(0.0, "mono16", [2, 2], &codes, 0));
+    let bench = with_recording(records.file());
+    let third = || {
+        image::open(bench.path("out/scenes/drive-0000/rgb/000000.png"))
+            .unwrap()
+            .into_rgb16()[(0, 1)]
+            .0
+    };
+    let dark = import(&bench, "--out out").ended(0);
+    assert!(
+        dark.stderr
+            .contains("for a sensor of 12 bits set --white 4095"),
+        "{dark:?}"
+    );
+    assert_eq!(third(), [4095; 3]);
+    let scaled = import(&bench, "--out out --force --white 4095").ended(0);
+    assert_eq!((third(), &*scaled.stderr), ([65535; 3], ""));
+}
+
+#[test]
+fn other_files_are_named_for_what_they_are() {
+    for (bytes, expected) in [
+        (&b"#ROSBAG V2.0\n"[..], "import rosbag"),
+        (b"SQLite format 3\0", "rosbags-convert"),
+        (&[0x28, 0xb5, 0x2f, 0xfd, 1, 2, 3, 4], "zstd -d"),
+        (b"x", "not an MCAP file"),
+        (
+            b"\x89MCAP0\r\n",
+            "no topic with images: drive.mcap: the recording is cut off",
+        ),
+    ] {
+        let called = import(&with_recording(bytes), "").ended(2);
+        assert!(called.stderr.contains(expected), "{called:?}");
+    }
+    let mut records = Records::default();
+    records.topic(1, "/imu", "sensor_msgs/msg/Imu", "cdr", "");
+    records.message(1, 0.0, b"x");
+    let called = import(&with_recording(records.file()), "--out out").ended(2);
+    assert!(
+        called
+            .stderr
+            .contains("no topic with images: its topics are /imu (sensor_msgs/Imu)"),
+        "{called:?}"
+    );
+}
+
+#[test]
+fn a_bag_folder_is_read_in_the_order_of_its_files() {
+    let bench = Bench::new();
+    for (number, at) in [(0, 0.0), (2, 60.0), (10, 90.0)] {
+        let mut records = Records::default();
+        records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
+        records.message(1, at, &image(at, "mono8", [2, 2], &[number; 4], 0));
+        bench.file(&format!("bag/bag_{number}.mcap"), records.file());
+    }
+    let called = bench
+        .call(&["import", "mcap", "bag", "--out", "out"])
+        .ended(0);
+    assert_eq!(
+        names(&bench),
+        ["bag-0000/000000", "bag-0002/000001", "bag-0003/000002"]
+    );
+    assert_eq!(called.stderr, "");
+}
+
+#[test]
+fn a_bag_of_ros_1_gets_its_conversion() {
+    let called = Bench::new()
+        .call(&["import", "rosbag", "my drive.bag"])
+        .ended(2);
+    let expected = "rosbags-convert --src 'my drive.bag' --dst 'my drive' --dst-storage mcap";
+    assert!(called.stderr.contains(expected), "{called:?}");
+}
+
+/// A program `ffmpeg` that writes four images, half a second apart, as ffmpeg does.
+#[cfg(unix)]
+fn with_ffmpeg(bench: &Bench, end: &str) {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let script = format!(
+        r#"#!/bin/sh
+echo "$@" >> {calls}
+echo 'ffmpeg version 5.1.6 Copyright' >&2
+echo '  Duration: 00:00:02.00, start: 0.000000, bitrate: 9 kb/s' >&2
+echo '  Stream #0:0: Video: h264 (High), yuv420p, 4x2, 2 fps' >&2
+case "$*" in *image2pipe*) ;; *) exit 1;; esac
+echo '[Parsed_showinfo_1 @ 0x1] config in time_base: 1/10, frame_rate: 1/1' >&2
+for i in 0 1 2 3; do
+  echo "[Parsed_showinfo_1 @ 0x1] n: $i pts: $((10 * i + 5)) pts_time:$i.5 duration: 1" >&2
+  printf 'P6\n4 2\n255\nabcdefghijklmnopqrstuvw%s' $i
+done
+{end}
+"#,
+        calls = bench.path("calls").display()
+    );
+    let path = bench.file("bin/ffmpeg", script);
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).unwrap();
+}
+
+#[cfg(unix)]
+fn import_video(bench: &Bench, line: &str, path: &Path) -> Called {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let mut command = bench.command(&[&["import", "video", "drive.mp4"], &words[..]].concat());
+    let system = std::env::var("PATH").unwrap_or_default();
+    let path = format!("{}:{system}", path.display());
+    crate::support::run::called(command.env("PATH", path))
+}
+
+#[cfg(unix)]
+#[test]
+fn frames_of_a_video_come_from_ffmpeg() {
+    let bench = Bench::new();
+    bench.file("drive.mp4", b"x");
+    with_ffmpeg(&bench, "exit 0");
+    let described = import_video(&bench, "", &bench.path("bin")).ended(0);
+    assert_eq!(described.stdout, "h264 (High), yuv420p, 4x2, 2 fps; 2 s\n");
+    let called = import_video(
+        &bench,
+        "--every 1 --stretch 2 --out out",
+        &bench.path("bin"),
+    )
+    .ended(0);
+    assert!(
+        called.stdout.contains("4 frames of 2 scenes (2 s each)\n"),
+        "{called:?}"
+    );
+    assert_eq!(frames(&bench)[3]["t"], 3.5);
+    let image = image::open(bench.path("out/scenes/drive-0001/rgb/000003.png"))
+        .unwrap()
+        .into_rgb8();
+    assert_eq!(
+        (image.dimensions(), image[(0, 0)].0, image[(3, 1)].0),
+        ((4, 2), *b"abc", *b"vw3")
+    );
+    let calls = fs::read_to_string(bench.path("calls")).unwrap();
+    assert!(
+        calls.contains("-protocol_whitelist file,pipe -i file:drive.mp4 -map 0:v:0 -vf select="),
+        "{calls}"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_broken_video_gives_its_frames() {
+    let bench = Bench::new();
+    bench.file("drive.mp4", b"x");
+    with_ffmpeg(&bench, "echo 'moov atom not found' >&2; exit 1");
+    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
+    assert!(
+        called
+            .stderr
+            .contains("moov atom not found; frames up to there are kept"),
+        "{called:?}"
+    );
+    assert_eq!(frames(&bench).len(), 4);
+}
+
+#[cfg(unix)]
+#[test]
+fn without_ffmpeg_the_remedy_is_named() {
+    let bench = Bench::new();
+    bench.file("drive.mp4", b"x");
+    let mut command = bench.command(&["import", "video", "drive.mp4", "--out", "out"]);
+    let called = crate::support::run::called(command.env("PATH", bench.path("empty"))).ended(2);
+    assert!(
+        called.stderr.contains("ffmpeg: not found on PATH")
+            && called.stderr.contains("apt install ffmpeg"),
+        "{called:?}"
+    );
+}
