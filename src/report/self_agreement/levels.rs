@@ -184,7 +184,7 @@ fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, Agreeme
     let mut table = TableBuilder::new(AGREEMENT, rows)
         .page("agreement", &caption)
         .group(|row| Some(row.series.clone()))
-        .column(Text, "terminal | page | latex Measure", |row| {
+        .column(Text, "terminal | page measure | latex Measure", |row| {
             row.measure.name()
         });
     let is_enhanced = |(series, cells): (&Series<'_>, &SeriesByLevel<'_, AgreementCell>)| {

@@ -4,7 +4,7 @@
 //! All blocks of a page are run by one shell in an empty folder, with a mock endpoint, which has batches, at `OPENAI_BASE_URL`, few and small rooms
 //! where no data are named, the folder `models` at `$MODELS`, and a recording of a robot at `$DRIVE`. A comment `<!-- test: … -->` is a
 //! command that readers do not see. A block with the fence `text` shows what commands of its page print, `text first-command` what the
-//! first command of the README prints, digit for digit; `text no-run` shows what others print.
+//! first command of the README prints, with its numbers; `text no-run` shows what others print.
 
 mod faq;
 mod first_command;
