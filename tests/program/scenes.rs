@@ -49,7 +49,11 @@ fn scenes_are_clusters_and_can_be_named_later() {
         "{}",
         called.stdout
     );
-    assert!(called.stdout.contains("in 24 frames"), "{}", called.stdout);
+    assert!(
+        called.stdout.contains("With 24 frames the intervals"),
+        "{}",
+        called.stdout
+    );
     let check = bench.call(&words("check set"));
     assert!(joined(&check.stdout).contains(suggested), "{check:?}");
     // Named later: nothing is asked again, and the intervals are by scene.
@@ -60,7 +64,11 @@ fn scenes_are_clusters_and_can_be_named_later() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(records() == before);
     assert!(!called.stderr.contains("suggest") && !called.stdout.contains("suggest"));
-    assert!(called.stdout.contains("in 12 scenes"), "{}", called.stdout);
+    assert!(
+        called.stdout.contains("With 12 scenes the intervals"),
+        "{}",
+        called.stdout
+    );
     // What can be detected follows from the scenes, too.
     let check = bench.call(&words("check set"));
     let power = "power: 48 questions in 12 scenes detects ";
@@ -73,6 +81,10 @@ fn scenes_are_clusters_and_can_be_named_later() {
     // A file without them takes none away.
     questions(&bench, false);
     let called = bench.call(&words(RUN));
-    assert!(called.stdout.contains("in 12 scenes"), "{}", called.stdout);
+    assert!(
+        called.stdout.contains("With 12 scenes the intervals"),
+        "{}",
+        called.stdout
+    );
     assert!(records() == before);
 }
