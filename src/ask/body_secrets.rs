@@ -28,8 +28,9 @@ const LONG: usize = 20;
 /// # Errors
 /// [`Error::Usage`] with the name of the field, without its value.
 pub(super) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> {
-    let mut fields = fields.iter();
-    fields.try_for_each(|(name, value)| refuse_in_field(name, value))
+    fields
+        .iter()
+        .try_for_each(|(name, value)| refuse_in_field(name, value))
 }
 
 fn refuse_in_field(name: &str, value: &Value) -> Result<()> {

@@ -281,8 +281,9 @@ fn stated_wait(error: &Value) -> Option<Duration> {
     let metadata = error.get("metadata");
     let headers = metadata.and_then(|metadata| metadata.get("headers")?.as_object());
     let header = headers.and_then(|headers| {
-        let mut headers = headers.iter();
-        let (_, value) = headers.find(|(name, _)| name.eq_ignore_ascii_case("retry-after"))?;
+        let (_, value) = headers
+            .iter()
+            .find(|(name, _)| name.eq_ignore_ascii_case("retry-after"))?;
         text_or_number(value)
     });
     let field = metadata.and_then(|metadata| text_or_number(metadata.get("retry_after_seconds")?));

@@ -56,8 +56,9 @@ pub(super) fn permanent_cause(text: &str, is_plain: bool) -> Option<&'static str
             "the server does not answer in plain http at this port; if it speaks TLS, use https:// in --base-url",
         );
     }
-    let mut causes = CAUSES.iter();
-    let found = causes.find(|(words, _)| words.iter().any(|words| text.contains(words)));
+    let found = CAUSES
+        .iter()
+        .find(|(words, _)| words.iter().any(|words| text.contains(words)));
     found.map(|(_, remedy)| *remedy)
 }
 

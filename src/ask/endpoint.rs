@@ -112,8 +112,11 @@ impl Endpoint {
 
     /// The replicas that take requests to a model.
     fn taking(&self, model: ModelNumber) -> impl Iterator<Item = &Replica> {
-        let replicas = self.replicas.iter().enumerate();
-        let taking = replicas.filter(move |(index, _)| self.services.takes(model, *index));
+        let taking = self
+            .replicas
+            .iter()
+            .enumerate()
+            .filter(move |(index, _)| self.services.takes(model, *index));
         taking.map(|(_, replica)| replica)
     }
 
@@ -134,8 +137,10 @@ impl Endpoint {
 
     /// The headers of every request to an API, for each replica.
     pub(super) fn headers(&self, wire: Wire) -> Result<Vec<HeaderMap>> {
-        let replicas = self.replicas.iter();
-        replicas.map(|replica| replica.headers(wire)).collect()
+        self.replicas
+            .iter()
+            .map(|replica| replica.headers(wire))
+            .collect()
     }
 
     /// The files and batches of the server, at its first replica.

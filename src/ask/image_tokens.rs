@@ -88,11 +88,10 @@ pub(super) fn image_tokens(
     height: u64,
 ) -> Option<u64> {
     let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();
-    let mut families = TABLE.family.iter();
-    let family = families.find(|family| {
-        let mut begins = family.begins.iter();
-        begins.any(|begin| name.starts_with(begin))
-    })?;
+    let family = TABLE
+        .family
+        .iter()
+        .find(|family| family.begins.iter().any(|begin| name.starts_with(begin)))?;
     Some(family.rule.count(detail, width as f64, height as f64))
 }
 

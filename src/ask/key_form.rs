@@ -17,15 +17,17 @@ pub(crate) fn looks_like_key(name: &str) -> bool {
 
 /// Whether a value begins as a key does.
 pub(crate) fn is_secret_value(value: &str) -> bool {
-    let mut beginnings = BEGINNINGS.iter();
-    beginnings.any(|begin| value.starts_with(begin) && value.len() > begin.len())
+    BEGINNINGS
+        .iter()
+        .any(|begin| value.starts_with(begin) && value.len() > begin.len())
 }
 
 /// Whether a header of this name usually holds a secret.
 pub(crate) fn is_secret_name(name: &str) -> bool {
     let name = name.to_lowercase();
-    let mut words = ["auth", "key", "token", "secret", "cookie"].iter();
-    words.any(|word| name.contains(word))
+    ["auth", "key", "token", "secret", "cookie"]
+        .iter()
+        .any(|word| name.contains(word))
 }
 
 #[cfg(test)]

@@ -159,8 +159,10 @@ impl Parameters {
 
 /// The settings of a model, by the flag that sets each.
 pub(crate) fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
-    let fields = content.into_iter();
-    fields.map(|(name, value)| (flag(&name), value)).collect()
+    content
+        .into_iter()
+        .map(|(name, value)| (flag(&name), value))
+        .collect()
 }
 
 /// The flag that sets a parameter.

@@ -89,8 +89,10 @@ impl Server {
 
     /// The addresses of all replicas, as text without secrets.
     pub(crate) fn addresses(&self) -> Vec<String> {
-        let replicas = self.replicas.iter();
-        replicas.map(|replica| replica.base.to_string()).collect()
+        self.replicas
+            .iter()
+            .map(|replica| replica.base.to_string())
+            .collect()
     }
 }
 
@@ -260,8 +262,9 @@ fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'stati
 
 /// The variables of the tools of a host's vendor; none if the built-in table does not have the host.
 pub(crate) fn own_variables(host: &str) -> Vec<&'static str> {
-    let vendors = Vendor::at_host(host).into_iter();
-    let variables = vendors.flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()));
+    let variables = Vendor::at_host(host)
+        .into_iter()
+        .flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()));
     variables.map(String::as_str).collect()
 }
 

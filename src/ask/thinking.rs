@@ -88,8 +88,7 @@ impl Thinking {
 
 impl ServerRow {
     fn is_of(&self, base: &BaseUrl) -> bool {
-        let mut hosts = self.hosts.iter();
-        let named = hosts.any(|host| {
+        let named = self.hosts.iter().any(|host| {
             let whole = base.host() == host.trim_start_matches('.');
             whole || (host.starts_with('.') && base.host().ends_with(&**host))
         });

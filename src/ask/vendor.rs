@@ -105,14 +105,12 @@ static VENDORS: LazyLock<Vendors> = LazyLock::new(|| {
 impl Vendor {
     /// The vendor of a host; `None` if the host is not in the table.
     pub(crate) fn at_host(host: &str) -> Option<&'static Self> {
-        let mut vendors = VENDORS.vendor.iter();
-        vendors.find(|vendor| vendor.is_of(host))
+        VENDORS.vendor.iter().find(|vendor| vendor.is_of(host))
     }
 
     /// The vendor of the built-in table whose keys look like this one; `None` if keys of several do, or that is not known.
     pub(super) fn by_key(key: &str) -> Option<&'static Self> {
-        let mut vendors = VENDORS.vendor.iter();
-        vendors.find(|vendor| vendor.has_key(key))
+        VENDORS.vendor.iter().find(|vendor| vendor.has_key(key))
     }
 
     /// Whether a key looks like this vendor's.

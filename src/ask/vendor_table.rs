@@ -63,15 +63,17 @@ impl VendorTable {
 
     /// The vendor of a host: of the file, else of the built-in table; `None` if neither has it.
     pub(super) fn at_host(self, host: &str) -> Option<&'static Vendor> {
-        let mut own = self.0.iter();
-        own.find(|vendor| vendor.is_of(host))
+        self.0
+            .iter()
+            .find(|vendor| vendor.is_of(host))
             .or_else(|| Vendor::at_host(host))
     }
 
     /// The vendor whose keys look like this one, in the same order as [`Self::at_host`].
     pub(super) fn by_key(self, key: &str) -> Option<&'static Vendor> {
-        let mut own = self.0.iter();
-        own.find(|vendor| vendor.has_key(key))
+        self.0
+            .iter()
+            .find(|vendor| vendor.has_key(key))
             .or_else(|| Vendor::by_key(key))
     }
 }

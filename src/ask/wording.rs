@@ -43,8 +43,7 @@ impl Wording {
     /// The cause that an error is about; `None` if the table does not have it.
     pub(super) fn find(complaint: &Complaint, has_image: bool) -> Option<&'static Self> {
         let texts = complaint.texts();
-        let mut all = WORDINGS.iter();
-        all.find(|wording| {
+        WORDINGS.iter().find(|wording| {
             let mut patterns = wording.patterns.iter();
             (has_image || !wording.images)
                 && patterns.any(|pattern| texts.iter().any(|text| text.contains(pattern)))

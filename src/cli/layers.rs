@@ -209,8 +209,10 @@ fn settable_flags(command: &Command) -> impl Iterator<Item = &Arg> {
 /// Whether a flag that is set hides another in lower layers: the same flag, or one that conflicts with it.
 fn hides(command: &Command, set: &Arg, other: &Arg) -> bool {
     let conflicts = |arg: &Arg, with: &Arg| {
-        let mut all = command.get_arg_conflicts_with(arg).into_iter();
-        all.any(|arg| arg.get_id() == with.get_id())
+        command
+            .get_arg_conflicts_with(arg)
+            .into_iter()
+            .any(|arg| arg.get_id() == with.get_id())
     };
     set.get_id() == other.get_id() || conflicts(set, other) || conflicts(other, set)
 }

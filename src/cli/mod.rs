@@ -241,8 +241,10 @@ fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> Exit
             let mut stderr = AutoStream::never(std::io::stderr());
             let _ = stderr.write_all(shown_in_colours(&outcome.output).as_bytes());
         }
-        let mut paths = outcome.written.iter();
-        paths.try_for_each(|path| writeln!(stdout, "{}", path.display()))
+        outcome
+            .written
+            .iter()
+            .try_for_each(|path| writeln!(stdout, "{}", path.display()))
     };
     match (outcome.status, said) {
         (Status::Cancelled, _) => ExitCode::from(INTERRUPTED),

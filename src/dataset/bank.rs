@@ -173,8 +173,7 @@ impl Bank {
         per_image: Option<NonZeroUsize>,
     ) -> Vec<Question> {
         let most = per_image.map_or(usize::MAX, NonZeroUsize::get);
-        let frames = frames.into_iter();
-        let questions = frames.flat_map(|frame| {
+        let questions = frames.into_iter().flat_map(|frame| {
             let mut drawn: Vec<usize> = (0..self.questions.len()).collect();
             if most < drawn.len() {
                 drawn.sort_by_cached_key(|index| {
@@ -184,8 +183,9 @@ impl Bank {
                 drawn.truncate(most);
                 drawn.sort_unstable();
             }
-            let asked = drawn.into_iter();
-            asked.map(move |index| self.questions[index].about(frame))
+            drawn
+                .into_iter()
+                .map(move |index| self.questions[index].about(frame))
         });
         questions.collect()
     }

@@ -293,8 +293,9 @@ impl Dataset {
     /// Whether the images of a frame, or of the several that it stands for, are in the data set.
     #[must_use]
     pub(crate) fn has(&self, frame: &FrameId) -> bool {
-        let mut shown = self.shown(frame).iter();
-        shown.all(|frame| self.sources.contains_key(frame))
+        self.shown(frame)
+            .iter()
+            .all(|frame| self.sources.contains_key(frame))
     }
 
     /// The scene of a frame, or of several that a question shows together; empty if the data set names none.
@@ -446,8 +447,11 @@ impl Dataset {
     /// # Errors
     /// If the frame has no photograph of this name, or its file cannot be read.
     pub(crate) fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
-        let mut photos = self.photographs(frame).iter();
-        let Some(photo) = photos.find(|photo| photo.name == *name) else {
+        let Some(photo) = self
+            .photographs(frame)
+            .iter()
+            .find(|photo| photo.name == *name)
+        else {
             let problem = format_args!("no photograph {name} of the frame {:?} in it", frame.0);
             return Err(Error::data(&self.name, problem));
         };

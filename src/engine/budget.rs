@@ -229,8 +229,8 @@ impl Budget {
 
     /// US dollars spent so far; `None` if no model has a price.
     pub(crate) fn spent(&self) -> Option<f64> {
-        let mut models = self.models.iter();
-        models
+        self.models
+            .iter()
             .any(|model| model.price.is_some())
             .then(|| self.spending.spent())
     }

@@ -151,8 +151,11 @@ fn lines<E: Experiment>(
     expected: &[ExpectedRequest],
 ) -> Vec<(usize, CostLine)> {
     let sources = experiment.sources();
-    let models = experiment.models(phase).iter().enumerate();
-    let remote = models.filter(|(_, model)| model.model.is_remote());
+    let remote = experiment
+        .models(phase)
+        .iter()
+        .enumerate()
+        .filter(|(_, model)| model.model.is_remote());
     let lines = remote.map(|(index, model)| {
         let price = model.price(&experiment.settings().money.prices);
         let mut by_reading = BTreeMap::<Option<ReadingName>, Tokens>::new();

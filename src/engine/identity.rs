@@ -153,8 +153,8 @@ pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
             ("--tpm", json!(sending.quota.tokens)),
         ]);
     }
-    let settings = settings.into_iter();
     settings
+        .into_iter()
         .map(|(field, value)| (field.to_owned(), value))
         .collect()
 }

@@ -62,8 +62,7 @@ fn is_hang_up_ignored() -> bool {
     /// The bit of SIGHUP, signal 1.
     const HANG_UP: u64 = 1;
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mut lines = status.lines();
-    let mask = lines.find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
     mask.map_or_else(
         || !std::io::IsTerminal::is_terminal(&std::io::stderr()),

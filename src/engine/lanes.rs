@@ -113,8 +113,12 @@ impl<'a, I> Lanes<'a, I> {
     /// Adds the trials of a group.
     pub(crate) fn extend(&mut self, ready: Vec<PreparedTrial<I>>) {
         if let Some(first) = ready.first() {
-            let images = first.stimulus.images.iter();
-            let bytes = images.map(|image| image.facts().bytes).sum();
+            let bytes = first
+                .stimulus
+                .images
+                .iter()
+                .map(|image| image.facts().bytes)
+                .sum();
             self.held
                 .push_back((Arc::downgrade(&first.stimulus), bytes));
         }
@@ -181,8 +185,9 @@ impl<'a, I> Lanes<'a, I> {
 
     /// Whether the budget keeps back a trial that its endpoint would take now.
     pub(crate) fn is_held_back(&self) -> bool {
-        let mut lanes = self.all.iter();
-        lanes.any(|lane| lane.is_held && lane.in_flight < self.width(lane))
+        self.all
+            .iter()
+            .any(|lane| lane.is_held && lane.in_flight < self.width(lane))
     }
 
     /// Tries again the trials that the budget did not allow.

@@ -192,8 +192,11 @@ pub(crate) fn asked_in<'a>(
     condition: Option<&Condition>,
 ) -> Vec<(usize, &'a ModelUnderTest)> {
     let view = condition.map_or(View::Blind, |_| View::Image);
-    let all = models.iter().enumerate();
-    all.filter(|(_, model)| model.view == view).collect()
+    models
+        .iter()
+        .enumerate()
+        .filter(|(_, model)| model.view == view)
+        .collect()
 }
 
 /// The opened endpoint.
@@ -239,6 +242,7 @@ pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String
             }
         }
     }
-    let by_name = by_name.into_iter();
-    by_name.map(|(name, changes)| (name, json!(changes)))
+    by_name
+        .into_iter()
+        .map(|(name, changes)| (name, json!(changes)))
 }

@@ -493,8 +493,11 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
     });
     let limit = limits.flatten().reduce(ImageLimit::stricter)?;
     // A model that is shown none may have any.
-    let models = settings.ask.models.iter();
-    let seeing = models.filter(|model| model.view == View::Image);
+    let seeing = settings
+        .ask
+        .models
+        .iter()
+        .filter(|model| model.view == View::Image);
     let servers = seeing.filter_map(|model| model.server.as_ref());
     let replicas = servers.flat_map(|server| &server.replicas);
     Some(replicas.fold(limit, ImageLimit::with_requests_to))
@@ -510,8 +513,13 @@ pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Mis
 
 /// Keys of the trials without a reply that were charged as often as `--retries paid` allows.
 pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> HashSet<TrialKey> {
-    let servers = settings.ask.servers().into_iter();
-    let Some(most) = servers.map(|server| server.sending.paid_retries).max() else {
+    let Some(most) = settings
+        .ask
+        .servers()
+        .into_iter()
+        .map(|server| server.sending.paid_retries)
+        .max()
+    else {
         return HashSet::new();
     };
     let lost = stored

@@ -185,8 +185,10 @@ pub(crate) struct ExperimentSettings {
 impl JobSettings {
     /// Whether a model of the run is shown images.
     pub(crate) fn shows_images(&self) -> bool {
-        let mut models = self.ask.models.iter();
-        models.any(|model| model.view == View::Image)
+        self.ask
+            .models
+            .iter()
+            .any(|model| model.view == View::Image)
     }
 
     /// The files of the enhancement models, each of which works on some images of the run. If they or the model `room-net` need ONNX

@@ -92,8 +92,9 @@ pub(crate) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
 /// Images for an enhancer that is tried without a plan: those of `images` that are dark, and darkened ones if there are too few.
 pub(crate) fn darkened(images: &[Rgb]) -> Vec<Rgb> {
     let dark = images.iter().filter(|image| brightness(image) <= DARK);
-    let drops = DROPS.iter();
-    let darkened = drops.flat_map(|drop| images.iter().map(|image| expose(image, *drop)));
+    let darkened = DROPS
+        .iter()
+        .flat_map(|drop| images.iter().map(|image| expose(image, *drop)));
     dark.cloned().chain(darkened).take(FRAMES).collect()
 }
 

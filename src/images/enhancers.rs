@@ -172,8 +172,10 @@ impl<'a> OpenEnhancers<'a> {
     /// # Errors
     /// As by [`Self::open`].
     pub(crate) fn take(&mut self) -> Result<Vec<Enhancer>> {
-        let models = self.take_models()?.into_iter();
-        models.map(|model| model.open(self.settings)).collect()
+        self.take_models()?
+            .into_iter()
+            .map(|model| model.open(self.settings))
+            .collect()
     }
 
     /// The models as they are; ONNX Runtime is open then.

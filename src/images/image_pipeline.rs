@@ -260,8 +260,11 @@ impl<'a> ImagePipeline<'a> {
             }
         }
         let in_order = |images: Vec<Arc<Payload>>| {
-            let order = source.order.iter();
-            order.map(|place| Arc::clone(&images[*place])).collect()
+            source
+                .order
+                .iter()
+                .map(|place| Arc::clone(&images[*place]))
+                .collect()
         };
         Ok(images.into_iter().map(in_order).collect())
     }
@@ -374,8 +377,8 @@ impl<'a> ImagePipeline<'a> {
     }
 
     fn enhancer(&mut self, name: &EnhancerName) -> Result<&mut Enhancer> {
-        let mut enhancers = self.enhancers.iter_mut();
-        enhancers
+        self.enhancers
+            .iter_mut()
             .find(|enhancer| enhancer.name() == name)
             .ok_or_else(|| Error::data(name, "this enhancer is not open"))
     }

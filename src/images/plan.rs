@@ -24,8 +24,9 @@ pub(crate) struct SourcePlan<I> {
 impl<I> SourcePlan<I> {
     /// The conditions in which the source is shown.
     pub(crate) fn conditions(&self) -> impl Iterator<Item = &Condition> {
-        let groups = self.groups.iter();
-        groups.filter_map(|group| group.condition.as_ref())
+        self.groups
+            .iter()
+            .filter_map(|group| group.condition.as_ref())
     }
 
     fn trials(&self) -> usize {
@@ -151,13 +152,16 @@ impl<I> Plan<I> {
 
     /// The conditions of the remaining trials.
     pub(crate) fn conditions(&self) -> BTreeSet<&Condition> {
-        let sources = self.sources.iter();
-        sources.flat_map(SourcePlan::conditions).collect()
+        self.sources
+            .iter()
+            .flat_map(SourcePlan::conditions)
+            .collect()
     }
 
     /// The groups of the remaining trials, each with the index of its source.
     pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, &TrialGroup<I>)> {
-        let sources = self.sources.iter();
-        sources.flat_map(|part| part.groups.iter().map(|group| (part.source, group)))
+        self.sources
+            .iter()
+            .flat_map(|part| part.groups.iter().map(|group| (part.source, group)))
     }
 }

@@ -86,8 +86,7 @@ impl Recipe {
 
     /// The images of the enhancer of this name, if they were made elsewhere.
     pub(crate) fn elsewhere(&self, name: &EnhancerName) -> Option<&EnhancedImages> {
-        let mut folders = self.elsewhere.iter();
-        folders.find(|images| images.name() == name)
+        self.elsewhere.iter().find(|images| images.name() == name)
     }
 
     /// The recipe for frames of walks.

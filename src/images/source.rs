@@ -45,8 +45,10 @@ impl Frames for Dataset {
     }
 
     fn photographs(&self, frame: &FrameId) -> Vec<(PhotoName, Option<f64>)> {
-        let photos = self.photographs(frame).iter();
-        photos.map(|photo| (photo.name.clone(), photo.ev)).collect()
+        self.photographs(frame)
+            .iter()
+            .map(|photo| (photo.name.clone(), photo.ev))
+            .collect()
     }
 
     fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {

@@ -147,8 +147,11 @@ impl Baseline {
     /// # Errors
     /// If no model can be compared, or no verdict is possible about any.
     pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
-        let rows = self.rows.iter();
-        let models: Vec<&BaselineRow> = rows.filter(|row| !row.subject.is_reference()).collect();
+        let models: Vec<&BaselineRow> = self
+            .rows
+            .iter()
+            .filter(|row| !row.subject.is_reference())
+            .collect();
         let old = &self.old;
         let none = |problem: String| {
             let problem = format!("{problem}; leave the flag out to see the report");

@@ -109,8 +109,10 @@ impl Combined {
 
     /// The manifest and the folder of each run.
     pub(super) fn manifests(&self) -> Vec<(&RunManifest, &Path)> {
-        let runs = self.runs.iter();
-        runs.map(|run| (&run.manifest, &*run.folder)).collect()
+        self.runs
+            .iter()
+            .map(|run| (&run.manifest, &*run.folder))
+            .collect()
     }
 }
 

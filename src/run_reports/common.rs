@@ -26,8 +26,11 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
             "no item was answered by every model; leave it out",
         ));
     }
-    let items = combined.trials.items().into_iter();
-    let is_shared = items.map(|item| item.is_some_and(|item| shared.contains(&owned(item))));
+    let is_shared = combined
+        .trials
+        .items()
+        .into_iter()
+        .map(|item| item.is_some_and(|item| shared.contains(&owned(item))));
     let is_shared: Vec<bool> = is_shared.collect();
     let trials = combined.trials.iter();
     let kept: Vec<bool> = trials.map(|trial| is_shared[trial.item_number()]).collect();

@@ -88,8 +88,10 @@ pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
 
 fn notes(runs: &[JoinedRun]) -> impl Iterator<Item = (&JoinedRun, &str, &EnhancerNote)> {
     runs.iter().flat_map(|run| {
-        let notes = run.manifest.enhancers.iter();
-        notes.map(move |(name, note)| (run, &**name, note))
+        run.manifest
+            .enhancers
+            .iter()
+            .map(move |(name, note)| (run, &**name, note))
     })
 }
 
@@ -119,8 +121,10 @@ fn how(note: &EnhancerNote) -> String {
 
 /// The value ranges that are assumed; `None` if they are stated.
 fn assumed(note: &EnhancerNote) -> Option<String> {
-    let lines = note.convention.iter();
-    let assumed = lines.filter(|line| line.key.starts_with("range_") && line.source == "assumed");
+    let assumed = note
+        .convention
+        .iter()
+        .filter(|line| line.key.starts_with("range_") && line.source == "assumed");
     let ranges: BTreeSet<&str> = assumed.map(|line| &*line.value).collect();
     let ranges: Vec<&str> = ranges.into_iter().collect();
     (!ranges.is_empty()).then(|| ranges.join(" and "))

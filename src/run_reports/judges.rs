@@ -64,8 +64,9 @@ fn judge_settings(manifest: &RunManifest) -> Option<Settings> {
     // Runs of earlier versions have the judge among the models alone.
     let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
     let settings = columns.into_iter().flatten().next().map(decisive)?;
-    let settings = settings.into_iter();
-    let of_judge = settings.map(|(flag, value)| (judge_flag(&flag), value));
+    let of_judge = settings
+        .into_iter()
+        .map(|(flag, value)| (judge_flag(&flag), value));
     Some(of_judge.collect())
 }
 

@@ -149,8 +149,8 @@ impl Lights {
 /// A group of runs, parted by the groups of the curves with which it is compared.
 fn parted_by(group: &[usize], bases: &[&Vec<Vec<usize>>]) -> Vec<Vec<usize>> {
     let place = |run: usize| -> Vec<Option<usize>> {
-        let places = bases.iter();
-        places
+        bases
+            .iter()
             .map(|groups| groups.iter().position(|group| group.contains(&run)))
             .collect()
     };

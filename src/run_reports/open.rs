@@ -107,8 +107,9 @@ impl Scores {
 
     /// Whether the mark of an answer cannot be read.
     fn has_unmarked(&self) -> bool {
-        let mut answers = self.answers.iter();
-        answers.any(|answer| answer.outcome == AnswerOutcome::Unmarked)
+        self.answers
+            .iter()
+            .any(|answer| answer.outcome == AnswerOutcome::Unmarked)
     }
 
     /// The scores.

@@ -21,8 +21,9 @@ pub(crate) struct MarkIndex<M> {
 impl<M> MarkIndex<M> {
     /// The index for these questions, without marks.
     pub(crate) fn new<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> Self {
-        let questions = questions.into_iter();
-        let words = questions.map(|question| (question.id.clone(), question.judged_words()));
+        let words = questions
+            .into_iter()
+            .map(|question| (question.id.clone(), question.judged_words()));
         Self {
             words: words.collect(),
             by_answer: HashMap::new(),

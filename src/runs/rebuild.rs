@@ -80,8 +80,9 @@ impl ImageRebuilder {
         }
         let flags = ImageFlags::read(&manifest.images).map_err(wrong)?;
         let flags = with_new_paths(flags, &args).map_err(wrong)?;
-        let mut conditions = conditions.iter();
-        let enhanced = conditions.any(|condition| condition.enhancer.is_some());
+        let enhanced = conditions
+            .iter()
+            .any(|condition| condition.enhancer.is_some());
         let models = if enhanced { &*flags.llie } else { &[] };
         let elsewhere = if enhanced { &*flags.enhanced } else { &[] };
         let files = enhancers::read(models)?;

@@ -159,8 +159,7 @@ mod tests {
 
     fn resolved(text: Option<&str>, variables: &[(&str, &str)]) -> Result<Shard> {
         Shard::resolve(text, |name| {
-            let mut variables = variables.iter();
-            let found = variables.find(|(known, _)| *known == name);
+            let found = variables.iter().find(|(known, _)| *known == name);
             found.map(|(_, value)| (*value).to_owned())
         })
     }

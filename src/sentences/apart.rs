@@ -38,8 +38,10 @@ fn names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
         .map(String::as_str)
         .collect();
     let listing = &findings.grid.listing;
-    let subjects = findings.grid.subjects.iter();
-    let names = subjects
+    let names = findings
+        .grid
+        .subjects
+        .iter()
         .filter(|subject| subject.view == Some(View::Image))
         .map(|subject| &*subject.model)
         .filter(|name| listing.is_people(name) || left_out.contains(name));
@@ -51,8 +53,8 @@ fn names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
 /// The models that stand in means.
 fn others<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
     let apart = names(findings);
-    let models = pool(&findings.grid).into_iter();
-    models
+    pool(&findings.grid)
+        .into_iter()
         .filter(|model| !apart.contains(model) && !is_reference(model))
         .collect()
 }

@@ -26,8 +26,10 @@ impl<'f> Confidence<'f> {
         }
         let models = findings.models_of(variant);
         let rows = || {
-            let rows = findings.calibrations.iter();
-            rows.filter(|row| row.replies >= LEAST_CONFIDENT_REPLIES)
+            findings
+                .calibrations
+                .iter()
+                .filter(|row| row.replies >= LEAST_CONFIDENT_REPLIES)
         };
         let dark = rows().filter(|row| {
             let subject = &row.subject;

@@ -76,8 +76,9 @@ pub(super) fn means_of_set<'f>(
     kind: PooledKind,
     variant: &KindReading,
 ) -> Vec<&'f PooledFinding> {
-    let averaged = findings.averaged.iter();
-    averaged
+    findings
+        .averaged
+        .iter()
         .filter(|mean| mean.kind == kind && mean.variant == *variant)
         .collect()
 }
@@ -89,8 +90,7 @@ pub(super) fn findings_of_kind<'f>(
     kind: PooledKind,
     variant: &KindReading,
 ) -> Vec<&'f PooledFinding> {
-    let pooled = findings.pooled.iter();
-    let of_set = pooled.filter(|finding| {
+    let of_set = findings.pooled.iter().filter(|finding| {
         finding.kind == kind
             && finding.family.as_ref() == kind.only_family()
             && finding.variant == *variant

@@ -58,8 +58,10 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
             crossing.before.0, crossing.after.0, crossing.before.1, crossing.after.1
         )
     } else {
-        let mut pairs = best.pairs.iter();
-        let pair = pairs.find(|pair| pair.first == leader.model && pair.second == second.model)?;
+        let pair = best
+            .pairs
+            .iter()
+            .find(|pair| pair.first == leader.model && pair.second == second.model)?;
         let difference = numbers.difference("", pair.difference);
         let p = numbers.p("p", best.p_report.unwrap_or(pair.holm));
         format!("{difference} against {}, {p}", second.model)
@@ -123,8 +125,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option
     };
     let most = of_families.iter().min_by(by_value)?;
     let least = of_families.iter().max_by(by_value)?;
-    let mut whole = findings.pooled.iter();
-    let is_lost = whole.any(|finding| {
+    let is_lost = findings.pooled.iter().any(|finding| {
         finding.kind == PooledKind::Darkness
             && finding.family.is_none()
             && finding.variant == *variant

@@ -11,8 +11,8 @@ pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<
     let whole = whole.filter(|one| !matches!(one.claim, NoiseHypothesis::NoiseCompounds(Some(_))));
     let whole: Vec<&FindingByReading> = whole.collect();
     let of = |robustness: Robustness| {
-        let mut findings = whole.iter();
-        findings
+        whole
+            .iter()
             .by_ref()
             .filter(|one| one.robustness == robustness)
             .count()

@@ -68,8 +68,10 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
         "This bank does not show what {model} sees: at L0 its answer to each of the {all} questions is the same about 95 % of the images \
          or more."
     );
-    let own = found.questions.iter();
-    let images = own.filter(|question| question.model == model);
+    let images = found
+        .questions
+        .iter()
+        .filter(|question| question.model == model);
     let images = images.map(|question| question.images);
     let (least, greatest) = (images.clone().min(), images.max());
     let fewest = numbers.count("fewest_images", least.unwrap_or_default());
@@ -134,8 +136,10 @@ fn compared<'f>(
     kind: ComparisonKind,
     model: &str,
 ) -> impl Iterator<Item = &'f Comparison> {
-    let all = found.comparisons.iter();
-    all.filter(move |comparison| comparison.kind == kind && comparison.family.is_none())
+    found
+        .comparisons
+        .iter()
+        .filter(move |comparison| comparison.kind == kind && comparison.family.is_none())
         .filter(move |comparison| comparison.first.model == model)
 }
 

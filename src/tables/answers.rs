@@ -87,11 +87,14 @@ pub(crate) fn counted_answers(
     confusions: &[Confusion],
 ) -> Table {
     let cells = confusions.iter().flat_map(|confusion| {
-        let rows = confusion.counts.iter().enumerate();
-        let cells = rows.flat_map(|(truth, row)| {
-            let answer = row.iter().enumerate();
-            answer.map(move |(answer, count)| (truth, answer, *count))
-        });
+        let cells = confusion
+            .counts
+            .iter()
+            .enumerate()
+            .flat_map(|(truth, row)| {
+                let answer = row.iter().enumerate();
+                answer.map(move |(answer, count)| (truth, answer, *count))
+            });
         cells.map(move |cell| (confusion, cell))
     });
     let non_empty = cells.filter(|(_, (_, _, count))| *count > 0);

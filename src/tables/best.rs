@@ -9,10 +9,10 @@ use darkqa_score::findings::Findings;
 
 /// Empty if there are fewer than two models.
 pub(super) fn best(findings: &Findings<'_>) -> Table {
-    let pairs = findings.best.iter().flat_map(|best| {
-        let pairs = best.pairs.iter();
-        pairs.map(move |pair| (best, pair))
-    });
+    let pairs = findings
+        .best
+        .iter()
+        .flat_map(|best| best.pairs.iter().map(move |pair| (best, pair)));
     let variant = findings
         .best
         .as_ref()
@@ -80,8 +80,7 @@ fn accuracy<'b>(
     (best, pair): &(&'b BestInTheDark, &DarkPair),
     side: fn(&DarkPair) -> &str,
 ) -> Option<&'b DarkAccuracy> {
-    let mut models = best.models.iter();
-    models.find(|model| model.model == side(pair))
+    best.models.iter().find(|model| model.model == side(pair))
 }
 
 /// The mean less the accuracy at L0; empty if that is not above chance.

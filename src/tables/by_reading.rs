@@ -27,10 +27,9 @@ pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
 type FileRow<'f> = (&'f FindingByReading, &'f EffectInReading);
 
 fn file(found: &[FindingByReading]) -> Table {
-    let rows = found.iter().flat_map(|finding| {
-        let effects = finding.effects.iter();
-        effects.map(move |effect| (finding, effect))
-    });
+    let rows = found
+        .iter()
+        .flat_map(|finding| finding.effects.iter().map(move |effect| (finding, effect)));
     let tested = |(_, effect): &FileRow<'_>| effect.effect;
     TableBuilder::new("readings", rows)
         .column(Text, "csv model", |(finding, _)| subject(finding))
@@ -143,8 +142,10 @@ fn thresholds<'f>(findings: &'f Findings<'_>, finding: &FindingByReading) -> Vec
 }
 
 fn threshold(curves: &[&Curve], reading: &ReadingName) -> String {
-    let mut curves = curves.iter();
-    let Some(curve) = curves.find(|curve| curve.variant.reading.as_ref() == Some(reading)) else {
+    let Some(curve) = curves
+        .iter()
+        .find(|curve| curve.variant.reading.as_ref() == Some(reading))
+    else {
         return "not asked".to_owned();
     };
     let darkest = curve.summary.darkest.value();
@@ -178,8 +179,10 @@ fn effect(effect: Option<&TestedEffect>) -> String {
 }
 
 fn items(finding: &FindingByReading) -> usize {
-    let effects = finding.effects.iter();
-    let mut numbers = effects.filter_map(|effect| Some(effect.effect?.difference.n));
+    let mut numbers = finding
+        .effects
+        .iter()
+        .filter_map(|effect| Some(effect.effect?.difference.n));
     numbers.next().unwrap_or(0)
 }
 

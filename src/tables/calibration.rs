@@ -113,8 +113,10 @@ fn condition(subject: &Subject) -> String {
 /// The bins of the reliability diagram.
 fn reliability(all: &[Calibration]) -> Table {
     let rows = all.iter().flat_map(|row| {
-        let bins = row.bins.iter().enumerate();
-        bins.map(|(number, bin)| (&row.subject, number + 1, *bin))
+        row.bins
+            .iter()
+            .enumerate()
+            .map(|(number, bin)| (&row.subject, number + 1, *bin))
     });
     TableBuilder::new("reliability", rows)
         .subject(
@@ -130,10 +132,9 @@ fn reliability(all: &[Calibration]) -> Table {
 }
 
 fn positions(all: &[Calibration]) -> Table {
-    let rows = all.iter().flat_map(|row| {
-        let positions = row.positions.iter();
-        positions.map(|share| (&row.subject, *share))
-    });
+    let rows = all
+        .iter()
+        .flat_map(|row| row.positions.iter().map(|share| (&row.subject, *share)));
     let mut table = TableBuilder::new("positions", rows)
         .page(CONFIDENCE, "Probability by the place of a choice")
         .subject(|row: &(&Subject, PositionShare)| row.0, ToString::to_string)

@@ -109,8 +109,8 @@ impl FrameAnswers {
 
     /// The first level at which at most half of the right answers are kept.
     fn half(&self) -> Option<AxisLevel> {
-        let mut levels = self.kept.iter();
-        levels
+        self.kept
+            .iter()
             .find(|(_, kept)| 2 * **kept <= self.right)
             .map(|(level, _)| *level)
     }

@@ -32,8 +32,9 @@ fn summary_tables(findings: &Findings<'_>, summary: &AccuracySummary, what: &str
     let strict = summary.family_cells(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).in_light_of(findings);
     let notes = notes(summary, &ladder);
-    let ladders = ladder.by_axis().into_iter();
-    let mut tables: Vec<Table> = ladders
+    let mut tables: Vec<Table> = ladder
+        .by_axis()
+        .into_iter()
         .map(|(axis, ladder)| axis_table(findings, summary, what, axis, &ladder))
         .collect();
     if let Some(last) = tables.last_mut() {
@@ -137,13 +138,12 @@ fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
         if cells.values().all(|cell| cell.always.is_none()) {
             continue;
         }
-        let levels = ladder.levels.iter();
-        let shares = levels.map(
-            |level| match cells.get(level).and_then(|cell| always(cell)) {
+        let shares = ladder.levels.iter().map(|level| {
+            match cells.get(level).and_then(|cell| always(cell)) {
                 Some(share) => TableCell::Text(share),
                 None => TableCell::Blank,
-            },
-        );
+            }
+        });
         let names = [
             TableCell::Blank,
             "  right every time".into(),

@@ -177,8 +177,7 @@ const LEAST_STEP: f64 = 0.25;
 /// All items and models are then asked there alike. A search that places levels by the answers of each model gains little, since the
 /// spread between items makes most of the error, and it would compare models at different levels.
 fn finer(findings: &Findings<'_>) -> Option<String> {
-    let curves = findings.curves.iter();
-    let raw = curves.filter(|curve| {
+    let raw = findings.curves.iter().filter(|curve| {
         curve.family.is_none() && curve.enhancer.is_none() && curve.axis() == Axis::LIGHT
     });
     let intervals: Vec<[f64; 2]> = raw
@@ -187,8 +186,11 @@ fn finer(findings: &Findings<'_>) -> Option<String> {
             Some([threshold.low, threshold.high])
         })
         .collect();
-    let subjects = findings.grid.subjects.iter();
-    let levels = subjects.filter_map(|subject| subject.level);
+    let levels = findings
+        .grid
+        .subjects
+        .iter()
+        .filter_map(|subject| subject.level);
     let levels = levels.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
     let levels: BTreeSet<AxisLevel> = levels.collect();
     let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();

@@ -201,8 +201,11 @@ impl<'a, C> Ladder<'a, C> {
                 && (other.variant == series.variant
                     || is_clean && LightGroup::meet(groups[0], groups[1]))
         });
-        let own = self.series.get(series).into_iter();
-        let mut cells = own.chain(raw.map(|(_, cells)| cells));
+        let mut cells = self
+            .series
+            .get(series)
+            .into_iter()
+            .chain(raw.map(|(_, cells)| cells));
         cells.find_map(|cells| cells.get(&AxisLevel::L0).copied())
     }
 

@@ -278,8 +278,9 @@ impl Table {
 
     /// The rows that a format shows.
     pub(crate) fn rows_in(&self, format: TableFormat) -> impl Iterator<Item = &TableRow> {
-        let rows = self.rows.iter();
-        rows.filter(move |row| !row.hidden_in.contains(&format))
+        self.rows
+            .iter()
+            .filter(move |row| !row.hidden_in.contains(&format))
     }
 
     /// The rows that a format shows, each with the heading that stands above it: empty where the rows of a group end, `None` within

@@ -77,8 +77,7 @@ pub(crate) fn table(parts: &[Table]) -> String {
         .clone()
         .any(|column| column.kind == ColumnKind::Accuracy);
     let heads = columns.flat_map(|Column { kind, heads }| {
-        let heads = heads.terminal.iter();
-        heads.map(|head| TextColumn {
+        heads.terminal.iter().map(|head| TextColumn {
             head: head.clone(),
             kind: *kind,
         })

@@ -40,8 +40,10 @@ fn records() -> Vec<Record> {
                 let name = format!("model-{model}");
                 let drawn = Digest::from_bytes(format!("{name} {condition} {question}").as_bytes());
                 let severity = condition.level().severity();
-                let severities = Severity::LADDER.iter();
-                let level = severities.filter(|s| Some(**s) <= severity).count() as u32;
+                let level = Severity::LADDER
+                    .iter()
+                    .filter(|s| Some(**s) <= severity)
+                    .count() as u32;
                 let right = u32::from(drawn.as_bytes()[0]) > 30 * level;
                 let mut record = record(&name, condition, (question, question / 4), right);
                 record.detail.family = Family::PAPER[question % 4].clone();

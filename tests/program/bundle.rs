@@ -100,8 +100,10 @@ fn a_bundle_is_the_run_again_and_the_same_bytes_each_time() {
     let command = command.unwrap().trim_start_matches("darkqa-eval ");
     bench.complete(&words(&format!("{command} --out again")));
     let keys = |run: &str| -> BTreeSet<String> {
-        let records = records(&bench.path(run)).into_iter();
-        records.map(|record| record["key"].to_string()).collect()
+        records(&bench.path(run))
+            .into_iter()
+            .map(|record| record["key"].to_string())
+            .collect()
     };
     assert_eq!(keys("again"), keys("run"));
     let summary = fs::read_to_string(bench.path("run/summary.json")).unwrap();

@@ -276,8 +276,8 @@ fn walks_are_blurred_frame_by_frame() {
             .collect()
     };
     let exposure = |records: &[Value], condition: &str| {
-        let mut records = records.iter();
         let found = records
+            .iter()
             .find(|record| record["condition"] == condition)
             .unwrap();
         found["images"]["exposure"].clone()

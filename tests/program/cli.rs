@@ -354,8 +354,11 @@ const SHORT: &str = "--model random --limit 2 --out run --json";
 /// The different values that the rows of a summary have under a name, as JSON.
 fn values(summary: &str, name: &str) -> BTreeSet<String> {
     let summary: serde_json::Value = serde_json::from_str(summary).unwrap();
-    let rows = summary["rows"].as_array().unwrap().iter();
-    rows.filter(|row| row["model"] == "random")
+    summary["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|row| row["model"] == "random")
         .map(|row| row[name].to_string())
         .collect()
 }

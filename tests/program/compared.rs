@@ -98,8 +98,7 @@ impl Scene {
 
     pub(crate) fn csv(&self, path: &str) -> Vec<Vec<String>> {
         let text = fs::read_to_string(self.bench.path(path)).unwrap();
-        let lines = text.lines();
-        lines
+        text.lines()
             .map(|line| line.split(',').map(str::to_owned).collect())
             .collect()
     }

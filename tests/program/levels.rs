@@ -97,8 +97,7 @@ fn levels_without_l0_have_accuracies_and_no_threshold() {
     assert!(!bench.path("run/thresholds.csv").exists());
     let summary = rows(&bench, "summary.csv");
     let of = |level: &str| {
-        let mut rows = summary.iter();
-        let row = rows.find(|row| {
+        let row = summary.iter().find(|row| {
             cell(row, "level") == level
                 && cell(row, "family") == "all"
                 && cell(row, "mode") == "strict"

@@ -58,8 +58,9 @@ fn several_endpoints_share_the_open_files() {
     assert_eq!(ran.0.code, Some(0), "{:?}", ran.0);
     // The replicas are compared by what they say of the model.
     let asked = |endpoint: &MockEndpoint| {
-        let requests = endpoint.requests().into_iter();
-        requests
+        endpoint
+            .requests()
+            .into_iter()
             .filter(|request| request.line.starts_with("POST "))
             .count()
     };

@@ -55,8 +55,7 @@ fn sign_test(gained: usize, lost: usize) -> f64 {
 fn holm(set: &[f64], p: f64) -> f64 {
     let mut sorted = set.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let steps = sorted.iter().enumerate();
-    let up_to = steps.filter(|(_, other)| **other <= p);
+    let up_to = sorted.iter().enumerate().filter(|(_, other)| **other <= p);
     up_to
         .map(|(j, other)| (set.len() - j) as f64 * other)
         .fold(0.0, f64::max)
@@ -430,8 +429,11 @@ fn enhanced_walks_go_through_batch_and_page() {
     let each = ["L0", "L3-noise", "L3-noise+bright", "marks"];
     assert_eq!(counts(&house), each.map(|name| (name.to_owned(), 3)).into());
     let summary = house.read("run/summary.json");
-    let mut rows = summary["rows"].as_array().unwrap().iter();
-    let row = rows.find(|row| row["by"] == "all" && row["enhancer"] == "bright");
+    let row = summary["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|row| row["by"] == "all" && row["enhancer"] == "bright");
     assert_eq!(
         (&row.unwrap()["n"], &row.unwrap()["value"]),
         (&json!(3), &json!(0.75))
@@ -513,8 +515,12 @@ fn a_null_or_refused_reply_is_no_answer() {
         json!({"q1": 0, "q2": 0, "q3": 5})
     );
     let summary = house.read("run/summary.json");
-    let mut rows = summary["rows"].as_array().unwrap().iter();
-    let row = rows.find(|row| row["by"] == "all").unwrap();
+    let row = summary["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|row| row["by"] == "all")
+        .unwrap();
     assert_eq!((&row["n"], &row["null"]), (&json!(3), &json!(2)));
     assert!((row["value"].as_f64().unwrap() - 1.0 / 3.0).abs() < 1e-12);
     assert!(

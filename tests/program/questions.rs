@@ -146,8 +146,8 @@ struct Outcome {
 impl Outcome {
     fn lines(&self) -> Vec<Value> {
         assert_eq!(self.code, 0, "{}", self.err);
-        let lines = self.questions.lines();
-        lines
+        self.questions
+            .lines()
             .map(|line| serde_json::from_str(line).unwrap())
             .collect()
     }

@@ -361,15 +361,16 @@ fn rooms_on_disk_are_those_in_the_program() {
         bench.complete(&words(&format!(
             "--model observer --data {data} --levels L0,L4 --out {out}"
         )));
-        let kept = records(&bench.path(out)).into_iter();
-        kept.map(|record| {
-            (
-                record["question"].to_string(),
-                record["condition"].to_string(),
-                record["reply"].to_string(),
-            )
-        })
-        .collect::<BTreeSet<_>>()
+        records(&bench.path(out))
+            .into_iter()
+            .map(|record| {
+                (
+                    record["question"].to_string(),
+                    record["condition"].to_string(),
+                    record["reply"].to_string(),
+                )
+            })
+            .collect::<BTreeSet<_>>()
     };
     assert_eq!(run("frames", "a"), run("rooms:frames=4,size=160x120", "b"));
 }

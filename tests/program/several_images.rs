@@ -49,8 +49,8 @@ fn parts(body: &Value) -> Vec<Result<String, RgbImage>> {
 
 /// Words, and the width of each picture.
 fn outline(body: &Value) -> Vec<String> {
-    let parts = parts(body).into_iter();
-    parts
+    parts(body)
+        .into_iter()
         .map(|part| part.unwrap_or_else(|picture| picture.width().to_string()))
         .collect()
 }

@@ -22,11 +22,10 @@ fn exchanged(value: &Value, words: &[(&str, &str)]) -> Value {
     match value {
         Value::String(text) => Value::String(word(text)),
         Value::Array(all) => all.iter().map(|value| exchanged(value, words)).collect(),
-        Value::Object(all) => {
-            let all = all.iter();
-            all.map(|(key, value)| (word(key), exchanged(value, words)))
-                .collect()
-        }
+        Value::Object(all) => all
+            .iter()
+            .map(|(key, value)| (word(key), exchanged(value, words)))
+            .collect(),
         other => other.clone(),
     }
 }

@@ -49,8 +49,10 @@ fn parts_are_together_what_one_run_is() {
     let table = house.0.complete(&["merge", "parts", "--out", "merged"]);
     let (whole, merged) = (house.0.path("whole"), house.0.path("merged"));
     let keys = |run: &std::path::Path| -> BTreeSet<String> {
-        let records = records(run).into_iter();
-        records.map(|record| record["key"].to_string()).collect()
+        records(run)
+            .into_iter()
+            .map(|record| record["key"].to_string())
+            .collect()
     };
     assert_eq!(keys(&whole), keys(&merged));
     let compared = assert_same_products(&whole, &merged);

@@ -62,8 +62,8 @@ fn flags(mock: &MockEndpoint, more: &str) -> String {
 
 /// What is asked, by key.
 fn asked(run: &std::path::Path) -> BTreeMap<String, Value> {
-    let records = records(run).into_iter();
-    records
+    records(run)
+        .into_iter()
         .map(|record| (record["key"].to_string(), record["reply"].clone()))
         .collect()
 }

@@ -256,8 +256,10 @@ impl MockBatches {
         self.with(|server| {
             let begun = server.batches.iter().filter(|batch| batch.is_begun());
             let ids = begun.map(|batch| {
-                let ids = batch.requests.iter();
-                ids.map(|one| one["custom_id"].as_str().unwrap().to_owned())
+                batch
+                    .requests
+                    .iter()
+                    .map(|one| one["custom_id"].as_str().unwrap().to_owned())
                     .collect()
             });
             ids.collect()
@@ -477,8 +479,11 @@ impl Server {
     }
 
     fn cancel(&mut self, id: &str) -> Answer {
-        let mut batches = self.batches.iter_mut();
-        let Some(batch) = batches.find(|one| id_in_path(&one.id) == id) else {
+        let Some(batch) = self
+            .batches
+            .iter_mut()
+            .find(|one| id_in_path(&one.id) == id)
+        else {
             return Answer::error(404, "not_found", "no such batch");
         };
         if !batch.cancelled {

@@ -27,8 +27,10 @@ pub(crate) fn check_rows_at_once<T: Send>(
 ) {
     let check = &check;
     thread::scope(|scope| {
-        let rows = rows.into_iter();
-        let checks: Vec<_> = rows.map(|row| scope.spawn(move || check(row))).collect();
+        let checks: Vec<_> = rows
+            .into_iter()
+            .map(|row| scope.spawn(move || check(row)))
+            .collect();
         check_rows(checks, |row| {
             row.join().unwrap_or_else(|panic| resume_unwind(panic));
         });

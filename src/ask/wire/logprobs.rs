@@ -117,8 +117,9 @@ pub(super) fn thought(message: &Value, usage: Option<&Value>, text: &str) -> Tho
 
 /// Whether a message has reasoning beside its content.
 pub(super) fn has_reasoning(message: &Value) -> bool {
-    let mut fields = ["reasoning_content", "reasoning"].iter();
-    fields.any(|field| message.get(*field).is_some_and(is_filled))
+    ["reasoning_content", "reasoning"]
+        .iter()
+        .any(|field| message.get(*field).is_some_and(is_filled))
 }
 
 /// Whether a field of reasoning says anything.

@@ -23,8 +23,7 @@ fn parsed(words: &[&str], variables: &[(&str, &str)], file: &str) -> Result<ArgM
         words.extend(["--config".into(), path.into()]);
     }
     let variable = |name: &str| {
-        let mut variables = variables.iter();
-        let found = variables.find(|(known, _)| *known == name);
+        let found = variables.iter().find(|(known, _)| *known == name);
         found.map(|(_, value)| value.into())
     };
     parse(COMMAND.clone(), words, variable)

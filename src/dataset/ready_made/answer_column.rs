@@ -73,8 +73,11 @@ pub(super) fn option_column<'a>(
 /// The flag for a column of no known name whose cells are an option in every row, in the first way that fits; `None` if there is none.
 pub(super) fn unnamed(table: &Table, roles: &Roles, items: &[Item]) -> Option<String> {
     let none = Offered::default();
-    let columns = table.columns.iter().enumerate();
-    let free = columns.filter(|(at, _)| !roles.holds(*at));
+    let free = table
+        .columns
+        .iter()
+        .enumerate()
+        .filter(|(at, _)| !roles.holds(*at));
     let found = free.flat_map(|(at, name)| {
         let column = Column {
             at,
@@ -113,8 +116,8 @@ pub(super) fn yes_or_no_column<'a>(
             .map(|item| answer(table, item, column))
             .collect();
         let said = |read: fn(&str) -> Option<usize>| -> Said {
-            let answers = answers.iter();
             answers
+                .iter()
                 .map(|answer| Some(read(answer.as_ref()?).unwrap_or(OTHER)))
                 .collect()
         };

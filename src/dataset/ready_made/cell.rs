@@ -83,12 +83,10 @@ impl Cell {
             Self::Bytes(bytes) => bytes.len(),
             Self::File(_) => size_of::<FileFacts>(),
             Self::List(cells) => cells.iter().map(Self::length).sum(),
-            Self::Fields(fields) => {
-                let fields = fields.iter();
-                fields
-                    .map(|(_, cell)| size_of::<Arc<str>>() + cell.length())
-                    .sum()
-            }
+            Self::Fields(fields) => fields
+                .iter()
+                .map(|(_, cell)| size_of::<Arc<str>>() + cell.length())
+                .sum(),
         };
         size_of::<Self>() + inner
     }
@@ -168,8 +166,8 @@ impl Cell {
         let Self::Fields(fields) = self else {
             return None;
         };
-        let mut fields = fields.iter();
         fields
+            .iter()
             .find(|(field, _)| **field == *name)
             .map(|(_, cell)| cell)
     }

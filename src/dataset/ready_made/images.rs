@@ -111,8 +111,8 @@ fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>
             }
         }
         Cell::Fields(_) => {
-            let fields = ["bytes", "path"].into_iter();
-            let field = fields
+            let field = ["bytes", "path"]
+                .into_iter()
                 .filter_map(|name| Some((name, cell.field(name)?)))
                 .find(|(_, cell)| !cell.is_absent());
             if let Some((name, cell)) = field {

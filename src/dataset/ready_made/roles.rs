@@ -189,10 +189,12 @@ impl Roles {
             let columns = entry.columns.iter();
             return columns.map(|name| column(table, name)).collect();
         }
-        let names = known(role).iter();
-        let columns = names.flat_map(|name| {
-            let columns = table.columns.iter().enumerate();
-            let same = columns.filter(move |(_, column)| plain(column) == *name);
+        let columns = known(role).iter().flat_map(|name| {
+            let same = table
+                .columns
+                .iter()
+                .enumerate()
+                .filter(move |(_, column)| plain(column) == *name);
             same.map(|(at, column)| Column {
                 at,
                 field: None,

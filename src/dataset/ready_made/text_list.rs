@@ -23,8 +23,8 @@ pub(super) fn dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
     }
     let fields = serde_json::from_str::<serde_json::Map<String, Value>>(text).ok();
     let texts = fields.and_then(|fields| {
-        let fields = fields.iter();
         fields
+            .iter()
             .map(|(name, value)| match value {
                 Value::Null => Some((name.clone(), None)),
                 value => Some((name.clone(), Some(item(value)?))),

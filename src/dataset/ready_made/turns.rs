@@ -24,8 +24,11 @@ impl Turns {
     /// The turns in the first column that holds conversations; `None` if none does.
     pub(super) fn find(table: &Table) -> Option<Self> {
         let row = table.rows.first()?;
-        let columns = table.columns.iter().enumerate();
-        let mut turns = columns.filter_map(|(at, name)| Self::from_cell(name, row.cell(at)));
+        let mut turns = table
+            .columns
+            .iter()
+            .enumerate()
+            .filter_map(|(at, name)| Self::from_cell(name, row.cell(at)));
         turns.next()
     }
 

@@ -46,8 +46,7 @@ impl Overview<'_> {
         let panel = |family: Family| {
             let mut truth = None;
             let mut lines = self.lines(&variant, |subject| {
-                let mut confusions = self.findings.confusions.iter();
-                let confusion = confusions.find(|confusion| {
+                let confusion = self.findings.confusions.iter().find(|confusion| {
                     confusion.family == family && confusion.subject == *subject
                 })?;
                 truth = truth.or_else(|| commonest_truth(confusion));

@@ -22,8 +22,11 @@ impl Overview<'_> {
             for model in &self.models {
                 let line = |(style, (name, quantity)): (usize, (&str, Quantity))| {
                     let points = self.points(model, &variant, None, |subject| {
-                        let mut rows = self.findings.calibrations.iter();
-                        rows.find(|row| row.subject == *subject).map(quantity)
+                        self.findings
+                            .calibrations
+                            .iter()
+                            .find(|row| row.subject == *subject)
+                            .map(quantity)
                     });
                     (!points.is_empty()).then(|| PlotLine {
                         name: name.to_owned(),

@@ -124,8 +124,7 @@ impl<'a> Overview<'a> {
         enhancer: Option<&EnhancerName>,
         mut number: impl FnMut(&Subject) -> Option<Estimate>,
     ) -> Vec<(AxisLevel, Estimate)> {
-        let levels = self.levels.iter();
-        let points = levels.filter_map(|&level| {
+        let points = self.levels.iter().filter_map(|&level| {
             let grid = &self.findings.grid;
             let of = |enhancer| grid.stand_in(&Subject::seeing(model, level, variant, enhancer));
             let raw = || (level == AxisLevel::L0).then(|| of(None)).flatten();
@@ -136,8 +135,10 @@ impl<'a> Overview<'a> {
         if points.iter().all(|(of, ..)| *of != enhancer) {
             return Vec::new();
         }
-        let points = points.into_iter();
-        points.map(|(_, level, number)| (level, number)).collect()
+        points
+            .into_iter()
+            .map(|(_, level, number)| (level, number))
+            .collect()
     }
 
     /// Raw (`None`), and then each enhancer.
@@ -147,8 +148,11 @@ impl<'a> Overview<'a> {
 
     /// Whether some untouched frames were enhanced.
     fn has_enhanced_clean(&self) -> bool {
-        let mut subjects = self.findings.grid.subjects.iter();
-        subjects.any(|subject| subject.level == Some(AxisLevel::L0) && subject.enhancer.is_some())
+        self.findings
+            .grid
+            .subjects
+            .iter()
+            .any(|subject| subject.level == Some(AxisLevel::L0) && subject.enhancer.is_some())
     }
 
     /// Accuracy of a subject on a family, in the strict reading.
@@ -220,8 +224,7 @@ impl<'a> Overview<'a> {
 
     /// All variants that were asked: kinds in each light reading.
     fn tested_variants(&self) -> Vec<KindReading> {
-        let variants = self.findings.grid.variants().into_iter();
-        variants.cloned().collect()
+        self.findings.grid.variants().into_iter().cloned().collect()
     }
 
     /// Lines of a quantity for all models, in one variant, raw.
@@ -230,8 +233,7 @@ impl<'a> Overview<'a> {
         variant: &KindReading,
         mut number: impl FnMut(&Subject) -> Option<Estimate>,
     ) -> Vec<PlotLine> {
-        let models = self.models.iter();
-        let lines = models.map(|model| PlotLine {
+        let lines = self.models.iter().map(|model| PlotLine {
             name: self.names.shown(model),
             style: self.style(model),
             content: PanelContent::Curve(self.points(model, variant, None, &mut number)),
@@ -307,8 +309,12 @@ impl<'a> Overview<'a> {
     }
 
     fn n(&self, family: Option<&Family>) -> usize {
-        let items = self.findings.grid.items.iter();
-        items.filter(|item| item.is_of(family)).count()
+        self.findings
+            .grid
+            .items
+            .iter()
+            .filter(|item| item.is_of(family))
+            .count()
     }
 
     fn accuracy(&self) -> Option<(String, Chart)> {

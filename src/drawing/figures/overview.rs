@@ -150,8 +150,11 @@ impl Overview<'_> {
     /// The lines beside a mean over models, other than chance: each model without images, and on raw images the model that is drawn in
     /// black.
     fn beside_a_mean(&self, variant: &KindReading) -> Vec<PlotLine> {
-        let flat = self.flat_lines(None).into_iter();
-        let mut lines: Vec<PlotLine> = flat.filter(|line| line.name != CHANCE).collect();
+        let mut lines: Vec<PlotLine> = self
+            .flat_lines(None)
+            .into_iter()
+            .filter(|line| line.name != CHANCE)
+            .collect();
         let black = self.names.black.as_deref();
         if let Some(model) = black.filter(|model| self.models.contains(model)) {
             let points = self.points(model, variant, None, |subject| {

@@ -29,15 +29,17 @@ pub(crate) fn without_threshold(findings: &Findings<'_>, figure: &str) -> Option
 
 /// The curves of all families together on an axis.
 fn curves_on<'f>(findings: &'f Findings<'_>, axis: Axis) -> impl Iterator<Item = &'f Curve> {
-    let curves = findings.curves.iter();
-    curves.filter(move |curve| curve.family.is_none() && curve.axis() == axis)
+    findings
+        .curves
+        .iter()
+        .filter(move |curve| curve.family.is_none() && curve.axis() == axis)
 }
 
 impl Overview<'_> {
     /// The figure of each axis on which a curve has a threshold.
     pub(super) fn thresholds(&self) -> Vec<Drawing> {
-        let figures = Axis::ALL.into_iter();
-        figures
+        Axis::ALL
+            .into_iter()
             .filter_map(|axis| self.thresholds_on(axis))
             .collect()
     }

@@ -71,8 +71,11 @@ impl Font {
 
     /// Width in points of a text in letters of `size` points.
     pub(super) fn width(&self, text: &str, size: f64) -> f64 {
-        let letters = self.letters(text).into_iter();
-        letters.map(|letter| f64::from(letter.advance)).sum::<f64>() * size
+        self.letters(text)
+            .into_iter()
+            .map(|letter| f64::from(letter.advance))
+            .sum::<f64>()
+            * size
     }
 
     /// The text, or its start and end with "…" between, so that it is no wider than `room` points.

@@ -134,8 +134,10 @@ fn head_lines(head: &str) -> Vec<&str> {
 /// Width in points of the widest name, all on one line.
 fn names_width(table: &Table) -> f64 {
     let font = Font::bundled();
-    let rows = table.rows.iter();
-    let widths = rows.map(|row| font.width(&name(row), LETTERS) * WIDER);
+    let widths = table
+        .rows
+        .iter()
+        .map(|row| font.width(&name(row), LETTERS) * WIDER);
     widths.fold(0.0, f64::max)
 }
 

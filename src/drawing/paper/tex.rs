@@ -89,8 +89,10 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
 /// Room between two rows of axes in points: for the levels, the title of the axis, and the lines of the longest title below.
 fn rows_apart(chart: &Chart, look: &Look, width: f64) -> f64 {
     let font = Font::bundled();
-    let titles = chart.panels.iter();
-    let lines = titles.map(|panel| font.wrapped(&panel.title, look.letters, width).len());
+    let lines = chart
+        .panels
+        .iter()
+        .map(|panel| font.wrapped(&panel.title, look.letters, width).len());
     (6.3 + 1.25 * lines.max().unwrap_or(1) as f64) * look.letters
 }
 

@@ -44,8 +44,9 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
         let light = (&row.variant, row.enhancer.as_ref());
         lights.entry(light).or_default().push(row);
     }
-    let axes = Axis::ALL.into_iter();
-    let panels = axes.flat_map(|axis| PANELS.map(|panel| self::panel(&lights, axis, panel)));
+    let panels = Axis::ALL
+        .into_iter()
+        .flat_map(|axis| PANELS.map(|panel| self::panel(&lights, axis, panel)));
     let panels: Vec<Panel> = panels
         .filter(|panel| panel.lines.iter().any(is_curve))
         .collect();

@@ -21,8 +21,10 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
             models.push(&subject.model);
         }
     }
-    let pairs = findings.pairs.iter();
-    let panels = pairs.flat_map(|pair| models.iter().map(move |model| (pair, *model)));
+    let panels = findings
+        .pairs
+        .iter()
+        .flat_map(|pair| models.iter().map(move |model| (pair, *model)));
     let panels = panels.map(|(pair, model)| {
         let rows = findings.comparisons.iter().filter(|row| {
             row.family.is_none()

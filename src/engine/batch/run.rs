@@ -159,8 +159,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let models = self.run.experiment.models(phase);
         let mut left_out = BTreeSet::new();
         for (_, group) in remaining.plan.groups() {
-            let trials = group.trials.iter();
-            let of_stopped = trials.filter(|trial| {
+            let of_stopped = group.trials.iter().filter(|trial| {
                 self.stopped
                     .has_model(phase, (trial.model, &models[trial.model]))
             });
@@ -173,8 +172,13 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
 
     /// The first error, if all models of a phase are stopped; `None` if one may still be asked.
     fn stopped_phase(&mut self, phase: usize) -> Option<Error> {
-        let mut models = self.run.experiment.models(phase).iter().enumerate();
-        let is_stopped = models.all(|model| self.stopped.has_model(phase, model));
+        let is_stopped = self
+            .run
+            .experiment
+            .models(phase)
+            .iter()
+            .enumerate()
+            .all(|model| self.stopped.has_model(phase, model));
         let errors = is_stopped.then(|| self.stopped.take_errors())?;
         errors.into_iter().next()
     }

@@ -201,8 +201,9 @@ impl AskSettings {
 
     /// Whether a model of this name is shown images.
     pub(crate) fn shows_images_to(&self, id: &ModelName) -> bool {
-        let mut models = self.models.iter();
-        models.any(|model| model.id == *id && model.view == View::Image)
+        self.models
+            .iter()
+            .any(|model| model.id == *id && model.view == View::Image)
     }
 
     /// The endpoints, each once.
@@ -415,8 +416,9 @@ fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
 /// Refuses `--blind-model` with a model of the file: it would be asked at another address, and with other settings than with images.
 fn refuse_models_of_file(entries: &[Entry], blind: &[ModelName]) -> Result<()> {
     for name in blind.iter().map(ModelName::label) {
-        let mut entries = entries.iter();
-        let known = entries.find(|entry| entry.name == name || entry.id.label() == name);
+        let known = entries
+            .iter()
+            .find(|entry| entry.name == name || entry.id.label() == name);
         if let Some(Entry { name, id, .. }) = known
             && matches!(id, ModelName::Remote(_))
         {

@@ -203,10 +203,9 @@ impl Suspect<'_> {
     fn stated(&self, key: &str, variable: &str) -> Option<&Located> {
         let layers = [self.keys.get(key), self.file.defaults.get(key)];
         let names = |located: &&Located| match &located.value {
-            toml::Value::Table(table) => {
-                let mut values = table.values();
-                values.any(|value| value.get("env").and_then(toml::Value::as_str) == Some(variable))
-            }
+            toml::Value::Table(table) => table
+                .values()
+                .any(|value| value.get("env").and_then(toml::Value::as_str) == Some(variable)),
             value => value.as_str() == Some(variable),
         };
         layers.into_iter().flatten().find(names)

@@ -89,8 +89,10 @@ impl<'a> FrameWork<'a> {
     }
 
     fn place(&self, name: &PhotoName) -> Result<usize> {
-        let mut photos = self.photographs.iter();
-        let place = photos.position(|photo| photo.name == *name);
+        let place = self
+            .photographs
+            .iter()
+            .position(|photo| photo.name == *name);
         place.ok_or_else(|| {
             Error::data(
                 &self.frame,

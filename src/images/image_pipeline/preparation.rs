@@ -145,8 +145,8 @@ impl ImagePipeline<'_> {
         }
         let threads = NonZeroUsize::new(cores / count).unwrap_or(NonZeroUsize::MIN);
         let sets = (1..=count).map(|number| {
-            let twins = self.enhancers.iter();
-            twins
+            self.enhancers
+                .iter()
                 .map(|enhancer| enhancer.twin(number, threads))
                 .collect()
         });

@@ -66,8 +66,8 @@ impl Settings {
             None => LightReading::Paper,
             Some(given) => {
                 let word = text("profile", "a str", given)?;
-                let mut readings = LightReading::ALL.into_iter();
-                readings
+                LightReading::ALL
+                    .into_iter()
                     .find(|reading| reading.name().as_str() == word)
                     .ok_or_else(|| {
                         let names = LightReading::ALL.map(LightReading::name);

@@ -144,8 +144,8 @@ fn ladder<'py>(
     let shape = [levels.len()];
     if is_linear {
         let make = |index: usize, clean: &Rgb| -> Vec<Light> {
-            let states = states[index].iter();
-            states
+            states[index]
+                .iter()
                 .map(|state| state.light(clean.into(), &keys[index], noise))
                 .collect()
         };
@@ -155,8 +155,8 @@ fn ladder<'py>(
         if noise == NoiseTerms::All {
             return together(&settings, &levels, clean, &keys[index]);
         }
-        let states = states[index].iter();
-        states
+        states[index]
+            .iter()
             .map(|state| state.image(clean.into(), &keys[index], noise))
             .collect()
     };

@@ -109,8 +109,10 @@ impl PredictedFrame {
     }
 
     fn segments(&self, class: &str) -> impl Iterator<Item = &Segment> {
-        let segments = self.statistics.segments.iter();
-        segments.filter(move |segment| segment.class == class)
+        self.statistics
+            .segments
+            .iter()
+            .filter(move |segment| segment.class == class)
     }
 
     /// The colour of the largest segment of a class: the name of its median, or else the offered name that most of its pixels
@@ -135,8 +137,11 @@ impl PredictedFrame {
     /// nearness is a comparison.
     fn closest(&self, choices: &[String], rules: &Rules) -> Option<usize> {
         let distance = |word: &String| {
-            let mut classes = rules.book().class.iter();
-            let (class, _) = classes.find(|(_, rule)| rule.words.contains(word))?;
+            let (class, _) = rules
+                .book()
+                .class
+                .iter()
+                .find(|(_, rule)| rule.words.contains(word))?;
             let segments = self.segments(class);
             segments
                 .filter_map(|segment| Some(segment.depth?.median))

@@ -19,8 +19,10 @@ fn by_setting(
     camera: &CameraFit,
     series: impl Fn(&SettingFit, LineStyle) -> PointSeries,
 ) -> Vec<PointSeries> {
-    let settings = camera.settings.iter().enumerate();
-    settings
+    camera
+        .settings
+        .iter()
+        .enumerate()
         .map(|(style, fit)| series(fit, LineStyle(style)))
         .collect()
 }

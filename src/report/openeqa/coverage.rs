@@ -6,8 +6,11 @@ use darkqa_score::open::{Group, OpenCell};
 /// Lines with the number of scored answers, and of answers by every other outcome that occurs.
 #[must_use]
 pub(in crate::report) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
-    let cells = report.summary.cells.iter();
-    let all = cells.filter(|cell| cell.group == Group::All);
+    let all = report
+        .summary
+        .cells
+        .iter()
+        .filter(|cell| cell.group == Group::All);
     let sum = |count: fn(&OpenCell) -> usize| -> usize { all.clone().map(count).sum() };
     let (scored, planned) = (sum(OpenCell::scored), sum(|cell| cell.planned));
     let mut lines = vec![format!("{scored} of {planned} answers scored")];

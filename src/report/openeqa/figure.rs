@@ -16,8 +16,11 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     if whole.levels.len() < 2 {
         return Ok(Vec::new());
     }
-    let groups = report.summary.groups().into_iter();
-    let categories = groups.filter(|group| matches!(group, Group::Category(_)));
+    let categories = report
+        .summary
+        .groups()
+        .into_iter()
+        .filter(|group| matches!(group, Group::Category(_)));
     let categories: Vec<Panel> = categories
         .flat_map(|group| panels(report, group, &whole))
         .collect();
@@ -52,8 +55,9 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
 
 /// The panels of a group, one for each axis.
 fn panels(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>) -> Vec<Panel> {
-    let ladders = ladder(report.summary, group).by_axis().into_iter();
-    ladders
+    ladder(report.summary, group)
+        .by_axis()
+        .into_iter()
         .map(|(_, ladder)| panel(report, group, whole, &ladder))
         .collect()
 }

@@ -93,8 +93,9 @@ fn summary(summary: &OpenSummary) -> Table {
 /// The table of each axis.
 fn levels(report: &OpenReport<'_>) -> Vec<Table> {
     let whole = ladder(report.summary, &Group::All);
-    let ladders = whole.by_axis().into_iter();
-    let mut tables: Vec<Table> = ladders
+    let mut tables: Vec<Table> = whole
+        .by_axis()
+        .into_iter()
         .map(|(axis, ladder)| axis_table(report, axis, &ladder))
         .collect();
     if let Some(last) = tables.last_mut() {
@@ -140,8 +141,7 @@ fn axis_table(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>
 
 /// A note for each model without images.
 fn without_images(summary: &OpenSummary, ladder: &Ladder<'_, OpenCell>) -> Vec<String> {
-    let without_level = ladder.without_level.iter();
-    let notes = without_level.map(|(subject, cell)| {
+    let notes = ladder.without_level.iter().map(|(subject, cell)| {
         let text = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
         let interval = cell.score.map(|share| format!(" [{}]", ends(share)));
         let text = text + &interval.unwrap_or_default();

@@ -242,8 +242,11 @@ pub(crate) fn shown_thumbnails<'a>(
     all: &[Thumbnail],
     frames: impl IntoIterator<Item = &'a FrameId>,
 ) -> Vec<Thumbnail> {
-    let frames = frames.into_iter().enumerate();
-    let numbers: HashMap<&str, usize> = frames.map(|(n, frame)| (&*frame.0, n)).collect();
+    let numbers: HashMap<&str, usize> = frames
+        .into_iter()
+        .enumerate()
+        .map(|(n, frame)| (&*frame.0, n))
+        .collect();
     let shown = thumbnails(all, &numbers, SIZE_LIMITS[0].pictures);
     let picture = |thumbnail: &Thumbnail| {
         let number = numbers.get(&*thumbnail.frame.0)?;

@@ -127,8 +127,9 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
     ["enhancers", "variants", "models"]
         .into_iter()
         .find_map(|wanted| {
-            let mut charts = panels.charts.iter();
-            charts
+            panels
+                .charts
+                .iter()
                 .find(|(name, chart)| *name == wanted && chart.is_ok())
                 .and_then(|(_, chart)| chart.as_ref().ok())
         })

@@ -79,8 +79,9 @@ impl RunUsage {
             ("latency", format!("median {median}, 95 % within {most}")),
             ("served as", served.join(", ")),
         ];
-        let rows = rows.into_iter();
-        rows.map(|(name, value)| (name.to_owned(), value)).collect()
+        rows.into_iter()
+            .map(|(name, value)| (name.to_owned(), value))
+            .collect()
     }
 }
 

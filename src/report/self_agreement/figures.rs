@@ -55,8 +55,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
     let mut figures = Vec::new();
     for (name, caption, measure, panels) in charts {
         let has_points = |panel: &Panel| {
-            let mut lines = panel.lines.iter();
-            lines.any(
+            panel.lines.iter().any(
                 |line| matches!(&line.content, PanelContent::Curve(points) if !points.is_empty()),
             )
         };

@@ -82,16 +82,20 @@ pub(crate) fn choice_rows(
     variant: &KindReading,
     run: &RunLink,
 ) -> Vec<ChoiceRow> {
-    let subjects = findings.grid.subjects.iter();
-    let seeing = subjects.filter(|subject| subject.view == Some(View::Image));
+    let seeing = findings
+        .grid
+        .subjects
+        .iter()
+        .filter(|subject| subject.view == Some(View::Image));
     let mut models: Vec<&str> = Vec::new();
     for subject in seeing {
         if !models.contains(&&*subject.model) {
             models.push(&subject.model);
         }
     }
-    let rows = models.into_iter();
-    rows.map(|model| row(findings, variant, model, run))
+    models
+        .into_iter()
+        .map(|model| row(findings, variant, model, run))
         .collect()
 }
 
@@ -103,8 +107,7 @@ fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLin
         let cell = summary.cell(&grid.subjects[index], None, ReadingMode::Strict)?;
         cell.accuracy
     });
-    let mut curves = findings.curves.iter();
-    let curve: Option<&Curve> = curves.find(|curve| {
+    let curve: Option<&Curve> = findings.curves.iter().find(|curve| {
         curve.model == model
             && curve.variant == *variant
             && curve.enhancer.is_none()
@@ -112,14 +115,16 @@ fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLin
     });
     let darkest = curve.map(|curve| curve.summary.darkest);
     let of = |kind| {
-        let comparisons = findings.comparisons.iter();
-        comparisons.filter(move |comparison: &&Comparison| {
-            let first = &comparison.first;
-            comparison.kind == kind
-                && comparison.family.is_none()
-                && first.model == model
-                && first.variant == *variant
-        })
+        findings
+            .comparisons
+            .iter()
+            .filter(move |comparison: &&Comparison| {
+                let first = &comparison.first;
+                comparison.kind == kind
+                    && comparison.family.is_none()
+                    && first.model == model
+                    && first.variant == *variant
+            })
     };
     let change = of(ComparisonKind::Level).find(|found| found.first.level == darkest);
     let gains = of(ComparisonKind::Enhancer);

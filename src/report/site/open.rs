@@ -69,8 +69,9 @@ pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
 /// The rows as a table for files, with a line for each level.
 pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[OpenRow]) -> Table {
     let lines = rows.iter().flat_map(|row| {
-        let levels = row.levels.iter();
-        levels.map(move |(level, cell)| (row, level.to_string(), *cell))
+        row.levels
+            .iter()
+            .map(move |(level, cell)| (row, level.to_string(), *cell))
     });
     let blind = rows.iter().filter_map(|row| {
         let score = row.blind?;

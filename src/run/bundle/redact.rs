@@ -135,8 +135,10 @@ impl Redactor {
         if self.keys.iter().any(|key| text.contains(key)) {
             return Some("a key of the environment");
         }
-        let mut places = self.places.iter();
-        let is_leaked = places.any(|place| found(text, place).next().is_some());
+        let is_leaked = self
+            .places
+            .iter()
+            .any(|place| found(text, place).next().is_some());
         is_leaked.then_some("a path of this machine")
     }
 
@@ -224,8 +226,8 @@ impl Redactor {
 
 /// Whether a text is an absolute path, of this or another system.
 fn is_absolute(text: &str) -> bool {
-    let mut letters = text.chars();
-    let drive = letters
+    let drive = text
+        .chars()
         .next()
         .is_some_and(|letter| letter.is_ascii_alphabetic());
     let is_drive = drive && (text[1..].starts_with(":\\") || text[1..].starts_with(":/"));

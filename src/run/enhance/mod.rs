@@ -175,8 +175,8 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
 
 /// Images that stand for all. One that cannot be read is named when its turn comes.
 fn sample(images: &Inputs) -> Vec<Rgb> {
-    let sample = evenly(images.entries.len(), FRAMES).into_iter();
-    sample
+    evenly(images.entries.len(), FRAMES)
+        .into_iter()
         .filter_map(|place| images.picture(&images.entries[place]).ok()?.decode().ok())
         .collect()
 }

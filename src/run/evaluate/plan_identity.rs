@@ -60,8 +60,9 @@ fn light(config: &Evaluation) -> impl Iterator<Item = (String, Value)> {
         values.into_iter().flat_map(move |(name, content)| {
             let place = format!("{column} {name}");
             let settings = content.as_object().cloned().unwrap_or_default();
-            let settings = settings.into_iter();
-            settings.map(move |(flag, value)| (format!("{flag} of the {place}"), value))
+            settings
+                .into_iter()
+                .map(move |(flag, value)| (format!("{flag} of the {place}"), value))
         })
     });
     version.chain(columns).collect::<Vec<_>>().into_iter()

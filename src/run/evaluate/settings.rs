@@ -208,8 +208,9 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
         return Err(Error::usage("--model", problem));
     }
     let sees = |name: &str| {
-        let mut models = models.iter();
-        models.any(|model| model.name == name && model.view == View::Image)
+        models
+            .iter()
+            .any(|model| model.name == name && model.view == View::Image)
     };
     if let Some(blind) = models.iter().find(|model| !sees(&model.name)) {
         let problem = format_args!(

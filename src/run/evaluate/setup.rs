@@ -87,8 +87,8 @@ impl<'a> ChoiceSetup<'a> {
         let mut sources = if shows_images {
             inspect_all(&dataset, &questions, progress)?
         } else {
-            let frames = first_asked(&questions).into_iter();
-            frames
+            first_asked(&questions)
+                .into_iter()
                 .map(|question| Source::unseen(question.frame.clone()))
                 .collect()
         };
@@ -264,8 +264,9 @@ fn file_places(
 
 /// The digest of the file of each source, or of all its files.
 fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
-    let sources = sources.iter();
-    let digests = sources.filter_map(|source| Some((source.name.clone(), source.digest()?)));
+    let digests = sources
+        .iter()
+        .filter_map(|source| Some((source.name.clone(), source.digest()?)));
     digests.collect()
 }
 

@@ -197,8 +197,9 @@ fn part_of_frames(
     let mut own: Vec<&FrameId> = asked.into_iter().collect();
     keep_part(&mut own, shard)?;
     let own: BTreeSet<&FrameId> = own.into_iter().collect();
-    let questions = questions.iter();
-    let own = questions.filter(|question| own.contains(&question.frame));
+    let own = questions
+        .iter()
+        .filter(|question| own.contains(&question.frame));
     Ok(own.cloned().collect())
 }
 

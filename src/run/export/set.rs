@@ -232,8 +232,10 @@ fn llava(file: &str, question: &Question) -> Value {
 
 /// The choices, one line each with its letter.
 fn lettered(choices: &Choices) -> String {
-    let lines = choices.texts().iter().enumerate();
-    lines
+    choices
+        .texts()
+        .iter()
+        .enumerate()
         .map(|(i, text)| format!("{}. {text}", letter(i)))
         .collect::<Vec<_>>()
         .join("\n")

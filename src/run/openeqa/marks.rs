@@ -61,13 +61,15 @@ pub(super) fn marks(
             });
         }
     }
-    let walks = by_walk.into_iter().enumerate();
-    let plan = walks.map(|(source, trials)| SourcePlan {
-        source,
-        groups: vec![TrialGroup {
-            condition: None,
-            trials,
-        }],
-    });
+    let plan = by_walk
+        .into_iter()
+        .enumerate()
+        .map(|(source, trials)| SourcePlan {
+            source,
+            groups: vec![TrialGroup {
+                condition: None,
+                trials,
+            }],
+        });
     Ok(plan.collect())
 }

@@ -21,8 +21,10 @@ pub(super) fn answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenItem>>
     for question in &setup.questions {
         by_walk.entry(&question.episode).or_default().push(question);
     }
-    let walks = setup.sources.iter().enumerate();
-    walks
+    setup
+        .sources
+        .iter()
+        .enumerate()
         .map(|(source, walk)| {
             let questions = by_walk.remove(&*walk.name.0).unwrap_or_default();
             let conditions = std::iter::once(None).chain(setup.conditions.iter().map(Some));

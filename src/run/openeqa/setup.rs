@@ -110,8 +110,10 @@ impl<'a> OpenSetup<'a> {
 
     /// The index in `sources` of the walk of a question.
     pub(super) fn walk_of(&self, question: &OpenQuestion) -> usize {
-        let mut sources = self.sources.iter();
-        let place = sources.position(|source| source.name.0 == question.episode);
+        let place = self
+            .sources
+            .iter()
+            .position(|source| source.name.0 == question.episode);
         place.unwrap_or_default()
     }
 

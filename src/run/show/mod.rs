@@ -62,8 +62,9 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
             .filter(|answer| answer.shown == source)
             .collect();
         let asked = |condition: &&Condition| {
-            let mut answers = answers.iter();
-            answers.any(|answer| answer.condition.as_ref() == Some(condition))
+            answers
+                .iter()
+                .any(|answer| answer.condition.as_ref() == Some(condition))
         };
         let conditions: Vec<Condition> = conditions.iter().filter(asked).cloned().collect();
         if source != item.source && !conditions.is_empty() {

@@ -159,8 +159,7 @@ impl SheetItem {
     /// The rows of the picture: raw, and with each enhancer with which the item was asked.
     fn rows(&self) -> SheetRows {
         let row = |name: String, enhancer: Option<_>| {
-            let levels = self.levels.iter();
-            let conditions = levels.map(|level| {
+            let conditions = self.levels.iter().map(|level| {
                 let fits = |condition: &&Condition| {
                     let variant = condition.kind_reading();
                     condition.level() == *level
@@ -172,8 +171,11 @@ impl SheetItem {
             (name, conditions.collect())
         };
         let raw = row(self.curves.light.clone(), None);
-        let enhancers = self.curves.enhancers.iter();
-        let enhanced = enhancers.map(|name| row(format!("+ {name}"), Some(name)));
+        let enhanced = self
+            .curves
+            .enhancers
+            .iter()
+            .map(|name| row(format!("+ {name}"), Some(name)));
         let is_asked = |(_, conditions): &(String, Vec<Option<Condition>>)| {
             conditions.iter().any(Option::is_some)
         };

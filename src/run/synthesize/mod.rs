@@ -199,8 +199,12 @@ fn files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
     if let Some(sheet) = making.args.sheet {
         return vec![FrameFile::Sheet(sheet)];
     }
-    let degradations = making.light.degradations().into_iter();
-    degradations.map(FrameFile::Image).collect()
+    making
+        .light
+        .degradations()
+        .into_iter()
+        .map(FrameFile::Image)
+        .collect()
 }
 
 /// Writes all files of one frame.

@@ -119,10 +119,15 @@ fn foot(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) ->
 
 /// Camera and seed in words.
 fn camera(light: &LightSettings) -> String {
-    let mut readings = light.kinds.sensor.readings.iter();
-    let camera = readings.next().map_or_else(String::new, |(_, synthesis)| {
-        synthesis.camera.name().to_owned()
-    });
+    let camera = light
+        .kinds
+        .sensor
+        .readings
+        .iter()
+        .next()
+        .map_or_else(String::new, |(_, synthesis)| {
+            synthesis.camera.name().to_owned()
+        });
     format!("{camera}, seed {}", light.kinds.sensor.seed)
 }
 

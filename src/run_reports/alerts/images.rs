@@ -45,8 +45,10 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
 /// The names of the models that are asked at no endpoint.
 fn built_in(combined: &Combined) -> BTreeSet<&str> {
     let is_built_in = |model: &str| {
-        let mut runs = combined.runs.iter();
-        runs.any(|run| run.manifest.is_built_in(without_run(model)))
+        combined
+            .runs
+            .iter()
+            .any(|run| run.manifest.is_built_in(without_run(model)))
     };
     let asked = combined.trials.asked().into_iter().flatten();
     asked

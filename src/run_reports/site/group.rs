@@ -207,8 +207,9 @@ pub(super) fn grouped<M>(members: Vec<M>, key: impl Fn(&M) -> &GroupKey) -> Vec<
     let mut groups: Vec<Vec<M>> = Vec::new();
     for member in members {
         let own = key(&member);
-        let mut known = groups.iter_mut();
-        let group = known.find(|group| group.iter().all(|other| key(other).is_same(own)));
+        let group = groups
+            .iter_mut()
+            .find(|group| group.iter().all(|other| key(other).is_same(own)));
         match group {
             Some(group) => group.push(member),
             None => groups.push(vec![member]),

@@ -170,8 +170,7 @@ fn add_open(run: StoredRun<OpenDetail>, link: RunLink, site: &mut Site) -> Resul
 
 /// The page among the files of a report.
 fn page_of(files: Vec<(String, Vec<u8>)>) -> Result<Vec<u8>> {
-    let mut files = files.into_iter();
-    let page = files.find(|(name, _)| name == PAGE);
+    let page = files.into_iter().find(|(name, _)| name == PAGE);
     let page = page.ok_or_else(|| Error::data(PAGE, "the report of the run has no page"))?;
     Ok(page.1)
 }

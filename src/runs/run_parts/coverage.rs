@@ -79,8 +79,10 @@ impl Coverage {
 
     /// The places of the sources that are in no part.
     pub(super) fn gaps(&self) -> impl Iterator<Item = usize> {
-        let places = self.trials.iter().enumerate();
-        places.filter_map(|(place, trials)| trials.is_none().then_some(place))
+        self.trials
+            .iter()
+            .enumerate()
+            .filter_map(|(place, trials)| trials.is_none().then_some(place))
     }
 
     /// The shards that no part is of and that have what is missing. Of several divisions it is the one with the fewest such shards;

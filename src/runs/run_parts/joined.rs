@@ -87,7 +87,9 @@ impl<D: Detail> RunParts<D> {
 
     /// The folder and the manifest of each part, by their numbers.
     pub(crate) fn manifests(&self) -> Vec<(&Path, &RunManifest)> {
-        let parts = self.parts.iter();
-        parts.map(|part| (&*part.folder, &part.manifest)).collect()
+        self.parts
+            .iter()
+            .map(|part| (&*part.folder, &part.manifest))
+            .collect()
     }
 }

@@ -61,8 +61,9 @@ impl StoredPart {
         let mut columns = self.manifest.columns.iter();
         columns.all(|(column, values)| {
             let known = other.manifest.columns.get(column);
-            let mut values = values.keys();
-            values.all(|value| known.is_some_and(|known| known.contains_key(value)))
+            values
+                .keys()
+                .all(|value| known.is_some_and(|known| known.contains_key(value)))
         })
     }
 }

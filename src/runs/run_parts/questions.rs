@@ -52,8 +52,10 @@ impl PartQuestions {
 
     /// The questions without their evidence, in order.
     pub(crate) fn into_questions(self) -> Vec<RunQuestion> {
-        let questions = self.0.into_iter();
-        questions.map(|question| question.question).collect()
+        self.0
+            .into_iter()
+            .map(|question| question.question)
+            .collect()
     }
 
     /// Copies their lines into a run.

@@ -213,8 +213,9 @@ impl RunPlan {
         let own = self.part(shard);
         let share = |of: &dyn Fn(&PlannedFrame) -> Option<f64>| {
             let sum = |frames: &[PlannedFrame]| {
-                let mut frames = frames.iter();
-                frames.try_fold(0.0, |sum, frame| Some(sum + of(frame)?))
+                frames
+                    .iter()
+                    .try_fold(0.0, |sum, frame| Some(sum + of(frame)?))
             };
             let whole = sum(&self.frames)?;
             Some(sum(&self.frames[own.clone()])? / whole).filter(|_| whole > 0.0)

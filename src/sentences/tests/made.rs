@@ -309,8 +309,9 @@ fn a_model_with_part_of_the_questions_changes_nothing_about_others() {
     let part = asked("part", 3, &levels);
     let with_part = said(&[two.clone(), part].concat());
     let but_best = |said: &[Sentence]| -> Vec<String> {
-        let all = about_others(said).into_iter();
-        all.filter(|said| !said.contains("the highest mean accuracy"))
+        about_others(said)
+            .into_iter()
+            .filter(|said| !said.contains("the highest mean accuracy"))
             .collect()
     };
     assert_eq!(but_best(&with_part), but_best(&said(&two)));

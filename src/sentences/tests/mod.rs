@@ -80,8 +80,9 @@ fn parsed(kind: PooledKind, difference: f64, verdict: Significance) -> PooledDif
 }
 
 fn findings(kind: PooledKind, all: &[(f64, Significance)]) -> Vec<PooledFinding> {
-    let all = all.iter().enumerate();
-    all.map(|(i, (difference, verdict))| finding(kind, i + 1, *difference, *verdict))
+    all.iter()
+        .enumerate()
+        .map(|(i, (difference, verdict))| finding(kind, i + 1, *difference, *verdict))
         .collect()
 }
 

@@ -223,8 +223,10 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
             *counts.kinds.entry(claim.kind).or_default() += 1;
         }
         let whole = || {
-            let pooled = findings.pooled.iter();
-            pooled.filter(|finding| finding.family.as_ref() == finding.kind.only_family())
+            findings
+                .pooled
+                .iter()
+                .filter(|finding| finding.family.as_ref() == finding.kind.only_family())
         };
         counts.own += usize::from(whole().any(|finding| finding.strict.verdict.is_shown()));
         let is_decided = findings

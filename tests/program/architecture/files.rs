@@ -61,8 +61,9 @@ impl Files {
 
     /// All parts of all files.
     pub(crate) fn parts(&self) -> impl Iterator<Item = (&Source, &Part)> {
-        let sources = self.sources.iter();
-        sources.flat_map(|source| source.parts.iter().map(move |part| (source, part)))
+        self.sources
+            .iter()
+            .flat_map(|source| source.parts.iter().map(move |part| (source, part)))
     }
 
     /// The parts outside of tests.
@@ -73,8 +74,8 @@ impl Files {
 
     /// The rooms: the folders and files beside `lib.rs`.
     pub(crate) fn rooms(&self) -> BTreeSet<&str> {
-        let modules = self.places.keys();
-        modules
+        self.places
+            .keys()
             .filter_map(|module| Some(module.first()?.as_str()))
             .collect()
     }

@@ -190,8 +190,10 @@ fn white_must_be_known() {
 fn white_is_held_against_the_codes() {
     let warnings = |bench: &Bench, white: u16| -> Vec<String> {
         let found = measured(bench, &format!("cam --white {white}"));
-        let lines = found["warnings"].as_array().unwrap().iter();
-        lines
+        found["warnings"]
+            .as_array()
+            .unwrap()
+            .iter()
             .map(|line| line.as_str().unwrap().to_owned())
             .collect()
     };

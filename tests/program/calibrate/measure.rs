@@ -57,9 +57,10 @@ fn row(camera: &str, gain: f64, bias: usize, pairs: usize) {
                 scale_off += (value - truth) / scale / RUNS as f64;
             }
         }
-        let planes = sensor.state.bias.iter().enumerate();
-        let off = planes
-            .map(|(plane, truth)| (number(setting, &format!("/bias/{plane}/value")) - truth).abs());
+        let off =
+            sensor.state.bias.iter().enumerate().map(|(plane, truth)| {
+                (number(setting, &format!("/bias/{plane}/value")) - truth).abs()
+            });
         squares[4] += off.fold(0.0, f64::max).powi(2) / RUNS as f64;
     }
     let [gain_error, scale, shape, row, offset] = squares.map(f64::sqrt);

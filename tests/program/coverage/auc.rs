@@ -44,8 +44,9 @@ struct AucDesign {
 impl AucDesign {
     /// Conditions: five levels, each with noise, by exposure drop alone, and enhanced.
     fn names(&self) -> Vec<Condition> {
-        let variants = ["L{}-noise", "L{}-ev", "L{}-noise+e"].into_iter();
-        let names = variants.flat_map(|variant| (1..=5).map(move |level| (variant, level)));
+        let names = ["L{}-noise", "L{}-ev", "L{}-noise+e"]
+            .into_iter()
+            .flat_map(|variant| (1..=5).map(move |level| (variant, level)));
         let names =
             names.map(|(variant, level)| variant.replace("{}", &f64::to_string(&level.into())));
         let names = names.map(|name| name.parse().unwrap());

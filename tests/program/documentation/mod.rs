@@ -283,8 +283,9 @@ fn the_readme_is_one_page_and_works_in_a_clone() {
     let lines = readme.text.lines().count();
     assert!(words < 1200 && lines <= 120, "{words} words, {lines} lines");
     // Links to this repository are relative, so that they work in a clone; `.ci/absolute_links.py` changes them for package indexes.
-    let links = readme.links().into_iter();
-    let absolute: Vec<(usize, &str)> = links
+    let absolute: Vec<(usize, &str)> = readme
+        .links()
+        .into_iter()
         .filter(|(_, link)| link.contains("github.com/darkqa-eval"))
         .collect();
     assert!(absolute.is_empty(), "{absolute:?}");

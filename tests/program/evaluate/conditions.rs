@@ -150,8 +150,8 @@ fn the_reference_run_is_made_again() {
     ));
     let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
     let by_key = |run: &Path| -> BTreeMap<String, Value> {
-        let records = records(run).into_iter();
-        records
+        records(run)
+            .into_iter()
             .map(|record| (record["key"].to_string(), record))
             .collect()
     };

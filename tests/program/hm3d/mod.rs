@@ -32,8 +32,10 @@ fn walks(house: &House) {
 
 fn names(list: &Value) -> Vec<(String, String)> {
     let text = |value: &Value| value.as_str().unwrap().to_owned();
-    let list = list.as_array().unwrap().iter();
-    list.map(|entry| (text(&entry["name"]), text(&entry["why"])))
+    list.as_array()
+        .unwrap()
+        .iter()
+        .map(|entry| (text(&entry["name"]), text(&entry["why"])))
         .collect()
 }
 

@@ -139,8 +139,7 @@ impl Set {
             .enumerate()
             .map(|(place, asked)| {
                 let seen = look(place, asked);
-                let questions = asked.questions.iter();
-                let scores = questions.map(|question| {
+                let scores = asked.questions.iter().map(|question| {
                     let guess = 1.0 / question.choices.len() as f64;
                     match answer(asked, &seen, question) {
                         None => (guess, guess, 0),

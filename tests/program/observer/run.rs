@@ -165,8 +165,9 @@ fn the_rules_make_the_questions_and_the_answers_alike() {
     assert_ne!(rules, own);
     bench.file("own.toml", own);
     let evidence = |run: &str| -> usize {
-        let all = records(&bench.path(run)).into_iter();
-        all.filter(|record| record["observed"]["from"] == "evidence")
+        records(&bench.path(run))
+            .into_iter()
+            .filter(|record| record["observed"]["from"] == "evidence")
             .count()
     };
     bench.complete(&words(&format!("{RUN} --out built-in")));

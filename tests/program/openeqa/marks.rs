@@ -33,8 +33,10 @@ fn marks_come_to_upstreams_score() {
         judge.base_url()
     )));
     assert_eq!(called.code, Some(0), "{called:?}");
-    let records = records(&house.0.path("run")).into_iter();
-    let degraded: Vec<Value> = records.filter(|record| record["level"] == "L2").collect();
+    let degraded: Vec<Value> = records(&house.0.path("run"))
+        .into_iter()
+        .filter(|record| record["level"] == "L2")
+        .collect();
     assert_eq!(
         (&degraded[0]["ev"], &degraded[0]["reading"]),
         (&json!(4.0), &json!("paper"))
@@ -199,8 +201,10 @@ fn a_model_that_is_gone_keeps_nobody_elses_answers_from_their_marks() {
     assert_eq!(called.code, Some(1), "{called:?}");
     assert!(called.stdout.contains("no such model"), "{}", called.stdout);
     let summary = house.read("run/summary.json");
-    let mut rows = summary["rows"].as_array().unwrap().iter();
-    let row = rows
+    let row = summary["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
         .find(|row| row["model"] == "m" && row["by"] == "all")
         .unwrap();
     assert_eq!((&row["value"], &row["n"]), (&json!(1.0), &json!(3)));

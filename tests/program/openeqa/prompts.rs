@@ -20,8 +20,10 @@ fn prompt_text(request: &Value) -> String {
     if let Some(text) = content.as_str() {
         return text.to_owned();
     }
-    let parts = content.as_array().unwrap().iter();
-    parts
+    content
+        .as_array()
+        .unwrap()
+        .iter()
         .map(|part| part["text"].as_str().unwrap_or("[image]"))
         .collect()
 }

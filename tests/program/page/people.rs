@@ -47,8 +47,11 @@ fn people_can_answer() {
     browser.go(&url);
     browser.wait("document.querySelector('#count')?.textContent === '3 of 6'");
     let images = format!("{}/images/", bench.path("pack").display());
-    let complaints = browser.complaints(&url).into_iter();
-    let strange: Vec<String> = complaints.filter(|url| !url.contains(&images)).collect();
+    let strange: Vec<String> = browser
+        .complaints(&url)
+        .into_iter()
+        .filter(|url| !url.contains(&images))
+        .collect();
     assert_eq!(strange, Vec::<String>::new());
 }
 
@@ -96,7 +99,10 @@ fn people_can_answer_in_their_own_words() {
         called.stdout
     );
     let images = format!("{}/images/", house.0.path("study").display());
-    let complaints = browser.complaints(&url).into_iter();
-    let strange: Vec<String> = complaints.filter(|url| !url.contains(&images)).collect();
+    let strange: Vec<String> = browser
+        .complaints(&url)
+        .into_iter()
+        .filter(|url| !url.contains(&images))
+        .collect();
     assert_eq!(strange, Vec::<String>::new());
 }

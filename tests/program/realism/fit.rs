@@ -11,8 +11,12 @@ fn number(value: &Value) -> f64 {
 
 /// The fits of a summary under a light reading, pair by pair.
 fn fits<'s>(summary: &'s Value, reading: &str) -> &'s [Value] {
-    let mut fits = summary["fits"].as_array().unwrap().iter();
-    let fit = fits.find(|fit| fit["reading"] == reading).unwrap();
+    let fit = summary["fits"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|fit| fit["reading"] == reading)
+        .unwrap();
     fit["pairs"].as_array().unwrap()
 }
 
@@ -210,8 +214,11 @@ fn the_fitted_camera_is_read_again_and_gives_the_same_numbers() {
         let again: Value = serde_json::from_str(&again).unwrap();
         let fitted = fs::read_to_string(bench.path("out/summary.json")).unwrap();
         let fitted: Value = serde_json::from_str(&fitted).unwrap();
-        let mut rows = fitted["noise"].as_array().unwrap().iter();
-        let row = rows.find(|row| row["reading"] == reading && row["camera"] == "same-pairs");
+        let row = fitted["noise"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|row| row["reading"] == reading && row["camera"] == "same-pairs");
         for name in ["psnr", "ssim", "kl", "differences"] {
             assert_eq!(
                 row.unwrap()[name],

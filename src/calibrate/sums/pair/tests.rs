@@ -208,8 +208,9 @@ fn a_pattern_of_light_cancels_at_equal_light() {
     let hot = HotPixels::none(layout.plane_rows());
     let light = |site: usize| 4000.0 + 20.0 * (site % layout.width) as f64;
     let lit = |seed: u64, factor: f64| -> Vec<u16> {
-        let noise = frame(layout, seed, 500, 9).into_iter().enumerate();
-        noise
+        frame(layout, seed, 500, 9)
+            .into_iter()
+            .enumerate()
             .map(|(site, code)| code + (factor * light(site)).round() as u16)
             .collect()
     };

@@ -67,8 +67,7 @@ pub(super) fn chosen(
             let problem = format_args!("{place}: no configurations to choose {name:?} from{note}");
             return Err(Error::usage("--read config", problem));
         }
-        let files = by_kind(tree, files)?.into_iter();
-        let candidates = files.map(|path| Candidate {
+        let candidates = by_kind(tree, files)?.into_iter().map(|path| Candidate {
             split: splits::split_in_name(&path),
             config: String::new(),
             path,

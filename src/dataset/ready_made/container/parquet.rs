@@ -132,10 +132,11 @@ fn length(field: &Field) -> usize {
             .map(|(_, field)| length(field))
             .sum(),
         Field::ListInternal(list) => list.elements().iter().map(length).sum(),
-        Field::MapInternal(map) => {
-            let pairs = map.entries().iter();
-            pairs.map(|(key, value)| length(key) + length(value)).sum()
-        }
+        Field::MapInternal(map) => map
+            .entries()
+            .iter()
+            .map(|(key, value)| length(key) + length(value))
+            .sum(),
         _ => size_of::<u64>(),
     }
 }

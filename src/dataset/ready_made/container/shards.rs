@@ -49,8 +49,9 @@ mod tests {
     #[test]
     fn a_missing_shard_is_named() {
         let files = |numbers: &[usize]| {
-            let numbers = numbers.iter();
-            let files = numbers.map(|n| PathBuf::from(format!("d/test-0000{n}-of-00003.jsonl.gz")));
+            let files = numbers
+                .iter()
+                .map(|n| PathBuf::from(format!("d/test-0000{n}-of-00003.jsonl.gz")));
             files.collect::<Vec<PathBuf>>()
         };
         assert!(check_shards(&files(&[0, 1, 2])).is_ok());

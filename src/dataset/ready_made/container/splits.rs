@@ -68,8 +68,9 @@ pub(super) fn chosen(
         }
     };
     let split = split.map(str::to_owned);
-    let files = files.into_iter();
-    let of_split = files.filter(|file| split.as_ref().is_none_or(|split| file.split == *split));
+    let of_split = files
+        .into_iter()
+        .filter(|file| split.as_ref().is_none_or(|split| file.split == *split));
     Ok(of_split.collect())
 }
 

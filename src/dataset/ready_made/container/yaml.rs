@@ -17,8 +17,8 @@ impl Yaml {
         let Self::Fields(fields) = self else {
             return None;
         };
-        let mut fields = fields.iter();
         fields
+            .iter()
             .find(|(field, _)| field == name)
             .map(|(_, value)| value)
     }

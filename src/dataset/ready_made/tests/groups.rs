@@ -31,8 +31,9 @@ fn made(rows: &[Map<String, Value>]) -> (tempfile::TempDir, std::path::PathBuf) 
 
 /// Name and size of the group of each question.
 fn groups(dataset: &Dataset) -> Vec<Option<(&str, usize)>> {
-    let questions = dataset.questions().iter();
-    questions
+    dataset
+        .questions()
+        .iter()
         .map(|question| {
             let group = question.group.as_ref();
             group.map(|group| (&*group.name, group.size))

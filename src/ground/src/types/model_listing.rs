@@ -135,8 +135,9 @@ impl ModelListing {
 
     /// The enhancers with known training data, each with `trained on DATA`.
     pub fn trainings(&self) -> impl Iterator<Item = (&str, String)> {
-        let training = self.training.iter();
-        training.map(|(enhancer, data)| (&**enhancer, format!("trained on {data}")))
+        self.training
+            .iter()
+            .map(|(enhancer, data)| (&**enhancer, format!("trained on {data}")))
     }
 
     /// `trained on DATA` of an enhancer; `None` if its training data are unknown.

@@ -99,8 +99,8 @@ fn libraries_outside_of_their_places_are_found() {
 #[test]
 fn digests_of_debug_output_are_found() {
     let rule = |files: &Files| {
-        let makers = digests::makers(files).into_iter();
-        makers
+        digests::makers(files)
+            .into_iter()
             .map(|(file, name, has_debug)| format!("{file} {name} {has_debug}"))
             .collect()
     };
