@@ -57,8 +57,11 @@ fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
 /// Whether the text of a field looks like a secret: it begins as a key does, or its field holds nothing else, or has a telling name and
 /// a long text of letters and digits.
 fn is_secret(name: &str, text: &str) -> bool {
-    let letters = name.chars().filter(char::is_ascii_alphanumeric);
-    let letters: String = letters.collect::<String>().to_lowercase();
+    let letters: String = name
+        .chars()
+        .filter(char::is_ascii_alphanumeric)
+        .collect::<String>()
+        .to_lowercase();
     let named = !text.is_empty() && SECRETS.iter().any(|end| letters.ends_with(end));
     let in_key = |c: char| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c);
     let long = text.len() >= LONG

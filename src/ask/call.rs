@@ -112,16 +112,21 @@ impl<'a> Message<'a> {
                 }
                 is_place
             });
-            let parts = pieces.into_iter().map(|piece| match piece {
-                MarkedPiece::Words(words) => MessagePart::Words(words),
-                MarkedPiece::Image(index) => MessagePart::Image(&self.images[index]),
-            });
-            parts.collect::<Vec<_>>()
+            pieces
+                .into_iter()
+                .map(|piece| match piece {
+                    MarkedPiece::Words(words) => MessagePart::Words(words),
+                    MarkedPiece::Image(index) => MessagePart::Image(&self.images[index]),
+                })
+                .collect::<Vec<_>>()
         };
         let [before, behind] = [of_text(self.before), of_text(self.behind)];
-        let others = self.images.iter().zip(is_shown);
-        let others = others.filter(|(_, is_shown)| !is_shown);
-        let others = others.map(|(image, _)| MessagePart::Image(image));
+        let others = self
+            .images
+            .iter()
+            .zip(is_shown)
+            .filter(|(_, is_shown)| !is_shown)
+            .map(|(image, _)| MessagePart::Image(image));
         before.into_iter().chain(others).chain(behind).collect()
     }
 }
@@ -169,11 +174,14 @@ mod tests {
             behind,
             places,
         };
-        let parts = message.parts().into_iter().map(|part| match part {
-            MessagePart::Words(words) => words.to_owned(),
-            MessagePart::Image(image) => image.facts().width.to_string(),
-        });
-        parts.collect()
+        message
+            .parts()
+            .into_iter()
+            .map(|part| match part {
+                MessagePart::Words(words) => words.to_owned(),
+                MessagePart::Image(image) => image.facts().width.to_string(),
+            })
+            .collect()
     }
 
     #[test]

@@ -61,8 +61,9 @@ impl Complaint {
 
     /// The error in the field `error`; flat shapes are not read.
     pub(super) fn in_error(body: &Value) -> Option<Self> {
-        let error = body.get("error").filter(|error| is_filled(error));
-        error.map(Self::from_error)
+        body.get("error")
+            .filter(|error| is_filled(error))
+            .map(Self::from_error)
     }
 
     /// The error in the value of a field `error`.
@@ -134,9 +135,11 @@ impl Complaint {
     /// Whether the limit that was reached resets once a day.
     pub(super) fn is_daily(&self) -> bool {
         let message = self.message.to_lowercase();
-        let limits = self.limits.iter().map(|limit| limit.to_lowercase());
-        let mut texts = limits.chain([message]);
-        texts.any(|text| DAILY.iter().any(|words| text.contains(words)))
+        self.limits
+            .iter()
+            .map(|limit| limit.to_lowercase())
+            .chain([message])
+            .any(|text| DAILY.iter().any(|words| text.contains(words)))
     }
 
     /// The error in the body of a refused request: JSON, an HTML page or plain text.
@@ -167,9 +170,13 @@ impl Complaint {
 
     /// The message, the codes and the causes, in lower case.
     pub(super) fn texts(&self) -> Vec<String> {
-        let codes = [&self.code, &self.kind].into_iter().flatten();
-        let texts = codes.chain(&self.reasons).chain([&self.message]);
-        texts.map(|text| text.to_lowercase()).collect()
+        [&self.code, &self.kind]
+            .into_iter()
+            .flatten()
+            .chain(&self.reasons)
+            .chain([&self.message])
+            .map(|text| text.to_lowercase())
+            .collect()
     }
 
     /// The error code as an HTTP status; `None` if it is not one from 400 to 599.
@@ -259,9 +266,12 @@ fn object_in(text: &str) -> Option<Value> {
 
 /// The field that a list of `detail` or of errors points to: the last part of its first `loc`.
 fn located(error: &Value) -> Option<String> {
-    let list = [error.get("detail"), Some(error)].into_iter().flatten();
-    let mut items = list.filter_map(Value::as_array).flatten();
-    items.find_map(|item| text_or_number(item.get("loc")?.as_array()?.last()?))
+    [error.get("detail"), Some(error)]
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_array)
+        .flatten()
+        .find_map(|item| text_or_number(item.get("loc")?.as_array()?.last()?))
 }
 
 /// The entries of Google's `details`.
@@ -295,11 +305,11 @@ fn stated_wait(error: &Value) -> Option<Duration> {
 
 /// The ids of the limits in Google's `details`.
 fn limits(error: &Value) -> Vec<String> {
-    let violations = details(error)
+    details(error)
         .filter_map(|detail| detail.get("violations")?.as_array())
-        .flatten();
-    let ids = violations.filter_map(|violation| text_or_number(violation.get("quotaId")?));
-    ids.collect()
+        .flatten()
+        .filter_map(|violation| text_or_number(violation.get("quotaId")?))
+        .collect()
 }
 
 fn is_filled(value: &Value) -> bool {

@@ -28,8 +28,9 @@ pub(super) fn letter_of(constrain: Constrain, choices: usize, reply: &str) -> Op
         Some(_) => return None,
         None => reply,
     };
-    let mut letters = (0..choices).map(|index| letter(index).to_string());
-    letters.find(|letter| letter == text.trim())
+    (0..choices)
+        .map(|index| letter(index).to_string())
+        .find(|letter| letter == text.trim())
 }
 
 #[cfg(test)]

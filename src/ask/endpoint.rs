@@ -82,8 +82,8 @@ impl Endpoint {
         };
         let replicas = addresses
             .into_iter()
-            .map(|access| Replica::open(access, each));
-        let replicas = replicas.collect::<Result<Vec<_>>>()?;
+            .map(|access| Replica::open(access, each))
+            .collect::<Result<Vec<_>>>()?;
         if replicas.is_empty() {
             return Err(Error::usage("--base-url", "an address expected"));
         }
@@ -112,12 +112,11 @@ impl Endpoint {
 
     /// The replicas that take requests to a model.
     fn taking(&self, model: ModelNumber) -> impl Iterator<Item = &Replica> {
-        let taking = self
-            .replicas
+        self.replicas
             .iter()
             .enumerate()
-            .filter(move |(index, _)| self.services.takes(model, *index));
-        taking.map(|(_, replica)| replica)
+            .filter(move |(index, _)| self.services.takes(model, *index))
+            .map(|(_, replica)| replica)
     }
 
     /// The base URL of the first replica; its text has no user, password and query string.
@@ -404,8 +403,10 @@ impl Endpoint {
 
     /// The time for which no replica that takes this model has taken a request.
     fn refused_for(&self, model: ModelNumber) -> Duration {
-        let times = self.taking(model).map(|replica| replica.gate.refused_for());
-        times.min().unwrap_or_default()
+        self.taking(model)
+            .map(|replica| replica.gate.refused_for())
+            .min()
+            .unwrap_or_default()
     }
 
     /// Warns once if no request has been accepted for a while: the run goes on, and would otherwise wait without a word.

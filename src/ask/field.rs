@@ -96,13 +96,15 @@ impl RequestFields {
 
     /// The fields of the switch for thinking, as a server may refuse them.
     pub(super) fn switched<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
-        let names = self.switch().into_iter().flat_map(Map::keys);
-        names.map(|name| RequestField {
-            name,
-            state: FieldState::Sent,
-            hint: "leave --thinking out: the model or its server has no such switch",
-            adaptable: None,
-        })
+        self.switch()
+            .into_iter()
+            .flat_map(Map::keys)
+            .map(|name| RequestField {
+                name,
+                state: FieldState::Sent,
+                hint: "leave --thinking out: the model or its server has no such switch",
+                adaptable: None,
+            })
     }
 
     /// These fields after a server refused one of them; `None` if the user set it, or if it was changed before: a token limit is sent

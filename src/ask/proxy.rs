@@ -31,10 +31,10 @@ pub(super) fn check_proxy(
         return Ok(());
     };
     let first = |names: [&'static str; 2]| {
-        let mut set = names
+        names
             .into_iter()
-            .filter_map(|name| Some((name, variable(name)?)));
-        set.next().filter(|(_, value)| !value.is_empty())
+            .find_map(|name| Some((name, variable(name)?)))
+            .filter(|(_, value)| !value.is_empty())
     };
     let own = if base.is_plain() {
         ["HTTP_PROXY", "http_proxy"]

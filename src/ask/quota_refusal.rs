@@ -28,11 +28,12 @@ impl QuotaRefusal {
 fn stated_limit(message: &str) -> Option<u64> {
     let lower = message.to_lowercase();
     let (_, behind) = lower.split_once("limit:")?;
-    let digits = behind
+    let digits: String = behind
         .trim_start()
         .chars()
-        .take_while(|c| c.is_ascii_digit() || matches!(c, ',' | '_'));
-    let digits: String = digits.filter(char::is_ascii_digit).collect();
+        .take_while(|c| c.is_ascii_digit() || matches!(c, ',' | '_'))
+        .filter(char::is_ascii_digit)
+        .collect();
     digits.parse().ok().filter(|limit| *limit > 0)
 }
 

@@ -422,10 +422,13 @@ fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
 
 /// A number that is the same for all questions about the same images.
 fn affinity(message: Message<'_>) -> u64 {
-    let digests = message.images.iter().map(|image| image.facts().digest);
-    digests.fold(0, |sum, digest| {
-        let mut first = [0; 8];
-        first.copy_from_slice(&digest.as_bytes()[..8]);
-        sum ^ u64::from_le_bytes(first)
-    })
+    message
+        .images
+        .iter()
+        .map(|image| image.facts().digest)
+        .fold(0, |sum, digest| {
+            let mut first = [0; 8];
+            first.copy_from_slice(&digest.as_bytes()[..8]);
+            sum ^ u64::from_le_bytes(first)
+        })
 }

@@ -56,8 +56,10 @@ fn shortened(text: String) -> String {
 /// The likeliest tokens without keys.
 fn without_keys(chances: TokenChances, scrubbed: impl Fn(String) -> String) -> TokenChances {
     let position = |position: TokenPosition| {
-        let likeliest = position.likeliest.into_iter();
-        let likeliest = likeliest.map(|(token, logprob)| (scrubbed(token), logprob));
+        let likeliest = position
+            .likeliest
+            .into_iter()
+            .map(|(token, logprob)| (scrubbed(token), logprob));
         TokenPosition {
             likeliest: likeliest.collect(),
             token: scrubbed(position.token),

@@ -117,15 +117,19 @@ impl Scrub {
     pub(super) fn json_line(&self, line: String) -> String {
         let line = self.without_whole_keys(line);
         let pieces: Vec<&str> = line.split('"').collect();
-        let masked = pieces.iter().enumerate().map(|(at, piece)| {
-            let is_id = at >= 2 && pieces[at - 2] == "custom_id";
-            if is_id {
-                (*piece).to_owned()
-            } else {
-                self.parts.masked((*piece).to_owned())
-            }
-        });
-        masked.collect::<Vec<_>>().join("\"")
+        pieces
+            .iter()
+            .enumerate()
+            .map(|(at, piece)| {
+                let is_id = at >= 2 && pieces[at - 2] == "custom_id";
+                if is_id {
+                    (*piece).to_owned()
+                } else {
+                    self.parts.masked((*piece).to_owned())
+                }
+            })
+            .collect::<Vec<_>>()
+            .join("\"")
     }
 
     fn without_whole_keys(&self, text: String) -> String {
@@ -158,8 +162,10 @@ impl Scrub {
 
 /// The secrets that are removed from replies.
 fn keys(secrets: &[String]) -> impl Iterator<Item = &str> {
-    let secrets = secrets.iter().map(String::as_str);
-    secrets.filter(|secret| secret.len() >= MIN_SECRET_IN_REPLY)
+    secrets
+        .iter()
+        .map(String::as_str)
+        .filter(|secret| secret.len() >= MIN_SECRET_IN_REPLY)
 }
 
 /// Whether a character is a control other than white space, or a mark that reverses or hides text.

@@ -76,8 +76,10 @@ impl SecretParts {
             let has_letter = run.iter().any(|letter| letter.value.is_ascii_alphabetic());
             (has_digit && has_letter) || run.len() >= WORDS
         };
-        let runs = runs.into_iter().map(|run| &letters[run]).filter(is_part);
-        runs.map(|run| run[0].start..run[run.len() - 1].end)
+        runs.into_iter()
+            .map(|run| &letters[run])
+            .filter(is_part)
+            .map(|run| run[0].start..run[run.len() - 1].end)
             .collect()
     }
 }

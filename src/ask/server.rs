@@ -262,10 +262,11 @@ fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'stati
 
 /// The variables of the tools of a host's vendor; none if the built-in table does not have the host.
 pub(crate) fn own_variables(host: &str) -> Vec<&'static str> {
-    let variables = Vendor::at_host(host)
+    Vendor::at_host(host)
         .into_iter()
-        .flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()));
-    variables.map(String::as_str).collect()
+        .flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()))
+        .map(String::as_str)
+        .collect()
 }
 
 /// The error about an endpoint without a key.
@@ -292,8 +293,9 @@ fn no_key(base: &BaseUrl, names: &[&str]) -> Error {
 
 /// The headers for accounts with several organizations or projects, from the variables that the vendor's clients use.
 fn account_headers(vendor: Option<&Vendor>) -> Vec<(String, String)> {
-    let headers = vendor.into_iter().flat_map(|vendor| &vendor.account);
-    headers
+    vendor
+        .into_iter()
+        .flat_map(|vendor| &vendor.account)
         .filter_map(|(header, name)| Some((header.clone(), variable(name)?)))
         .collect()
 }

@@ -172,8 +172,9 @@ impl Services {
             Health::OutUntil(time) => time <= now,
             Health::OnTrial => false,
         };
-        let left = (0..count).filter(|index| !state.is_gone(model, *index));
-        let left: Vec<usize> = left.collect();
+        let left: Vec<usize> = (0..count)
+            .filter(|index| !state.is_gone(model, *index))
+            .collect();
         let mut open: Vec<usize> = left.iter().copied().filter(working).collect();
         if open.is_empty() {
             // None works: those that are out are tried as a single endpoint would be, with its retries and their waits.
@@ -191,10 +192,10 @@ impl Services {
             .map(|index| in_flight(*index))
             .min()
             .unwrap_or(0);
-        let near = open
+        let chosen = open
             .iter()
-            .filter(|index| in_flight(**index) <= least + LEANING);
-        let chosen = near.max_by_key(|index| weight(affinity, **index));
+            .filter(|index| in_flight(**index) <= least + LEANING)
+            .max_by_key(|index| weight(affinity, **index));
         let Some(&chosen) = chosen else {
             return Choice::None;
         };

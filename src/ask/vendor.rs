@@ -120,8 +120,11 @@ impl Vendor {
 
     /// Whether a vendor of the built-in table has a host of this very name; a name below a domain may be that of any customer.
     pub(super) fn has_host(host: &str) -> bool {
-        let mut hosts = VENDORS.vendor.iter().flat_map(|vendor| &vendor.hosts);
-        hosts.any(|known| known == host)
+        VENDORS
+            .vendor
+            .iter()
+            .flat_map(|vendor| &vendor.hosts)
+            .any(|known| known == host)
     }
 
     /// Whether a host is one of the vendor's.

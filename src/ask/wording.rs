@@ -73,8 +73,11 @@ mod tests {
     #[test]
     fn the_table_is_complete() {
         let all: Wordings = toml::from_str(include_str!("wordings.toml")).unwrap();
-        let patterns = all.wording.iter().flat_map(|wording| &wording.patterns);
-        let mut patterns: Vec<&String> = patterns.collect();
+        let mut patterns: Vec<&String> = all
+            .wording
+            .iter()
+            .flat_map(|wording| &wording.patterns)
+            .collect();
         assert!(
             patterns
                 .iter()

@@ -43,17 +43,17 @@ fn off_trend(settings: &[SettingFit]) -> Vec<String> {
         return Vec::new();
     }
     let slope = if points.len() > 3 {
-        let pairs = points
+        let slopes = points
             .iter()
             .enumerate()
-            .flat_map(|(i, a)| points[i + 1..].iter().map(move |b| (a, b)));
-        let slopes = pairs.filter(|(a, b)| (a[0] - b[0]).abs() > 1e-9);
+            .flat_map(|(i, a)| points[i + 1..].iter().map(move |b| (a, b)))
+            .filter(|(a, b)| (a[0] - b[0]).abs() > 1e-9);
         median(slopes.map(|(a, b)| (b[1] - a[1]) / (b[0] - a[0])).collect())
     } else {
         0.0
     };
     let level = median(points.iter().map(|[x, y]| y - slope * x).collect());
-    let off = settings.iter().zip(&points).filter_map(|(fit, [x, y])| {
+    settings.iter().zip(&points).filter_map(|(fit, [x, y])| {
         let off = y - slope * x - level;
         (off.abs() > OFF_TREND * fit.read_deviation).then(|| {
             format!(
@@ -61,8 +61,7 @@ fn off_trend(settings: &[SettingFit]) -> Vec<String> {
                 fit.name
             )
         })
-    });
-    off.collect()
+    }).collect()
 }
 
 /// The median of numbers; the upper one of two, and 0 without any.

@@ -133,8 +133,10 @@ impl FrameReader {
             mosaic.samples
         } else {
             let rows = mosaic.samples.chunks_exact(mosaic.width).skip(y);
-            let rows = rows.take(height).map(|row| &row[x..x + width]);
-            rows.collect::<Vec<_>>().concat()
+            rows.take(height)
+                .map(|row| &row[x..x + width])
+                .collect::<Vec<_>>()
+                .concat()
         };
         Ok(Frame {
             samples,

@@ -94,12 +94,16 @@ impl MeanFrame {
             let median = f64::from(medians[self.plane(plane_row)]) / self.frames();
             let extremes = self.part(&self.extremes, plane_row);
             let sites = self.part(&self.sums, plane_row).zip(extremes);
-            let hot = sites.enumerate().filter(|(_, (sum, [least, greatest]))| {
-                let mean = f64::from(**sum) / self.frames() - median;
-                let (above, below) = (f64::from(*least) - median, median - f64::from(*greatest));
-                mean.abs() > limit && above.max(below) > 0.5 * limit
-            });
-            hot.map(|(column, _)| column as u32).collect()
+            sites
+                .enumerate()
+                .filter(|(_, (sum, [least, greatest]))| {
+                    let mean = f64::from(**sum) / self.frames() - median;
+                    let (above, below) =
+                        (f64::from(*least) - median, median - f64::from(*greatest));
+                    mean.abs() > limit && above.max(below) > 0.5 * limit
+                })
+                .map(|(column, _)| column as u32)
+                .collect()
         });
         HotPixels::new(columns.collect())
     }
@@ -107,14 +111,16 @@ impl MeanFrame {
     /// The median sum of each plane; the upper one of two.
     fn medians(&self) -> Vec<u32> {
         let planes = (0..self.layout.cfa.planes()).into_par_iter();
-        let medians = planes.map(|plane| {
-            let parts = (0..self.layout.plane_rows()).filter(|part| self.plane(*part) == plane);
-            let sums = parts.flat_map(|part| self.part(&self.sums, part));
-            let mut sums: Vec<u32> = sums.copied().collect();
-            let middle = sums.len() / 2;
-            *sums.select_nth_unstable(middle).1
-        });
-        medians.collect()
+        planes
+            .map(|plane| {
+                let sums = (0..self.layout.plane_rows())
+                    .filter(|part| self.plane(*part) == plane)
+                    .flat_map(|part| self.part(&self.sums, part));
+                let mut sums: Vec<u32> = sums.copied().collect();
+                let middle = sums.len() / 2;
+                *sums.select_nth_unstable(middle).1
+            })
+            .collect()
     }
 
     /// Sums of parts of rows, to which `add` adds each site that is not hot, in the order of the rows.
@@ -126,22 +132,23 @@ impl MeanFrame {
         let parts = (0..self.layout.plane_rows())
             .into_par_iter()
             .with_min_len(64);
-        let sums = parts.map(|plane_row| {
-            let mut hot = hot.columns(plane_row).peekable();
-            let mut sums = [0.0; N];
-            for (column, sum) in self.part(&self.sums, plane_row).enumerate() {
-                if hot.next_if_eq(&column).is_none() {
-                    let site = Site {
-                        plane_row,
-                        column,
-                        mean: f64::from(*sum) / self.frames(),
-                    };
-                    add(&mut sums, site);
+        parts
+            .map(|plane_row| {
+                let mut hot = hot.columns(plane_row).peekable();
+                let mut sums = [0.0; N];
+                for (column, sum) in self.part(&self.sums, plane_row).enumerate() {
+                    if hot.next_if_eq(&column).is_none() {
+                        let site = Site {
+                            plane_row,
+                            column,
+                            mean: f64::from(*sum) / self.frames(),
+                        };
+                        add(&mut sums, site);
+                    }
                 }
-            }
-            sums
-        });
-        sums.collect()
+                sums
+            })
+            .collect()
     }
 
     /// The variance of the fixed pattern: that of the mean frame about the means of its planes, less what noise of this size
@@ -198,8 +205,10 @@ impl MeanFrame {
         let error =
             (noise.within / sites + noise.row.max(0.0) / (rows / TILES) as f64) / self.frames();
         let uneven = sums.chunks(TILES * TILES).map(|tiles| {
-            let filled = tiles.iter().filter(|[count, _]| *count > 0.0);
-            let means = filled.map(|[count, sum]| sum / count);
+            let means = tiles
+                .iter()
+                .filter(|[count, _]| *count > 0.0)
+                .map(|[count, sum]| sum / count);
             let [low, high] = means
                 .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
                     [mean.min(low), mean.max(high)]

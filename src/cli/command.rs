@@ -333,14 +333,16 @@ fn marked(command: clap::Command) -> clap::Command {
             return arg;
         };
         let help = arg.get_help().map(|help| format!("{help} [{class}]"));
-        let long = arg.get_long_help().map(ToString::to_string);
-        let long = long.map(|help| match help.split_once('\n') {
-            // The lines of its keys follow, each with its own class.
-            Some((first, keys)) if KeyedFlag::named(&name_of(&arg)).is_some() => {
-                format!("{first} [{class}]\n{keys}")
-            }
-            _ => format!("{help} [{class}]"),
-        });
+        let long =
+            arg.get_long_help()
+                .map(ToString::to_string)
+                .map(|help| match help.split_once('\n') {
+                    // The lines of its keys follow, each with its own class.
+                    Some((first, keys)) if KeyedFlag::named(&name_of(&arg)).is_some() => {
+                        format!("{first} [{class}]\n{keys}")
+                    }
+                    _ => format!("{help} [{class}]"),
+                });
         let arg = arg.help(help.unwrap_or_default());
         match long {
             Some(long) => arg.long_help(long),

@@ -83,8 +83,11 @@ fn with_keyed(command: Command, keyed: &KeyedFlag) -> Command {
 /// The help of a key: its values, what it decides, and its default.
 fn line(key: &str, arg: &Arg) -> String {
     let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-    let defaults = arg.get_default_values().iter();
-    let defaults: Vec<_> = defaults.map(|value| value.to_string_lossy()).collect();
+    let defaults: Vec<_> = arg
+        .get_default_values()
+        .iter()
+        .map(|value| value.to_string_lossy())
+        .collect();
     let default = match &defaults[..] {
         _ if !arg.get_action().takes_values() => String::new(),
         [] => String::new(),

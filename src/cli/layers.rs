@@ -89,8 +89,11 @@ pub(super) fn parse(
     let mut set: Vec<&Arg> = settable_flags(command)
         .filter(|arg| own.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine))
         .collect();
-    let in_call = set.iter().filter_map(|arg| arg.get_long());
-    let in_call: BTreeSet<String> = in_call.map(str::to_owned).collect();
+    let in_call: BTreeSet<String> = set
+        .iter()
+        .filter_map(|arg| arg.get_long())
+        .map(str::to_owned)
+        .collect();
     let expansion = Expansion(command);
     let environment = expansion.layer(environment_values(&all, command, &variable)?)?;
     let file = match own.get_one::<PathBuf>(CONFIG) {
@@ -225,8 +228,9 @@ fn environment_values(
     command: &Command,
     variable: &impl Fn(&str) -> Option<OsString>,
 ) -> Result<BTreeMap<String, LayeredValue>> {
-    let names = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok());
-    let ours = names.filter(|name| name.starts_with(PREFIX));
+    let ours = std::env::vars_os()
+        .filter_map(|(name, _)| name.into_string().ok())
+        .filter(|name| name.starts_with(PREFIX));
     let mut known: Vec<String> = every_flag(all)
         .iter()
         .map(|flag| variable_name(flag))

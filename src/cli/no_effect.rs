@@ -98,8 +98,10 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
 /// The ids of the flags in a group.
 fn ids<A: Args>() -> Vec<String> {
     let command = A::augment_args(Clap::new(""));
-    let ids = command.get_arguments().map(|arg| arg.get_id().to_string());
-    ids.collect()
+    command
+        .get_arguments()
+        .map(|arg| arg.get_id().to_string())
+        .collect()
 }
 
 /// The flags that decide only degraded images. Without the seed, which decides guesses and orders, too.
@@ -345,8 +347,10 @@ mod tests {
     use crate::cli::command;
 
     fn lines(words: &str) -> Vec<String> {
-        let words = std::iter::once("darkqa-eval").chain(words.split(' '));
-        let words: Vec<OsString> = words.map(OsString::from).collect();
+        let words: Vec<OsString> = std::iter::once("darkqa-eval")
+            .chain(words.split(' '))
+            .map(OsString::from)
+            .collect();
         let parsed = layers::parse(command::command(), words, |_| None);
         let matches = parsed.map_err(|_| "not parsed").unwrap().matches;
         without_effect(&Cli::from_arg_matches(&matches).unwrap(), &matches)

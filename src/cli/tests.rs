@@ -100,8 +100,10 @@ fn short_help_names_flags_that_exist() {
     let root = command::command();
     let help = help("darkqa-eval -h");
     let is_name = |c: char| c == '-' || c.is_ascii_alphanumeric();
-    let words = help.split(|c: char| !is_name(c));
-    let flags: BTreeSet<&str> = words.filter(|word| word.starts_with('-')).collect();
+    let flags: BTreeSet<&str> = help
+        .split(|c: char| !is_name(c))
+        .filter(|word| word.starts_with('-'))
+        .collect();
     assert!(flags.len() > 20, "{flags:?}");
     for flag in flags {
         let is_flag = |arg: &Arg| {
@@ -279,8 +281,11 @@ fn is_only_a_group(command: &Clap) -> bool {
 /// The place of a flag in the list: keys stand below their keyed flag.
 fn order(command: &Clap, arg: &Arg) -> (usize, bool) {
     let keyed = KEYED_FLAGS.iter().find(|keyed| {
-        let mut flags = keyed.keys.iter().map(|(_, flag)| *flag);
-        flags.any(|flag| flag == name_of(arg))
+        keyed
+            .keys
+            .iter()
+            .map(|(_, flag)| *flag)
+            .any(|flag| flag == name_of(arg))
     });
     let keyed = keyed.and_then(|keyed| {
         let mut args = command.get_arguments();

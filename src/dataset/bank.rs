@@ -173,21 +173,23 @@ impl Bank {
         per_image: Option<NonZeroUsize>,
     ) -> Vec<Question> {
         let most = per_image.map_or(usize::MAX, NonZeroUsize::get);
-        let questions = frames.into_iter().flat_map(|frame| {
-            let mut drawn: Vec<usize> = (0..self.questions.len()).collect();
-            if most < drawn.len() {
-                drawn.sort_by_cached_key(|index| {
-                    let text = self.questions[*index].text.as_bytes();
-                    *Digest::from_parts([b"ask", frame.0.as_bytes(), text]).as_bytes()
-                });
-                drawn.truncate(most);
-                drawn.sort_unstable();
-            }
-            drawn
-                .into_iter()
-                .map(move |index| self.questions[index].about(frame))
-        });
-        questions.collect()
+        frames
+            .into_iter()
+            .flat_map(|frame| {
+                let mut drawn: Vec<usize> = (0..self.questions.len()).collect();
+                if most < drawn.len() {
+                    drawn.sort_by_cached_key(|index| {
+                        let text = self.questions[*index].text.as_bytes();
+                        *Digest::from_parts([b"ask", frame.0.as_bytes(), text]).as_bytes()
+                    });
+                    drawn.truncate(most);
+                    drawn.sort_unstable();
+                }
+                drawn
+                    .into_iter()
+                    .map(move |index| self.questions[index].about(frame))
+            })
+            .collect()
     }
 }
 

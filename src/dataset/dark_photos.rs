@@ -65,7 +65,7 @@ impl DarkField {
             Self::Several(entries) => entries,
         };
         let mut names = BTreeSet::new();
-        let photos = entries.into_iter().enumerate().map(|(place, entry)| {
+        entries.into_iter().enumerate().map(|(place, entry)| {
             let KnownPhoto { path, ev, name } = match entry {
                 DarkEntry::Known(known) => known,
                 DarkEntry::Path(path) => KnownPhoto {
@@ -93,8 +93,7 @@ impl DarkField {
                 path: existing(path)?,
                 ev,
             })
-        });
-        photos.collect()
+        }).collect()
     }
 }
 

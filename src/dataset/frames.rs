@@ -263,8 +263,9 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
 
 /// The files of questions that are in a folder besides [`QUESTIONS`].
 pub(super) fn other_questions(folder: &Path) -> impl Iterator<Item = PathBuf> {
-    let all = ["csv", "tsv", "json", "parquet"].map(|ending| format!("questions.{ending}"));
-    all.map(|name| folder.join(name))
+    ["csv", "tsv", "json", "parquet"]
+        .map(|ending| format!("questions.{ending}"))
+        .map(|name| folder.join(name))
         .into_iter()
         .filter(|file| file.exists())
 }

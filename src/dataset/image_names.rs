@@ -84,8 +84,11 @@ mod tests {
         let inner = folder.path().join("inner.png");
         fs::create_dir(&inner).unwrap();
         let names = ImageNames::from_paths(paths.into_iter().chain([inner]));
-        let images = names.images.iter();
-        let images: Vec<_> = images.map(|path| path.file_name().unwrap()).collect();
+        let images: Vec<_> = names
+            .images
+            .iter()
+            .map(|path| path.file_name().unwrap())
+            .collect();
         assert_eq!(images, ["a.PNG", "b.webp", "c.tiff"]);
         assert_eq!(
             names.unread().unwrap(),

@@ -84,8 +84,10 @@ impl DepthFile {
             Self::Png { scale, .. } => {
                 // Multiplied first: most scales are a round number of millimetres, and then this is exact.
                 let unit = scale * 1_000.0;
-                let table = (0..=u16::MAX).map(|units| millimetres(units.into(), unit));
-                let table: Vec<u32> = table.map(|depth| depth.unwrap_or(u32::MAX)).collect();
+                let table: Vec<u32> = (0..=u16::MAX)
+                    .map(|units| millimetres(units.into(), unit))
+                    .map(|depth| depth.unwrap_or(u32::MAX))
+                    .collect();
                 let depths = png(bytes, &[SampleForm::Grey16], size, |units| {
                     table[usize::from(units)]
                 })?;
@@ -106,13 +108,15 @@ impl DepthFile {
 impl MapPaths {
     /// The files of the maps.
     pub(crate) fn paths(&self) -> impl Iterator<Item = PathBuf> {
-        let depth = self.depth.iter().map(|depth| depth.path().to_owned());
-        depth.chain(
-            [&self.semantic, &self.segments]
-                .into_iter()
-                .flatten()
-                .cloned(),
-        )
+        self.depth
+            .iter()
+            .map(|depth| depth.path().to_owned())
+            .chain(
+                [&self.semantic, &self.segments]
+                    .into_iter()
+                    .flatten()
+                    .cloned(),
+            )
     }
 
     /// The paths of a frame without maps.
@@ -134,17 +138,20 @@ impl MapPaths {
     pub(super) fn sizes(&self) -> Result<Vec<(&Path, Size)>> {
         let depth = self.depth.as_ref().map(DepthFile::path);
         let files = [depth, self.semantic.as_deref(), self.segments.as_deref()];
-        let sizes = files.into_iter().flatten().map(|path| {
-            let bytes = reading::bytes(path)?;
-            let size = if is_npy(path) {
-                Npy::parse(&bytes).map(|npy| npy.size)
-            } else {
-                let png = RawPng::open(&bytes, &SampleForm::ALL, MOST_PIXELS);
-                png.map(|png| png.size).map_err(String::from)
-            };
-            Ok((path, in_file(path, size)?))
-        });
-        sizes.collect()
+        files
+            .into_iter()
+            .flatten()
+            .map(|path| {
+                let bytes = reading::bytes(path)?;
+                let size = if is_npy(path) {
+                    Npy::parse(&bytes).map(|npy| npy.size)
+                } else {
+                    let png = RawPng::open(&bytes, &SampleForm::ALL, MOST_PIXELS);
+                    png.map(|png| png.size).map_err(String::from)
+                };
+                Ok((path, in_file(path, size)?))
+            })
+            .collect()
     }
 
     /// The image file that these maps belong to. Maps are not turned, so the image is not turned either if they have the size of the

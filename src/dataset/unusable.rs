@@ -14,8 +14,11 @@ impl Dataset {
             return self.sources.keys().collect();
         }
         let shown = self.questions.iter();
-        let shown = shown.flat_map(|question| self.shown(&question.frame));
-        shown.collect::<BTreeSet<&FrameId>>().into_iter().collect()
+        shown
+            .flat_map(|question| self.shown(&question.frame))
+            .collect::<BTreeSet<&FrameId>>()
+            .into_iter()
+            .collect()
     }
 
     /// Decodes an image, and the photographs of its scene in the dark.

@@ -126,11 +126,14 @@ impl PlotLine {
 impl Panel {
     /// The levels of its curves, from L0.
     pub(crate) fn levels(&self) -> Vec<AxisLevel> {
-        let levels = self.lines.iter().flat_map(|line| match &line.content {
-            PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
-            PanelContent::Flat(_) | PanelContent::Marks(_) => Vec::new(),
-        });
-        let mut levels: Vec<AxisLevel> = levels.collect();
+        let mut levels: Vec<AxisLevel> = self
+            .lines
+            .iter()
+            .flat_map(|line| match &line.content {
+                PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
+                PanelContent::Flat(_) | PanelContent::Marks(_) => Vec::new(),
+            })
+            .collect();
         levels.sort_unstable();
         levels.dedup();
         levels
@@ -138,13 +141,19 @@ impl Panel {
 
     /// The right end of the axis, in the unit of the levels.
     pub(crate) fn farthest(&self) -> f64 {
-        let marks = self.lines.iter().flat_map(|line| match &line.content {
-            PanelContent::Marks(marks) => &marks[..],
-            PanelContent::Flat(_) | PanelContent::Curve(_) => &[],
-        });
-        let marks = marks.map(|mark| mark.ev[2]);
-        let levels = self.levels().into_iter().map(AxisLevel::value);
-        levels.chain(marks).fold(0.0, f64::max)
+        let marks = self
+            .lines
+            .iter()
+            .flat_map(|line| match &line.content {
+                PanelContent::Marks(marks) => &marks[..],
+                PanelContent::Flat(_) | PanelContent::Curve(_) => &[],
+            })
+            .map(|mark| mark.ev[2]);
+        self.levels()
+            .into_iter()
+            .map(AxisLevel::value)
+            .chain(marks)
+            .fold(0.0, f64::max)
     }
 
     /// Title of the horizontal axis.

@@ -40,8 +40,8 @@ const MAX_FRAMES: usize = 3;
 /// The first frames by level, with a row for each variant and enhancer: a page for each axis. Empty without thumbnails.
 pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SamplePage> {
     let axis = |thumbnail: &Thumbnail| thumbnail.condition.level().axis();
-    let axes = Axis::ALL.into_iter();
-    let axes: Vec<Axis> = axes
+    let axes: Vec<Axis> = Axis::ALL
+        .into_iter()
         .filter(|other| thumbnails.iter().any(|of| axis(of) == Some(*other)))
         .collect();
     // The clean frames are on every axis; alone, on that of light.
@@ -50,14 +50,15 @@ pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SamplePage> {
     } else {
         axes
     };
-    let pages = axes.into_iter().filter_map(|on| {
-        let all = thumbnails.iter();
-        let all: Vec<&Thumbnail> = all
-            .filter(|of| of.condition.level().is_shown_on(on))
-            .collect();
-        axis_page(&all, on)
-    });
-    pages.collect()
+    axes.into_iter()
+        .filter_map(|on| {
+            let all: Vec<&Thumbnail> = thumbnails
+                .iter()
+                .filter(|of| of.condition.level().is_shown_on(on))
+                .collect();
+            axis_page(&all, on)
+        })
+        .collect()
 }
 
 /// The page of the thumbnails of one axis; `None` without any.
@@ -68,8 +69,7 @@ fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
         .collect();
     frames.sort_unstable();
     frames.dedup();
-    let levels = thumbnails.iter().map(|of| of.condition.level());
-    let levels: BTreeSet<AxisLevel> = levels.collect();
+    let levels: BTreeSet<AxisLevel> = thumbnails.iter().map(|of| of.condition.level()).collect();
     let lines = lines(thumbnails);
     let mut rows = Vec::new();
     for frame in frames.into_iter().take(MAX_FRAMES) {
@@ -83,10 +83,10 @@ fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
                             && LightGroup::meet(condition.group.as_ref(), variant.group.as_ref()))
             };
             let images = levels.iter().map(|at| {
-                let mut of_frame = thumbnails
+                let thumbnail = thumbnails
                     .iter()
-                    .filter(|thumbnail| thumbnail.frame == *frame);
-                let thumbnail = of_frame.find(|thumbnail| is_shown(&thumbnail.condition, *at))?;
+                    .filter(|thumbnail| thumbnail.frame == *frame)
+                    .find(|thumbnail| is_shown(&thumbnail.condition, *at))?;
                 Some(SampleImage {
                     url: thumbnail.small.clone(),
                     alt: format!("{} at {}", frame, thumbnail.condition),
@@ -224,11 +224,11 @@ mod tests {
         let thumbnails = ["L0", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
         let samples = only(&thumbnails);
         let urls = |row: &SampleRow| -> Vec<String> {
-            let urls = row
-                .images
+            row.images
                 .iter()
-                .map(|image| image.as_ref().map(|i| i.url.clone()));
-            urls.map(Option::unwrap_or_default).collect()
+                .map(|image| image.as_ref().map(|i| i.url.clone()))
+                .map(Option::unwrap_or_default)
+                .collect()
         };
         let rows: Vec<Vec<String>> = samples.rows.iter().map(urls).collect();
         assert_eq!(rows[0], ["data:L0", "data:L3-ev"]);

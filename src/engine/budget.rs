@@ -102,12 +102,14 @@ impl Budget {
         answering: Answering<'_>,
         stored: &[StoredTrial],
     ) -> Result<Self> {
-        let budgets = models.iter().map(|model| ModelBudget {
-            price: model.price(&money.prices),
-            prompts: PromptBounds::new(),
-            excess: Arc::default(),
-        });
-        let budgets: Vec<ModelBudget> = budgets.collect();
+        let budgets: Vec<ModelBudget> = models
+            .iter()
+            .map(|model| ModelBudget {
+                price: model.price(&money.prices),
+                prompts: PromptBounds::new(),
+                excess: Arc::default(),
+            })
+            .collect();
         let unknown = models
             .iter()
             .zip(&budgets)

@@ -108,9 +108,11 @@ fn sampled(
 ) -> Vec<f64> {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     let number = all.len().min(SAMPLED);
-    let sample = (0..number).into_par_iter().filter_map(|index| {
-        let frame = all[index * all.len() / number];
-        of(&frames.picture(&frame.id).ok()?)
-    });
-    sample.collect()
+    (0..number)
+        .into_par_iter()
+        .filter_map(|index| {
+            let frame = all[index * all.len() / number];
+            of(&frames.picture(&frame.id).ok()?)
+        })
+        .collect()
 }

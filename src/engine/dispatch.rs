@@ -102,8 +102,12 @@ impl Dispatcher<'_> {
     }
 
     fn breaker(&self) -> CircuitBreaker {
-        let servers = self.models.iter().filter_map(|model| model.server.as_ref());
-        let most = servers.map(|server| server.most_in_flight()).max();
+        let most = self
+            .models
+            .iter()
+            .filter_map(|model| model.server.as_ref())
+            .map(|server| server.most_in_flight())
+            .max();
         CircuitBreaker::new(
             self.models,
             most.unwrap_or(self.settings.concurrency.most()),

@@ -55,8 +55,7 @@ pub(crate) fn estimate<E: Experiment>(
         None => SampledImages::default(),
     };
     let images = PlannedImages::new(experiment, plans, &sample);
-    let latencies = stored.iter().filter_map(StoredTrial::latency_ms);
-    let latencies: Vec<u64> = latencies.collect();
+    let latencies: Vec<u64> = stored.iter().filter_map(StoredTrial::latency_ms).collect();
     // Endpoints are asked side by side: the slowest decides.
     let times = loads.iter().map(|load| asking_time(load, &latencies));
     let slowest = times.max_by(|(a, _), (b, _)| a.total_cmp(b));
@@ -115,9 +114,10 @@ fn built_in_models<E: Experiment>(
     for trial in plan.groups().flat_map(|(_, group)| &group.trials) {
         trials[trial.model] += 1;
     }
-    let models = models.iter().zip(trials);
-    let built_in = models.filter(|(model, trials)| !model.model.is_remote() && *trials > 0);
-    built_in
+    models
+        .iter()
+        .zip(trials)
+        .filter(|(model, trials)| !model.model.is_remote() && *trials > 0)
         .map(|(model, trials)| (label(model, E::PHASES[phase]), trials))
         .collect()
 }
@@ -134,8 +134,11 @@ fn label(model: &ModelUnderTest, phase: &str) -> String {
 
 /// The reason why a request is too large for an endpoint: the largest image, or the request with the most images.
 fn too_large(limit: ImageLimit, image: &ImageFacts, sources: &[Source]) -> Option<String> {
-    let shown = sources.iter().map(|source| source.order.len());
-    let most = shown.max().unwrap_or(0);
+    let most = sources
+        .iter()
+        .map(|source| source.order.len())
+        .max()
+        .unwrap_or(0);
     let checked = limit.check(image);
     let checked = checked.and_then(|()| limit.check_request(most, Some(image)));
     let problem = checked.err().map(|problem| problem.to_string());
@@ -151,44 +154,45 @@ fn lines<E: Experiment>(
     expected: &[ExpectedRequest],
 ) -> Vec<(usize, CostLine)> {
     let sources = experiment.sources();
-    let remote = experiment
+    experiment
         .models(phase)
         .iter()
         .enumerate()
-        .filter(|(_, model)| model.model.is_remote());
-    let lines = remote.map(|(index, model)| {
-        let price = model.price(&experiment.settings().money.prices);
-        let mut by_reading = BTreeMap::<Option<ReadingName>, Tokens>::new();
-        for (place, group) in plan.groups() {
-            let degradation = group.condition.as_ref().and_then(|c| c.degradation());
-            let reading = degradation.and_then(Degradation::reading).cloned();
-            let tokens = by_reading.entry(reading).or_default();
-            let own = group.trials.iter().filter(|trial| trial.model == index);
-            let before = tokens.requests;
-            for trial in own {
-                tokens.add(text_tokens(&trial.prompt), trial.item.reply_tokens());
+        .filter(|(_, model)| model.model.is_remote())
+        .map(|(index, model)| {
+            let price = model.price(&experiment.settings().money.prices);
+            let mut by_reading = BTreeMap::<Option<ReadingName>, Tokens>::new();
+            for (place, group) in plan.groups() {
+                let degradation = group.condition.as_ref().and_then(|c| c.degradation());
+                let reading = degradation.and_then(Degradation::reading).cloned();
+                let tokens = by_reading.entry(reading).or_default();
+                let own = group.trials.iter().filter(|trial| trial.model == index);
+                let before = tokens.requests;
+                for trial in own {
+                    tokens.add(text_tokens(&trial.prompt), trial.item.reply_tokens());
+                }
+                let source = &sources[place];
+                if group.condition.is_some() && tokens.requests > before {
+                    let scaling = experiment.recipe().scaling;
+                    let charged = measured.image(index);
+                    let of_request = shown_tokens(model, price, charged, source, scaling);
+                    let requests = (tokens.requests - before) as f64;
+                    let known = tokens.image.zip(of_request);
+                    tokens.image = known.map(|(sum, each)| sum + each * requests);
+                }
             }
-            let source = &sources[place];
-            if group.condition.is_some() && tokens.requests > before {
-                let scaling = experiment.recipe().scaling;
-                let charged = measured.image(index);
-                let of_request = shown_tokens(model, price, charged, source, scaling);
-                let requests = (tokens.requests - before) as f64;
-                let known = tokens.image.zip(of_request);
-                tokens.image = known.map(|(sum, each)| sum + each * requests);
+            for request in expected.iter().filter(|request| request.model == index) {
+                let tokens = by_reading.entry(None).or_default();
+                tokens.add(request.text_tokens, request.reply_tokens);
             }
-        }
-        for request in expected.iter().filter(|request| request.model == index) {
-            let tokens = by_reading.entry(None).or_default();
-            tokens.add(request.text_tokens, request.reply_tokens);
-        }
-        let line = CostLine {
-            charged_image_tokens: measured.image(index),
-            ..line(model, price, &by_reading, E::PHASES[phase])
-        };
-        (index, line)
-    });
-    lines.filter(|(_, line)| line.requests > 0).collect()
+            let line = CostLine {
+                charged_image_tokens: measured.image(index),
+                ..line(model, price, &by_reading, E::PHASES[phase])
+            };
+            (index, line)
+        })
+        .filter(|(_, line)| line.requests > 0)
+        .collect()
 }
 
 /// The requests to one endpoint and their tokens.
@@ -310,8 +314,11 @@ fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
         tokens,
     } = load;
     let (requests, tokens) = (*requests, *tokens);
-    let times = latencies_ms.iter().filter(|ms| **ms > 0);
-    let times: Vec<f64> = times.map(|ms| *ms as f64 / 1e3).collect();
+    let times: Vec<f64> = latencies_ms
+        .iter()
+        .filter(|ms| **ms > 0)
+        .map(|ms| *ms as f64 / 1e3)
+        .collect();
     let (each, origin) = if times.is_empty() {
         (REPLY_SECONDS, "assumed")
     } else {

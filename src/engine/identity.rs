@@ -32,8 +32,10 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
         ("synthesis", json!(PAPER.map(version))),
         ("enhancement", json!(darkqa_enhance::VERSION)),
     ];
-    let fields = fields.into_iter().chain(scaling);
-    fields.map(|(field, value)| (field.to_owned(), value))
+    fields
+        .into_iter()
+        .chain(scaling)
+        .map(|(field, value)| (field.to_owned(), value))
 }
 
 /// Definitions of the models, enhancers, light readings and further variants of a run.
@@ -42,26 +44,25 @@ pub(crate) fn columns<'a>(
     recipe: &Recipe,
     settings: &JobSettings,
 ) -> Columns {
-    let models = models.into_iter();
-    let models = models.map(|entry| (entry.name.to_string(), model(entry)));
-    let enhancers = recipe.enhancers.iter();
-    let enhancers = enhancers.map(|(name, digest)| {
+    let models = models
+        .into_iter()
+        .map(|entry| (entry.name.to_string(), model(entry)));
+    let enhancers = recipe.enhancers.iter().map(|(name, digest)| {
         let content = enhancer(digest, &settings.loading.size);
         (name.as_str().to_owned(), content)
     });
-    let elsewhere = recipe.elsewhere.iter();
-    let elsewhere = elsewhere.map(|images| {
+    let elsewhere = recipe.elsewhere.iter().map(|images| {
         let content = json!({"--enhanced": images.digest()});
         (images.name().as_str().to_owned(), content)
     });
     let enhancers = enhancers.chain(elsewhere);
     let degradations = settings.light.degradations();
-    let readings = degradations
+    let readings: BTreeSet<&ReadingName> = degradations
         .iter()
         .flatten()
         .filter_map(Degradation::reading)
-        .chain(settings.light.matches.iter().filter_map(PairDark::reading));
-    let readings: BTreeSet<&ReadingName> = readings.collect();
+        .chain(settings.light.matches.iter().filter_map(PairDark::reading))
+        .collect();
     let kinds: BTreeSet<Kind> = degradations
         .iter()
         .flatten()
@@ -70,17 +71,22 @@ pub(crate) fn columns<'a>(
         .collect();
     let kinds = kinds.into_iter().filter(|kind| !PAPER.contains(kind));
     let kinds = kinds.map(|kind| (kind.word().to_owned(), variant(kind, &recipe.kinds)));
-    let noise = recipe.kinds.sensor.readings.iter();
-    let noise = noise.filter(|(name, _)| readings.contains(name));
-    let noise = noise.map(|(name, content)| (name.to_string(), reading(content)));
+    let noise = recipe
+        .kinds
+        .sensor
+        .readings
+        .iter()
+        .filter(|(name, _)| readings.contains(name))
+        .map(|(name, content)| (name.to_string(), reading(content)));
     let columns: [(&str, BTreeMap<String, Value>); 4] = [
         ("model", models.collect()),
         ("enhancer", enhancers.collect()),
         ("reading", noise.collect()),
         ("variant", kinds.collect()),
     ];
-    let filled = columns.into_iter().filter(|(_, values)| !values.is_empty());
-    filled
+    columns
+        .into_iter()
+        .filter(|(_, values)| !values.is_empty())
         .map(|(column, values)| (column.to_owned(), values))
         .collect()
 }

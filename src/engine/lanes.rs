@@ -102,11 +102,12 @@ impl<'a, I> Lanes<'a, I> {
 
     /// The maximum number of requests in flight in a lane now.
     fn width(&self, lane: &Lane<I>) -> usize {
-        let widths = lane
+        let width = lane
             .models
             .iter()
-            .filter_map(|model| self.models[*model].model.width());
-        let width = widths.max().unwrap_or(self.default_width);
+            .filter_map(|model| self.models[*model].model.width())
+            .max()
+            .unwrap_or(self.default_width);
         width.min(lane.room)
     }
 

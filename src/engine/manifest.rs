@@ -27,9 +27,11 @@ pub(crate) fn run_manifest<E: Experiment>(
 ) -> Result<RunManifest> {
     let job = experiment.settings();
     let mut settings = identity::settings(job);
-    let notes = experiment.notes().into_iter();
-    let notes = notes.map(|(field, value)| (field.to_owned(), value));
-    let notes: BTreeMap<String, Value> = notes.collect();
+    let notes: BTreeMap<String, Value> = experiment
+        .notes()
+        .into_iter()
+        .map(|(field, value)| (field.to_owned(), value))
+        .collect();
     settings.extend(notes.clone());
     let mut columns = stored
         .as_ref()

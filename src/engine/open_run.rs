@@ -484,22 +484,25 @@ pub(crate) fn pipeline<'a, E: Experiment>(
 
 /// Largest image that all endpoints take; `None` if all models are built in. Each image is made once, for all of them.
 pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
-    let servers = settings.ask.servers().into_iter();
-    let limits = servers.map(|server| {
-        let stated = server.sending.max_image;
-        let stated = stated.map(|megabytes| ImageLimit::stated((megabytes * 1e6) as usize));
-        let known = server.replicas.iter().map(ImageLimit::from_access);
-        stated.or_else(|| known.reduce(ImageLimit::stricter))
-    });
-    let limit = limits.flatten().reduce(ImageLimit::stricter)?;
+    let limit = settings
+        .ask
+        .servers()
+        .into_iter()
+        .filter_map(|server| {
+            let stated = server.sending.max_image;
+            let stated = stated.map(|megabytes| ImageLimit::stated((megabytes * 1e6) as usize));
+            let known = server.replicas.iter().map(ImageLimit::from_access);
+            stated.or_else(|| known.reduce(ImageLimit::stricter))
+        })
+        .reduce(ImageLimit::stricter)?;
     // A model that is shown none may have any.
-    let seeing = settings
+    let replicas = settings
         .ask
         .models
         .iter()
-        .filter(|model| model.view == View::Image);
-    let servers = seeing.filter_map(|model| model.server.as_ref());
-    let replicas = servers.flat_map(|server| &server.replicas);
+        .filter(|model| model.view == View::Image)
+        .filter_map(|model| model.server.as_ref())
+        .flat_map(|server| &server.replicas);
     Some(replicas.fold(limit, ImageLimit::with_requests_to))
 }
 
@@ -522,10 +525,11 @@ pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> H
     else {
         return HashSet::new();
     };
-    let lost = stored
+    stored
         .iter()
-        .filter(|trial| trial.failed() && trial.lost_attempts() > most);
-    lost.map(|trial| trial.key).collect()
+        .filter(|trial| trial.failed() && trial.lost_attempts() > most)
+        .map(|trial| trial.key)
+        .collect()
 }
 
 /// Keys of the trials whose reply was truncated at a limit below that of their model now.
@@ -538,12 +542,18 @@ pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> Ha
         let limit = limits.get(trial.model.as_str());
         limit.is_some_and(|limit| trial.is_truncated_below(*limit))
     };
-    let truncated = stored.iter().filter(is_truncated);
-    truncated.map(|trial| trial.key).collect()
+    stored
+        .iter()
+        .filter(is_truncated)
+        .map(|trial| trial.key)
+        .collect()
 }
 
 /// Keys of the trials that have a reply.
 pub(crate) fn answered(stored: &[StoredTrial]) -> HashSet<TrialKey> {
-    let answered = stored.iter().filter(|record| !record.failed());
-    answered.map(|record| record.key).collect()
+    stored
+        .iter()
+        .filter(|record| !record.failed())
+        .map(|record| record.key)
+        .collect()
 }

@@ -55,8 +55,11 @@ fn add_group<E: Experiment>(
             None => SECONDS_PER_MEGAPIXEL,
             Some(_) => SECONDS_PER_MEGAPIXEL + ENHANCED_SECONDS_PER_MEGAPIXEL,
         };
-        let made = source.frames.iter().map(|frame| frame.size);
-        let pixels = made.map(|(width, height)| f64::from(width) * f64::from(height));
+        let pixels = source
+            .frames
+            .iter()
+            .map(|frame| frame.size)
+            .map(|(width, height)| f64::from(width) * f64::from(height));
         cost.seconds += each * pixels.sum::<f64>() / 1e6;
     }
     cost.requests += group.trials.len();

@@ -122,11 +122,14 @@ impl SampledImages {
     ) -> Result<Self> {
         let mut sample = Self::default();
         let sources = experiment.sources();
-        let shown = plan.sources.iter().filter_map(|part| {
-            let source = &sources[part.source];
-            Some((part, source, source.middle()?))
-        });
-        let shown: Vec<_> = shown.collect();
+        let shown: Vec<_> = plan
+            .sources
+            .iter()
+            .filter_map(|part| {
+                let source = &sources[part.source];
+                Some((part, source, source.middle()?))
+            })
+            .collect();
         let step = shown.len().div_ceil(SAMPLED).max(1);
         for (i, (part, source, frame)) in shown.into_iter().step_by(step).enumerate() {
             let mut work = FrameWork::planned(pipeline.steps.without_store(), source, frame);

@@ -106,13 +106,12 @@ impl PromptBounds {
 
     /// The most tokens of a prompt, by the earlier prompt that is most like it; `None` if none had images of these sizes.
     fn by_comparison(&self, facts: PromptFacts<'_>) -> Option<f64> {
-        let alike = self
-            .references
+        self.references
             .iter()
-            .filter(|one| one.sizes == facts.sizes);
-        let bounds = alike
-            .map(|one| one.charged + differing_bytes(&one.prompt, facts.prompt) as u64 + JOINS);
-        bounds.min().map(|tokens| tokens as f64)
+            .filter(|one| one.sizes == facts.sizes)
+            .map(|one| one.charged + differing_bytes(&one.prompt, facts.prompt) as u64 + JOINS)
+            .min()
+            .map(|tokens| tokens as f64)
     }
 }
 
@@ -120,11 +119,11 @@ impl PromptBounds {
 fn by_length(facts: PromptFacts<'_>) -> f64 {
     let text: usize = facts.prompt.parts().iter().map(|part| part.len()).sum();
     let text = (text + facts.system_bytes) as u64 + TEMPLATE_TOKENS;
-    let areas = facts
+    let tiled = facts
         .sizes
         .iter()
-        .map(|(width, height)| (width * height) as u64);
-    let tiled = areas.map(|area| area.div_ceil(PIXELS_PER_TOKEN).max(MIN_IMAGE_TOKENS));
+        .map(|(width, height)| (width * height) as u64)
+        .map(|area| area.div_ceil(PIXELS_PER_TOKEN).max(MIN_IMAGE_TOKENS));
     let images = facts
         .image_tokens
         .unwrap_or_else(|| tiled.sum::<u64>() as f64);
@@ -133,8 +132,10 @@ fn by_length(facts: PromptFacts<'_>) -> f64 {
 
 /// Bytes of a prompt's text that another one does not share at its beginning or end.
 fn differing_bytes(other: &Prompt, prompt: &Prompt) -> usize {
-    let parts = other.parts().into_iter().zip(prompt.parts());
-    parts
+    other
+        .parts()
+        .into_iter()
+        .zip(prompt.parts())
         .map(|(other, text)| differing(other.as_bytes(), text.as_bytes()))
         .sum()
 }

@@ -81,8 +81,9 @@ mod tests {
             file.set_modified(used).unwrap();
         }
         let swept = sweep(&folder, most, now).unwrap();
-        let left = days.iter().copied();
-        let left: Vec<u64> = left
+        let left: Vec<u64> = days
+            .iter()
+            .copied()
             .filter(|day| folder.place(&key(day)).exists())
             .collect();
         assert_eq!(swept.bytes, 100 * left.len() as u64);

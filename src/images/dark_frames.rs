@@ -23,15 +23,14 @@ impl<'a> DarkFrames<'a> {
         name: &EnhancerName,
     ) -> Self {
         let enhanced = |part: &SourcePlan<I>| -> Vec<Condition> {
-            let conditions = part.conditions().cloned();
-            conditions
-                .filter(|condition| condition.enhancer.as_ref() == Some(name))
+            part.conditions()
+                .filter(|&condition| condition.enhancer.as_ref() == Some(name))
+                .cloned()
                 .collect()
         };
-        let parts = plan
+        let parts: Vec<(&Source, Vec<Condition>)> = plan
             .iter()
-            .map(|part| (&sources[part.source], enhanced(part)));
-        let parts: Vec<(&Source, Vec<Condition>)> = parts
+            .map(|part| (&sources[part.source], enhanced(part)))
             .filter(|(_, conditions)| !conditions.is_empty())
             .collect();
         let spread = evenly(parts.len(), FRAMES).into_iter();

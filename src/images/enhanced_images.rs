@@ -84,11 +84,13 @@ impl EnhancedImages {
     fn open(args: &EnhancedFolder) -> Result<Self> {
         let mut paths = Vec::new();
         add_files(&args.folder, "", 0, &mut paths).map_err(|e| e.usage_at("--enhanced"))?;
-        let files = paths.into_par_iter().map(|path| {
-            let file = EnhancedFile::open(&args.folder.join(&path))?;
-            Ok((path, file))
-        });
-        let files = files.collect::<Result<BTreeMap<_, _>>>()?;
+        let files = paths
+            .into_par_iter()
+            .map(|path| {
+                let file = EnhancedFile::open(&args.folder.join(&path))?;
+                Ok((path, file))
+            })
+            .collect::<Result<BTreeMap<_, _>>>()?;
         if files.is_empty() {
             let problem = format_args!("{}: no image is in it", args.folder.display());
             return Err(Error::usage("--enhanced", problem));

@@ -243,15 +243,17 @@ impl<'a> ImagePipeline<'a> {
         let steps = self.steps;
         // One frame per thread at a time, because each holds a frame in its full size.
         for frames in source.frames.chunks(rayon::current_num_threads()) {
-            let staged = frames.par_iter().map(|frame| {
-                let mut work = FrameWork::planned(steps, source, frame);
-                let mut staged = Vec::with_capacity(conditions.len());
-                for condition in conditions {
-                    staged.push(work.stage(condition, Needed::Image)?);
-                }
-                Ok(staged)
-            });
-            let staged = staged.collect::<Result<Vec<Vec<StagedImage<'_>>>>>()?;
+            let staged = frames
+                .par_iter()
+                .map(|frame| {
+                    let mut work = FrameWork::planned(steps, source, frame);
+                    let mut staged = Vec::with_capacity(conditions.len());
+                    for condition in conditions {
+                        staged.push(work.stage(condition, Needed::Image)?);
+                    }
+                    Ok(staged)
+                })
+                .collect::<Result<Vec<Vec<StagedImage<'_>>>>>()?;
             for (frame, staged) in frames.iter().zip(staged) {
                 let conditions = conditions.iter().zip(&mut images);
                 for (staged, (condition, images)) in staged.into_iter().zip(conditions) {
@@ -372,8 +374,10 @@ impl<'a> ImagePipeline<'a> {
     }
 
     fn resting(&self, name: &EnhancerName) -> Option<&RestingEnhancer> {
-        let mut resting = self.resting.iter().map(Arc::as_ref);
-        resting.find(|enhancer| enhancer.name() == name)
+        self.resting
+            .iter()
+            .map(Arc::as_ref)
+            .find(|enhancer| enhancer.name() == name)
     }
 
     fn enhancer(&mut self, name: &EnhancerName) -> Result<&mut Enhancer> {

@@ -60,10 +60,11 @@ impl ImageFlags {
         };
         let flags = words.iter().flat_map(|(flag, value)| match value {
             Value::Bool(true) => vec![format!("--{flag}")],
-            Value::Array(list) => {
-                let texts = list.iter().map(text);
-                texts.map(|text| format!("--{flag}={text}")).collect()
-            }
+            Value::Array(list) => list
+                .iter()
+                .map(text)
+                .map(|text| format!("--{flag}={text}"))
+                .collect(),
             value => vec![format!("--{flag}={}", text(value))],
         });
         Self::try_parse_from(flags)
@@ -90,8 +91,12 @@ pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
         if source != Some(ValueSource::CommandLine) && !(several && source.is_some()) {
             continue;
         }
-        let texts = matches.get_raw(id).into_iter().flatten();
-        let texts: Option<Vec<Value>> = texts.map(|text| Some(text.to_str()?.into())).collect();
+        let texts: Option<Vec<Value>> = matches
+            .get_raw(id)
+            .into_iter()
+            .flatten()
+            .map(|text| Some(text.to_str()?.into()))
+            .collect();
         let mut texts = texts.ok_or_else(|| {
             let problem = "cannot be stored in the manifest: the value is not valid Unicode";
             Error::usage(spelled(flag), problem)

@@ -35,10 +35,10 @@ pub(crate) fn names(sources: &[Source]) -> Vec<PhotoName> {
 pub(crate) fn tell(frames: &dyn Frames, sources: &[Source], progress: &Progress) {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     for name in names(sources) {
-        let of = all
+        let of: Vec<(&SourceFrame, &SourcePhotograph)> = all
             .iter()
-            .filter_map(|frame| Some((*frame, frame.photograph(&name)?)));
-        let of: Vec<(&SourceFrame, &SourcePhotograph)> = of.collect();
+            .filter_map(|frame| Some((*frame, frame.photograph(&name)?)))
+            .collect();
         let sample = of.len().min(SAMPLED);
         let measured = (0..sample).into_par_iter().filter_map(|index| {
             let (frame, photo) = of[index * of.len() / sample];

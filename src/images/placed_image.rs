@@ -318,10 +318,9 @@ pub(crate) fn differing(one: &Value, other: &Value) -> Vec<String> {
         return Vec::new();
     };
     let names: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
-    let differ = names
+    names
         .into_iter()
-        .filter(|name| one.get(*name) != other.get(*name));
-    differ
+        .filter(|name| one.get(*name) != other.get(*name))
         .map(|name| {
             let inner = one.get(name).zip(other.get(name));
             match inner.map_or_else(Vec::new, |(one, other)| differing(one, other)) {

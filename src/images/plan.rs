@@ -48,8 +48,10 @@ pub(crate) struct Plan<I> {
 impl<I> Plan<I> {
     /// A plan of all these trials, none of them answered.
     pub(crate) fn new(sources: Vec<SourcePlan<I>>) -> Self {
-        let groups = sources.iter().flat_map(|source| &source.groups);
-        let trials = groups.flat_map(|group| &group.trials);
+        let trials = sources
+            .iter()
+            .flat_map(|source| &source.groups)
+            .flat_map(|group| &group.trials);
         let keys = trials.map(|trial| trial.key).collect();
         let mut by_source = BTreeMap::new();
         for part in &sources {
@@ -90,14 +92,15 @@ impl<I> Plan<I> {
             let planned: BTreeSet<Condition> = own
                 .map(|own| self.sources[own].conditions().cloned().collect())
                 .unwrap_or_default();
-            let conditions = groups.into_iter().filter_map(|group| group.condition);
-            let wanted = conditions
-                .filter(|condition| !planned.contains(condition) && is_wanted(source, condition));
-            let groups = wanted.map(|condition| TrialGroup {
-                condition: Some(condition),
-                trials: Vec::new(),
-            });
-            let groups: Vec<TrialGroup<I>> = groups.collect();
+            let groups: Vec<TrialGroup<I>> = groups
+                .into_iter()
+                .filter_map(|group| group.condition)
+                .filter(|condition| !planned.contains(condition) && is_wanted(source, condition))
+                .map(|condition| TrialGroup {
+                    condition: Some(condition),
+                    trials: Vec::new(),
+                })
+                .collect();
             match own {
                 Some(own) => self.sources[own].groups.extend(groups),
                 None if groups.is_empty() => {}
@@ -116,8 +119,11 @@ impl<I> Plan<I> {
         is_cheap: impl Fn(usize) -> bool,
     ) {
         let is_untouched = |group: &TrialGroup<I>| group.condition == Some(Condition::L0);
-        let untouched = self.groups().filter(|(_, group)| is_untouched(group));
-        let available: usize = untouched.map(|(_, group)| group.trials.len()).sum();
+        let available: usize = self
+            .groups()
+            .filter(|(_, group)| is_untouched(group))
+            .map(|(_, group)| group.trials.len())
+            .sum();
         if available < fewest {
             return;
         }
@@ -141,8 +147,10 @@ impl<I> Plan<I> {
 
     /// Number of trials that remain to be asked and have keys for which `is_counted` holds.
     pub(crate) fn remaining_of(&self, is_counted: impl Fn(&TrialKey) -> bool) -> usize {
-        let trials = self.groups().flat_map(|(_, group)| &group.trials);
-        trials.filter(|trial| is_counted(&trial.key)).count()
+        self.groups()
+            .flat_map(|(_, group)| &group.trials)
+            .filter(|trial| is_counted(&trial.key))
+            .count()
     }
 
     /// Number of trials that remain to be asked.

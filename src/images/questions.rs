@@ -58,16 +58,18 @@ fn usable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -> Resul
     let with_maps = dataset.questions().is_empty() && dataset.labels().is_some();
     let shown = dataset.shown_images();
     let bar = progress.bar("decoding images", shown.len());
-    let unusable = shown.into_par_iter().filter_map(|frame| {
-        let read = if with_maps {
-            dataset.frame(frame).map(drop)
-        } else {
-            dataset.decode_all(frame)
-        };
-        bar.inc();
-        Some((frame.clone(), read.err()?.to_string()))
-    });
-    let unusable: BTreeMap<FrameId, String> = unusable.collect();
+    let unusable: BTreeMap<FrameId, String> = shown
+        .into_par_iter()
+        .filter_map(|frame| {
+            let read = if with_maps {
+                dataset.frame(frame).map(drop)
+            } else {
+                dataset.decode_all(frame)
+            };
+            bar.inc();
+            Some((frame.clone(), read.err()?.to_string()))
+        })
+        .collect();
     drop(bar);
     dataset.without(&unusable, skip)
 }
@@ -175,8 +177,7 @@ pub(crate) fn select(
     selection: &SelectionArgs,
 ) -> Result<Vec<Question>> {
     let wanted = &selection.families;
-    let present = questions.iter().map(|question| &question.family);
-    let present: BTreeSet<&Family> = present.collect();
+    let present: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
     if let Some(missing) = wanted.iter().find(|family| !present.contains(family)) {
         let present: Vec<&str> = present.into_iter().map(Family::name).collect();
         let problem = format!(

@@ -33,14 +33,16 @@ pub(crate) fn by_rule(
     let palette = Palette::built_in()?;
     let names: Vec<&FrameId> = dataset.frames().collect();
     let bar = progress.bar("making questions", names.len());
-    let frames = names.par_iter().map(|name| {
-        let frame = dataset.frame(name)?;
-        let key = Digest::from_bytes(name.0.as_bytes());
-        let statistics = measure(&frame, labels, rules, &palette, key);
-        bar.inc();
-        statistics
-    });
-    let frames: Vec<FrameStatistics> = frames.collect::<Result<_>>()?;
+    let frames: Vec<FrameStatistics> = names
+        .par_iter()
+        .map(|name| {
+            let frame = dataset.frame(name)?;
+            let key = Digest::from_bytes(name.0.as_bytes());
+            let statistics = measure(&frame, labels, rules, &palette, key);
+            bar.inc();
+            statistics
+        })
+        .collect::<Result<_>>()?;
     drop(bar);
     let request = QuestionRequest {
         dataset: dataset.title(),

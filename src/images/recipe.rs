@@ -178,9 +178,11 @@ impl Recipe {
     pub(crate) fn check(&self, sources: &[Source], conditions: &[Condition]) -> Result<()> {
         for source in sources {
             for frame in &source.frames {
-                let shown = conditions.iter().filter(|of| frame.can_show(of));
-                let how = shown.map(|condition| frame.degradation(condition));
-                let how = how.collect::<Result<BTreeSet<Option<Degradation>>>>()?;
+                let how = conditions
+                    .iter()
+                    .filter(|of| frame.can_show(of))
+                    .map(|condition| frame.degradation(condition))
+                    .collect::<Result<BTreeSet<Option<Degradation>>>>()?;
                 for how in how.iter().flatten().filter(|how| how.kind().has_motion()) {
                     self.applied(&source.name, frame, how)?;
                 }

@@ -134,19 +134,21 @@ impl SourceFrame {
 
 /// The photographs of a frame. Their files are read, and must be images.
 fn inspect_photographs(frames: &dyn Frames, id: &FrameId) -> Result<Vec<SourcePhotograph>> {
-    let photos = frames.photographs(id).into_iter();
-    let photos = photos.map(|(name, stated)| {
-        let picture = frames.photograph(id, &name)?;
-        picture.check()?;
-        Ok(SourcePhotograph {
-            digest: picture.digest(),
-            note: picture.note(),
-            name,
-            stated,
-            facts: None,
+    frames
+        .photographs(id)
+        .into_iter()
+        .map(|(name, stated)| {
+            let picture = frames.photograph(id, &name)?;
+            picture.check()?;
+            Ok(SourcePhotograph {
+                digest: picture.digest(),
+                note: picture.note(),
+                name,
+                stated,
+                facts: None,
+            })
         })
-    });
-    photos.collect()
+        .collect()
 }
 
 /// The frames that are shown together: one frame, those of a question that shows several, or those of a walk.
@@ -251,16 +253,18 @@ pub(crate) fn inspect_all(
 ) -> Result<Vec<Source>> {
     let first = first_asked(questions);
     let bar = progress.bar("reading images", first.len());
-    let sources = first.into_par_iter().map(|question| {
-        let source = Source::from_questions(dataset, &question.frame).map_err(|e| {
-            let problem = format_args!("{e}; --skip bad leaves such questions out");
-            Error::data(
-                format_args!("question {:?}", excerpt(&question.id.0, 60)),
-                problem,
-            )
-        })?;
-        bar.inc();
-        Ok(source)
-    });
-    sources.collect()
+    first
+        .into_par_iter()
+        .map(|question| {
+            let source = Source::from_questions(dataset, &question.frame).map_err(|e| {
+                let problem = format_args!("{e}; --skip bad leaves such questions out");
+                Error::data(
+                    format_args!("question {:?}", excerpt(&question.id.0, 60)),
+                    problem,
+                )
+            })?;
+            bar.inc();
+            Ok(source)
+        })
+        .collect()
 }

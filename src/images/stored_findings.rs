@@ -68,9 +68,10 @@ impl<'a> StoredFindings<'a> {
         model: &Model,
         frames: &[(&Source, Vec<Condition>)],
     ) -> Result<FindingsPlace<'a>> {
-        let facts = frames.iter();
-        let facts = facts.map(|(source, conditions)| frame_facts(recipe, source, conditions));
-        let facts = facts.collect::<Result<Vec<_>>>()?;
+        let facts = frames
+            .iter()
+            .map(|(source, conditions)| frame_facts(recipe, source, conditions))
+            .collect::<Result<Vec<_>>>()?;
         Ok(FindingsPlace {
             store: self.store,
             opened: self.key(model, None)?,

@@ -106,15 +106,17 @@ impl WalkFolder {
         progress: &Progress,
     ) -> Vec<Source> {
         let bar = progress.bar("reading walks", names.len());
-        let sources = names.par_iter().map(|name| {
-            let source = self.source(name, settings);
-            bar.inc();
-            source.unwrap_or_else(|problem| Source {
-                problem: Some(problem.to_string()),
-                ..Source::unseen(FrameId(name.clone()))
+        names
+            .par_iter()
+            .map(|name| {
+                let source = self.source(name, settings);
+                bar.inc();
+                source.unwrap_or_else(|problem| Source {
+                    problem: Some(problem.to_string()),
+                    ..Source::unseen(FrameId(name.clone()))
+                })
             })
-        });
-        sources.collect()
+            .collect()
     }
 
     /// The source of a walk, with the frames that are shown.

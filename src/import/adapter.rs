@@ -141,8 +141,8 @@ pub(crate) trait Adapter: fmt::Debug + Sync {
         let stated = hfov.map(|hfov| pinhole(width, height, hfov));
         let default = sensor
             .as_ref()
-            .filter(|sensor| sensor.size == (width, height));
-        let default = default.map(|sensor| sensor.camera);
+            .filter(|sensor| sensor.size == (width, height))
+            .map(|sensor| sensor.camera);
         frame.intrinsics.or(stated).or(default)
     }
 

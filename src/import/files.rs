@@ -148,8 +148,10 @@ fn hdf5_depth(file: &[u8]) -> Result<Array2<u32>, String> {
     let array = Hdf5Array::parse(file, ARRAY)?;
     let metres = array.numbers()?;
     let size = metres.size;
-    let depths = metres.floats()?.map(|metres| millimetres(metres, 1_000.0));
-    let depths = depths.collect::<Result<Vec<u32>, String>>()?;
+    let depths = metres
+        .floats()?
+        .map(|metres| millimetres(metres, 1_000.0))
+        .collect::<Result<Vec<u32>, String>>()?;
     Array2::from_shape_vec(size, depths).map_err(|e| e.to_string())
 }
 

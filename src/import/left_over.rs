@@ -87,14 +87,14 @@ impl LeftOver {
         }
         let mut kinds: Vec<(&String, &Files)> = self.0.iter().collect();
         kinds.sort_by_key(|(kind, files)| (std::cmp::Reverse(files.count), *kind));
-        let named = kinds
+        let mut named: Vec<String> = kinds
             .iter()
             .take(MOST_NAMED)
             .map(|(kind, files)| match files.count {
                 1 => files.first.clone(),
                 count => format!("{count} {kind}"),
-            });
-        let mut named: Vec<String> = named.collect();
+            })
+            .collect();
         let more: usize = kinds
             .iter()
             .skip(MOST_NAMED)

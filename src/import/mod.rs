@@ -81,12 +81,13 @@ pub(crate) fn open_all(
 /// # Errors
 /// If a folder cannot be read.
 pub(crate) fn left_over(folders: &[PathBuf], adapter: &dyn Adapter) -> Result<LeftOver> {
-    let images = adapter
+    let read: BTreeSet<PathBuf> = adapter
         .listing()
         .frames
         .iter()
-        .map(|frame| frame.rgb.clone());
-    let read: BTreeSet<PathBuf> = images.chain(adapter.further_files()).collect();
+        .map(|frame| frame.rgb.clone())
+        .chain(adapter.further_files())
+        .collect();
     let mut all = LeftOver::default();
     for folder in folders {
         all.join(LeftOver::in_folder(folder, &read)?);

@@ -13,12 +13,12 @@ impl<T> Polygon<T> {
     /// Twice the area in square pixels, by the shoelace formula.
     fn size(&self) -> f64 {
         let next = self.corners.iter().cycle().skip(1);
-        let cross = self
-            .corners
+        self.corners
             .iter()
             .zip(next)
-            .map(|((x, y), (u, v))| x * v - u * y);
-        cross.sum::<f64>().abs()
+            .map(|((x, y), (u, v))| x * v - u * y)
+            .sum::<f64>()
+            .abs()
     }
 }
 
@@ -50,8 +50,9 @@ pub(super) fn draw<T: Copy + Default>(
 /// The columns at which the edges of a polygon cross a row, from left to right.
 fn crossings(corners: &[(f64, f64)], y: f64) -> Vec<f64> {
     let next = corners.iter().cycle().skip(1);
-    let edges = corners.iter().zip(next);
-    let mut crossings: Vec<f64> = edges
+    let mut crossings: Vec<f64> = corners
+        .iter()
+        .zip(next)
         .filter(|((_, a), (_, b))| (*a <= y) != (*b <= y))
         .map(|((x, a), (u, b))| x + (y - a) / (b - a) * (u - x))
         .filter(|x| x.is_finite())

@@ -300,13 +300,15 @@ impl Adapter for Scannet {
 
     fn further_files(&self) -> Vec<PathBuf> {
         let maps = self.maps.iter();
-        let maps = maps.flat_map(|maps| {
+        maps.flat_map(|maps| {
             maps.depth
                 .iter()
                 .chain([&maps.labels])
                 .chain(&maps.instances)
-        });
-        maps.chain(&self.about).cloned().collect()
+        })
+        .chain(&self.about)
+        .cloned()
+        .collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

@@ -213,12 +213,18 @@ impl Adapter for SunRgbd {
     }
 
     fn further_files(&self) -> Vec<PathBuf> {
-        let frames = self.files.iter();
-        let frames = frames.flat_map(|files| {
-            let depth = files.depth.iter().map(|(_, path)| path);
-            depth.chain([&files.annotation])
-        });
-        frames.chain(&self.about).cloned().collect()
+        self.files
+            .iter()
+            .flat_map(|files| {
+                files
+                    .depth
+                    .iter()
+                    .map(|(_, path)| path)
+                    .chain([&files.annotation])
+            })
+            .chain(&self.about)
+            .cloned()
+            .collect()
     }
 
     fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

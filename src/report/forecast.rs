@@ -279,14 +279,15 @@ fn by_endpoint(lines: &[CostLine]) -> String {
         }
     }
     let several = at.len() > 1;
-    let lines = at.into_iter().map(|(endpoints, models)| {
-        if several {
-            format!("asked at {endpoints}: {}\n", models.join(", "))
-        } else {
-            format!("asked at {endpoints}\n")
-        }
-    });
-    lines.collect()
+    at.into_iter()
+        .map(|(endpoints, models)| {
+            if several {
+                format!("asked at {endpoints}: {}\n", models.join(", "))
+            } else {
+                format!("asked at {endpoints}\n")
+            }
+        })
+        .collect()
 }
 
 /// The requests of all models by light reading; empty with fewer than two readings.
@@ -300,15 +301,17 @@ fn by_reading(lines: &[CostLine]) -> String {
     if sums.keys().flatten().count() < 2 {
         return String::new();
     }
-    let parts = sums.into_iter().map(|(reading, (requests, dollars))| {
-        let name = reading.map_or(
-            "shared by all (L0, exposure drop, blind)",
-            ReadingName::as_str,
-        );
-        let price = dollars.map_or("price unknown".to_owned(), money);
-        format!("{name} {} ({price})", count(requests as f64))
-    });
-    let parts: Vec<String> = parts.collect();
+    let parts: Vec<String> = sums
+        .into_iter()
+        .map(|(reading, (requests, dollars))| {
+            let name = reading.map_or(
+                "shared by all (L0, exposure drop, blind)",
+                ReadingName::as_str,
+            );
+            let price = dollars.map_or("price unknown".to_owned(), money);
+            format!("{name} {} ({price})", count(requests as f64))
+        })
+        .collect();
     format!("requests by reading: {}\n", parts.join(", "))
 }
 

@@ -144,8 +144,9 @@ impl<'a> RunList<'a> {
             Self::One(run, folder) => (Some(run), folder, [].as_slice()),
             Self::Several(runs) => (None, None, runs),
         };
-        let runs = runs.iter();
-        let runs = runs.map(|&(run, folder)| ComparedRun { folder, run });
+        let runs = runs
+            .iter()
+            .map(|&(run, folder)| ComparedRun { folder, run });
         RunsHead {
             schema,
             folder,

@@ -127,8 +127,7 @@ impl<'a> MarkdownReport<'a> {
 
     /// The text.
     pub(crate) fn text(&self) -> String {
-        let names = self.names.iter().map(|name| inline(name));
-        let names: Vec<String> = names.collect();
+        let names: Vec<String> = self.names.iter().map(|name| inline(name)).collect();
         let mut text = format!("### Seeing in the dark: {}\n\n", names.join(", "));
         let _ = writeln!(text, "{}\n", block(&self.head.join(" · ")));
         for alert in self.alerts {

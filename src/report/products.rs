@@ -22,10 +22,11 @@ pub fn products<'a>(
     report: &'a ChoiceReport<'a>,
     inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures = drawings(report.findings, &Names::default()).into_iter();
-    let figures = figures.chain(views::drawings(report.findings));
-    let figures = figures.map(|drawing| figure(drawing.name, &drawing.caption, &drawing.chart));
-    let figures: Vec<Figure> = figures.collect::<Result<_>>()?;
+    let figures: Vec<Figure> = drawings(report.findings, &Names::default())
+        .into_iter()
+        .chain(views::drawings(report.findings))
+        .map(|drawing| figure(drawing.name, &drawing.caption, &drawing.chart))
+        .collect::<Result<_>>()?;
     let page = page(report, &figures, inputs)?;
     files(&report.tables, &report.sentences, figures, page, inputs)
 }

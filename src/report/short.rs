@@ -179,8 +179,10 @@ fn table(report: &ChoiceReport<'_>) -> String {
     let longest = rows.iter().map(|row| row.name.chars().count()).max();
     let titles = rows.iter().map(|row| row.block.chars().count()).max();
     let most = Axis::ALL.map(|axis| {
-        let on = levels.iter().filter(|level| level.is_shown_on(axis));
-        on.count()
+        levels
+            .iter()
+            .filter(|level| level.is_shown_on(axis))
+            .count()
     });
     let most = most.into_iter().max().unwrap_or_default();
     let room = WIDTH
@@ -193,8 +195,11 @@ fn table(report: &ChoiceReport<'_>) -> String {
         let questions = counted(common.shared_questions, "question");
         format!(" on the {questions} that all models with images answered")
     });
-    let counts = rows.iter().flat_map(|row| row.cells.values());
-    let counts: BTreeSet<usize> = counts.filter_map(|cell| Some(cell.accuracy?.n)).collect();
+    let counts: BTreeSet<usize> = rows
+        .iter()
+        .flat_map(|row| row.cells.values())
+        .filter_map(|cell| Some(cell.accuracy?.n))
+        .collect();
     let counts = match (counts.first(), counts.last()) {
         (Some(least), Some(most)) if least < most => format!("; n from {least} to {most}"),
         _ => String::new(),
@@ -204,8 +209,11 @@ fn table(report: &ChoiceReport<'_>) -> String {
         for axis in Axis::ALL {
             let is_on = |level: &AxisLevel| level.is_shown_on(axis);
             let has_level = |row: &&TableLine<'_>| {
-                let mut axes = row.cells.keys().filter_map(|level| level.axis());
-                axes.next().unwrap_or(Axis::LIGHT) == axis
+                row.cells
+                    .keys()
+                    .find_map(|level| level.axis())
+                    .unwrap_or(Axis::LIGHT)
+                    == axis
             };
             let block: Vec<TableLine<'_>> = block.iter().filter(has_level).cloned().collect();
             let levels: Vec<AxisLevel> = levels.iter().copied().filter(is_on).collect();

@@ -53,8 +53,11 @@ struct StudyPage<'a> {
 /// If the questions cannot be written.
 pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
     let names = items.iter().flat_map(|item| {
-        let images = item.shots.iter().flat_map(|shot| &shot.images);
-        let shots = images.map(String::as_bytes);
+        let shots = item
+            .shots
+            .iter()
+            .flat_map(|shot| &shot.images)
+            .map(String::as_bytes);
         std::iter::once(item.id.as_bytes()).chain(shots)
     });
     let set = Digest::from_parts(names);

@@ -160,14 +160,16 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let workers = pool(args.threads.threads)?;
     let (bar, tally) = (progress.bar("frames", frames.len()), InputTally::default());
     let written: Vec<Option<WrittenFrame>> = workers.install(|| {
-        let frames = frames.par_iter().map(|frame| {
-            let written = write_frame(args, out, &*adapter, frame, &tally);
-            bar.inc();
-            written
-                .map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
-                .ok()
-        });
-        frames.collect()
+        frames
+            .par_iter()
+            .map(|frame| {
+                let written = write_frame(args, out, &*adapter, frame, &tally);
+                bar.inc();
+                written
+                    .map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
+                    .ok()
+            })
+            .collect()
     });
     drop(bar);
     tally.warn();

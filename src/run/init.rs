@@ -168,12 +168,15 @@ fn room_lines(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
 /// Copies images of a folder, and returns lines about them that are true of any image: whether it has colours, and its form.
 fn frame_lines(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
     let dataset = Dataset::from_images(frames, &[])?;
-    let copied = dataset.frames().take(PICTURES).map(|frame| {
-        let path = dataset.image_file(frame).unwrap_or(frames);
-        let name = path.file_name().unwrap_or_default();
-        (frame, path, folder.join(name))
-    });
-    let copied: Vec<(&FrameId, &Path, PathBuf)> = copied.collect();
+    let copied: Vec<(&FrameId, &Path, PathBuf)> = dataset
+        .frames()
+        .take(PICTURES)
+        .map(|frame| {
+            let path = dataset.image_file(frame).unwrap_or(frames);
+            let name = path.file_name().unwrap_or_default();
+            (frame, path, folder.join(name))
+        })
+        .collect();
     // The folder may be that of the images.
     let is_itself = |path: &Path, copy: &Path| path.canonicalize().ok() == copy.canonicalize().ok();
     let mut others = copied

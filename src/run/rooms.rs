@@ -50,13 +50,16 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     let rooms: BTreeMap<FrameId, Room> = args.rooms.all().collect();
     let bar = progress.bar("rooms", rooms.len());
     let frames: Vec<WrittenFrame> = workers.install(|| {
-        let frames = rooms.values().collect::<Vec<_>>().into_par_iter();
-        let frames = frames.map(|room| {
-            let frame = write_frame(args, room);
-            bar.inc();
-            frame
-        });
-        frames.collect::<Result<_>>()
+        rooms
+            .values()
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|room| {
+                let frame = write_frame(args, room);
+                bar.inc();
+                frame
+            })
+            .collect::<Result<_>>()
     })?;
     drop(bar);
     // The frames of a scene share a file of names, which two threads must not write at once.

@@ -93,7 +93,7 @@ impl Baseline {
         let questions = combined.questions.iter().chain(&old.questions);
         let clusters = clusters(&trials, questions);
         let grid = Grid::for_models(&trials, &clusters, &combined.listing, |_| true);
-        let pairs = grid
+        let pairs: Vec<(usize, usize)> = grid
             .subjects
             .iter()
             .enumerate()
@@ -105,8 +105,8 @@ impl Baseline {
                     ..subject.in_any_light()
                 };
                 Some((index, grid.find(&old)?))
-            });
-        let pairs: Vec<(usize, usize)> = pairs.collect();
+            })
+            .collect();
         let mut costs = SubjectCosts::from_joined(combined)?;
         let mut run = PricedRun::new(&old.manifest)?;
         for trial in old_trials.iter() {
@@ -127,8 +127,10 @@ impl Baseline {
     /// control shows that it proves nothing.
     pub(super) fn add_to(&self, report: &mut ChoiceReport<'_>) {
         let is_hidden = report.findings.observer.is_hidden();
-        let rows = self.rows.iter();
-        let rows = rows.filter(|row| !(is_hidden && is_observer(&row.subject.model)));
+        let rows = self
+            .rows
+            .iter()
+            .filter(|row| !(is_hidden && is_observer(&row.subject.model)));
         let rows: Vec<BaselineRow> = rows.cloned().collect();
         let sentences = against_baseline(&rows, &self.old, report.findings.unit);
         report.sentences.splice(..0, sentences);

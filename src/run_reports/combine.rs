@@ -38,10 +38,11 @@ impl Combined {
         let findings = findings.for_set(self.set()).for_groups(&self.questions);
         // Replies differ from time to time: that is no other model.
         let apart = self.models.apart.iter();
-        let by_replies = apart.filter(|apart| apart.differs_by_replies_alone());
-        by_replies.fold(findings, |findings, apart| {
-            findings.with_lights_between(&apart.names)
-        })
+        apart
+            .filter(|apart| apart.differs_by_replies_alone())
+            .fold(findings, |findings, apart| {
+                findings.with_lights_between(&apart.names)
+            })
     }
 
     /// The light of the set of these runs: dark if all say so, with the brightness that the first of them measured.
@@ -184,11 +185,12 @@ fn offers(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> Vec<Offer
             orders: 1,
         });
     }
-    let offers = all.into_iter().map(|(question, offer)| OfferedChoices {
-        orders: orders.get(question).map_or(1, BTreeSet::len),
-        ..offer
-    });
-    offers.collect()
+    all.into_iter()
+        .map(|(question, offer)| OfferedChoices {
+            orders: orders.get(question).map_or(1, BTreeSet::len),
+            ..offer
+        })
+        .collect()
 }
 
 /// Checks that the true answers are known of all questions, or of none: an accuracy and an agreement are not the same measure.

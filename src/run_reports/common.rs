@@ -16,9 +16,12 @@ use darkqa_score::common::shared_items;
 pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
     let shared: HashSet<(QuestionId, Vec<String>, u32)> = {
         let grid = combined.grid();
-        let items = grid.items.iter().zip(shared_items(&grid));
-        let items = items.filter(|(_, is_shared)| *is_shared);
-        items.map(|(item, _)| owned(item.asked)).collect()
+        grid.items
+            .iter()
+            .zip(shared_items(&grid))
+            .filter(|(_, is_shared)| *is_shared)
+            .map(|(item, _)| owned(item.asked))
+            .collect()
     };
     if shared.is_empty() {
         return Err(Error::usage(
@@ -26,12 +29,12 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
             "no item was answered by every model; leave it out",
         ));
     }
-    let is_shared = combined
+    let is_shared: Vec<bool> = combined
         .trials
         .items()
         .into_iter()
-        .map(|item| item.is_some_and(|item| shared.contains(&owned(item))));
-    let is_shared: Vec<bool> = is_shared.collect();
+        .map(|item| item.is_some_and(|item| shared.contains(&owned(item))))
+        .collect();
     let trials = combined.trials.iter();
     let kept: Vec<bool> = trials.map(|trial| is_shared[trial.item_number()]).collect();
     let mut places = Vec::with_capacity(kept.len());

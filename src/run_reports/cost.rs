@@ -77,13 +77,13 @@ impl Charged {
 
 /// The price of a model of a run: the one that its file of models states, else that of the table by the name that the endpoint knows.
 pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
-    let mut stated = manifest
+    let stated = manifest
         .settings
         .get("models")
         .and_then(Value::as_array)
         .into_iter()
-        .flatten();
-    let stated = stated.find(|entry| entry["name"] == *model);
+        .flatten()
+        .find(|entry| entry["name"] == *model);
     let stated = stated.and_then(|entry| serde_json::from_value(entry.get("price")?.clone()).ok());
     let columns = manifest
         .columns

@@ -29,14 +29,15 @@ pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
         (&one.name, in_one).cmp(&(&other.name, in_other))
     });
     let names: Vec<String> = rows.iter().map(|(row, _)| row.name.clone()).collect();
-    let named = rows.into_iter().map(|(mut row, runs)| {
-        if names.iter().filter(|name| **name == row.name).count() > 1 {
-            let runs: Vec<&str> = runs.into_iter().collect();
-            row.name = format!("{} in {}", row.name, runs.join(", "));
-        }
-        row
-    });
-    named.collect()
+    rows.into_iter()
+        .map(|(mut row, runs)| {
+            if names.iter().filter(|name| **name == row.name).count() > 1 {
+                let runs: Vec<&str> = runs.into_iter().collect();
+                row.name = format!("{} in {}", row.name, runs.join(", "));
+            }
+            row
+        })
+        .collect()
 }
 
 /// Alerts about the enhancers.
@@ -121,19 +122,24 @@ fn how(note: &EnhancerNote) -> String {
 
 /// The value ranges that are assumed; `None` if they are stated.
 fn assumed(note: &EnhancerNote) -> Option<String> {
-    let assumed = note
+    let ranges: BTreeSet<&str> = note
         .convention
         .iter()
-        .filter(|line| line.key.starts_with("range_") && line.source == "assumed");
-    let ranges: BTreeSet<&str> = assumed.map(|line| &*line.value).collect();
+        .filter(|line| line.key.starts_with("range_") && line.source == "assumed")
+        .map(|line| &*line.value)
+        .collect();
     let ranges: Vec<&str> = ranges.into_iter().collect();
     (!ranges.is_empty()).then(|| ranges.join(" and "))
 }
 
 /// The outputs of the graph that are not read; `None` if all are.
 fn unread(note: &EnhancerNote) -> Option<String> {
-    let lines = note.convention.iter().filter(|line| line.key == "not read");
-    let outputs: Vec<&str> = lines.map(|line| &*line.value).collect();
+    let outputs: Vec<&str> = note
+        .convention
+        .iter()
+        .filter(|line| line.key == "not read")
+        .map(|line| &*line.value)
+        .collect();
     (!outputs.is_empty()).then(|| format!("not read: {}", outputs.join(", ")))
 }
 
@@ -171,12 +177,14 @@ fn looks(note: &EnhancerNote) -> String {
 
 /// The flaws with their numbers, and a few of the images.
 fn flaws(judged: &JudgedImages) -> String {
-    let flaws = judged.flawed.iter();
-    let flaws: Vec<String> = flaws
+    let flaws: Vec<String> = judged
+        .flawed
+        .iter()
         .map(|(flaw, count)| format!("{count} {}", flaw.words()))
         .collect();
-    let examples = judged.examples.iter();
-    let examples: Vec<String> = examples
+    let examples: Vec<String> = judged
+        .examples
+        .iter()
         .map(|image| format!("{} at {}", image.frame, image.condition))
         .collect();
     format!("{} (for example {})", flaws.join(", "), examples.join("; "))

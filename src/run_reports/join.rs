@@ -236,8 +236,13 @@ impl<D: Detail> Joined<D> {
     ) -> Result<JoinedRun> {
         let charged = run.trials.iter().chain(run.left_out.iter());
         let cost = cost(charged, &run.manifest)?;
-        let left_out = run.left_out.asked().into_iter().flatten();
-        let left_out = left_out.map(|(model, _)| model.to_owned()).collect();
+        let left_out = run
+            .left_out
+            .asked()
+            .into_iter()
+            .flatten()
+            .map(|(model, _)| model.to_owned())
+            .collect();
         let served = served(&run.trials);
         let (trials, replies, added) = self.add_trials(run.trials, index, known);
         self.texts.extend(run.texts.by_file());
@@ -276,10 +281,10 @@ impl<D: Detail> Joined<D> {
 
 /// The names that servers gave for each model.
 fn served<D: Detail>(trials: &Trials<D>) -> BTreeMap<String, BTreeSet<String>> {
-    let pairs = trials
+    let pairs: HashSet<(&str, &str)> = trials
         .iter()
-        .filter_map(|trial| Some((trial.model(), trial.served_model()?)));
-    let pairs: HashSet<(&str, &str)> = pairs.collect();
+        .filter_map(|trial| Some((trial.model(), trial.served_model()?)))
+        .collect();
     let mut served = BTreeMap::<String, BTreeSet<String>>::new();
     for (model, name) in pairs {
         served
@@ -297,6 +302,7 @@ fn names<D: Detail>(runs: &[StoredRun<D>]) -> Vec<String> {
     if distinct.len() == runs.len() {
         return short;
     }
-    let paths = runs.iter().map(|run| run.folder.display().to_string());
-    paths.collect()
+    runs.iter()
+        .map(|run| run.folder.display().to_string())
+        .collect()
 }

@@ -37,8 +37,12 @@ impl LightCurve {
             ..KindReading::NONE
         });
         let variants = [Some(KindReading::NONE), base, Some(self.variant.clone())];
-        let bases = variants.into_iter().flatten().map(raw);
-        bases.filter(|base| base != self).collect()
+        variants
+            .into_iter()
+            .flatten()
+            .map(raw)
+            .filter(|base| base != self)
+            .collect()
     }
 
     /// The name of the curve without levels, as `noise+lift`; `L0` for untouched frames.
@@ -103,8 +107,11 @@ impl Lights {
         };
         for (curve, groups) in &partitions {
             let bases = curve.bases();
-            let bases = bases.iter().filter_map(|base| partitions.get(base));
-            let bases: Vec<_> = bases.filter(|base| base.len() > 1).collect();
+            let bases: Vec<_> = bases
+                .iter()
+                .filter_map(|base| partitions.get(base))
+                .filter(|base| base.len() > 1)
+                .collect();
             if groups.len() < 2 && bases.is_empty() {
                 continue;
             }
@@ -180,25 +187,27 @@ type Partitions<'a> = BTreeMap<&'a LightCurve, Vec<Vec<usize>>>;
 impl Seen {
     /// The groups of runs that agree on each curve.
     fn partitions(&self, manifests: &[&RunManifest], order: &[usize]) -> Partitions<'_> {
-        let curves = self.curves.iter().map(|(curve, having)| {
-            let agree = |one: usize, other: usize| {
-                let pair = (curve.clone(), one.min(other), one.max(other));
-                match self.pairs.get(&pair) {
-                    Some(agreement) => agreement.differing == 0,
-                    None => same_by_manifest(curve, manifests[one], manifests[other]),
+        self.curves
+            .iter()
+            .map(|(curve, having)| {
+                let agree = |one: usize, other: usize| {
+                    let pair = (curve.clone(), one.min(other), one.max(other));
+                    match self.pairs.get(&pair) {
+                        Some(agreement) => agreement.differing == 0,
+                        None => same_by_manifest(curve, manifests[one], manifests[other]),
+                    }
+                };
+                let mut groups: Vec<Vec<usize>> = Vec::new();
+                for run in order.iter().copied().filter(|run| having.contains(run)) {
+                    let mut known = groups.iter_mut();
+                    match known.find(|group| group.iter().all(|other| agree(run, *other))) {
+                        Some(group) => group.push(run),
+                        None => groups.push(vec![run]),
+                    }
                 }
-            };
-            let mut groups: Vec<Vec<usize>> = Vec::new();
-            for run in order.iter().copied().filter(|run| having.contains(run)) {
-                let mut known = groups.iter_mut();
-                match known.find(|group| group.iter().all(|other| agree(run, *other))) {
-                    Some(group) => group.push(run),
-                    None => groups.push(vec![run]),
-                }
-            }
-            (curve, groups)
-        });
-        curves.collect()
+                (curve, groups)
+            })
+            .collect()
     }
 
     /// The images of a curve that runs of different groups share.

@@ -37,8 +37,12 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
         }
         for (field, changes) in &run.manifest.settings {
             if let Some(model) = field.strip_prefix(ADAPTED_FOR) {
-                let changes = changes.as_array().into_iter().flatten();
-                let changes = changes.filter_map(Value::as_str).map(str::to_owned);
+                let changes = changes
+                    .as_array()
+                    .into_iter()
+                    .flatten()
+                    .filter_map(Value::as_str)
+                    .map(str::to_owned);
                 listing.adapted(&shown(model), changes);
             }
         }

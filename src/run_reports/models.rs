@@ -59,8 +59,11 @@ pub(super) struct ModelApart {
 impl ModelApart {
     /// The overlap of the two runs that differ most.
     pub(super) fn overlap(&self) -> Overlap {
-        let overlaps = self.overlaps.iter().copied();
-        let most = overlaps.max_by_key(|overlap| overlap.differing());
+        let most = self
+            .overlaps
+            .iter()
+            .copied()
+            .max_by_key(|overlap| overlap.differing());
         most.unwrap_or_default()
     }
 
@@ -131,10 +134,9 @@ impl Names {
     }
 
     fn add(&mut self, apart: ModelApart) {
-        let named = apart.groups.iter().zip(&apart.names).enumerate();
-        let named = named.flat_map(|(number, (group, name))| {
-            group.iter().map(move |run| (*run, (number, name.clone())))
-        });
+        let named = apart.groups.iter().zip(&apart.names).enumerate().flat_map(
+            |(number, (group, name))| group.iter().map(move |run| (*run, (number, name.clone()))),
+        );
         self.by_run.insert(apart.model.clone(), named.collect());
         self.apart.push(apart);
     }
@@ -193,8 +195,7 @@ fn suffixes(groups: &[Vec<usize>], differences: &[Setting], names: &[String]) ->
     };
     let by_settings = |group: &Vec<usize>| -> Option<String> {
         let of_group = differences.iter().map(|setting| {
-            let values = setting.values.iter();
-            let mut values = values.filter(|(run, _)| group.contains(run));
+            let mut values = setting.values.iter().filter(|(run, _)| group.contains(run));
             let (_, value) = values.next()?;
             Some(format!("{} {value}", spelled_setting(&setting.flag)))
         });

@@ -352,17 +352,17 @@ fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<Open
 
 /// Why trials have no answer, in words with what the error says, by question and subject.
 fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, Subject), String> {
-    let answers = records
+    records
         .iter()
-        .filter(|record| record.detail.step == Step::Answer);
-    let failed = answers.filter_map(|record| {
-        let failure = record.failure.as_ref()?;
-        let why = outcome_words::failed(failure.kind, failure.status);
-        let subject = Subject::new(&record.model, record.condition.as_ref());
-        let why = format!("{why}: {}", failure.message);
-        Some(((&record.question, subject), why))
-    });
-    failed.collect()
+        .filter(|record| record.detail.step == Step::Answer)
+        .filter_map(|record| {
+            let failure = record.failure.as_ref()?;
+            let why = outcome_words::failed(failure.kind, failure.status);
+            let subject = Subject::new(&record.model, record.condition.as_ref());
+            let why = format!("{why}: {}", failure.message);
+            Some(((&record.question, subject), why))
+        })
+        .collect()
 }
 
 /// The outcome of an answer, from the record of its mark.

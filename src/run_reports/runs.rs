@@ -160,8 +160,9 @@ pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
             None => times.push((place, folder, 1)),
         }
     }
-    let again = times.iter().filter(|(.., times)| *times > 1);
-    let again: Vec<(String, usize)> = again
+    let again: Vec<(String, usize)> = times
+        .iter()
+        .filter(|(.., times)| *times > 1)
         .map(|(_, folder, times)| (name(folder), *times))
         .collect();
     let folders = times.into_iter().map(|(_, folder, _)| folder);
@@ -204,8 +205,10 @@ fn report_choices(
     combined.listing.show(&args.columns);
     let baseline = old.map(|(new, old)| Baseline::new(&combined, new, old));
     let baseline = baseline.transpose()?;
-    let judged = baseline.as_ref().filter(|_| args.baseline.fail_if_worse);
-    let is_worse = judged.map(|baseline| baseline.is_worse(combined.unit()));
+    let is_worse = baseline
+        .as_ref()
+        .filter(|_| args.baseline.fail_if_worse)
+        .map(|baseline| baseline.is_worse(combined.unit()));
     let is_worse = is_worse.transpose()?.unwrap_or(false);
     let in_folder = args.out.is_none() && !args.common && baseline.is_none() && again.is_empty();
     let place = match &*combined.runs {

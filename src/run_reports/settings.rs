@@ -64,8 +64,8 @@ impl Setting {
                 None => by_value.push((value, vec![name])),
             }
         }
-        let values = by_value.into_iter();
-        let values: Vec<String> = values
+        let values: Vec<String> = by_value
+            .into_iter()
             .map(|(value, runs)| format!("{} in {}", short(value), listed(&runs)))
             .collect();
         format!("{} is {}", spelled_setting(&self.flag), listed(&values))
@@ -86,20 +86,21 @@ pub(super) fn listed<T: AsRef<str>>(texts: &[T]) -> String {
 /// columns has.
 pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
     let flags: BTreeSet<&String> = runs.iter().flatten().flat_map(BTreeMap::keys).collect();
-    let settings = flags.into_iter().map(|flag| Setting {
-        flag: flag.clone(),
-        values: runs
-            .iter()
-            .enumerate()
-            .filter_map(|(run, settings)| {
-                let settings = settings.as_ref()?;
-                let value = settings.get(flag).map(String::as_str);
-                let unset = takes_part(settings, flag).then_some(UNSET);
-                Some((run, value.or(unset)?.to_owned()))
-            })
-            .collect(),
-    });
-    settings
+    flags
+        .into_iter()
+        .map(|flag| Setting {
+            flag: flag.clone(),
+            values: runs
+                .iter()
+                .enumerate()
+                .filter_map(|(run, settings)| {
+                    let settings = settings.as_ref()?;
+                    let value = settings.get(flag).map(String::as_str);
+                    let unset = takes_part(settings, flag).then_some(UNSET);
+                    Some((run, value.or(unset)?.to_owned()))
+                })
+                .collect(),
+        })
         .filter(|setting| {
             setting
                 .values
@@ -353,8 +354,9 @@ mod tests {
     #[test]
     fn digests_are_shortened_and_objects_are_opened() {
         let content = serde_json::json!({"--llie": "ab".repeat(32), "--camera": {"name": "a7", "gain": null}});
-        let found = leaves(&content).map(|(flag, value)| (flag, short(&value)));
-        let found: Vec<_> = found.collect();
+        let found: Vec<_> = leaves(&content)
+            .map(|(flag, value)| (flag, short(&value)))
+            .collect();
         let expected = [("--camera (name)", "a7"), ("--llie", "abababab…")];
         assert_eq!(
             found,

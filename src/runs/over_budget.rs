@@ -39,8 +39,9 @@ impl OverBudget {
 
     /// The cost in a sentence, with the cause if it is known.
     pub(crate) fn sentence(&self) -> String {
-        let replies = self.longer_replies.iter();
-        let replies: Vec<String> = replies
+        let replies: Vec<String> = self
+            .longer_replies
+            .iter()
             .map(|(model, count)| format!("{model} ({count})"))
             .collect();
         let cause = match &replies[..] {

@@ -51,8 +51,9 @@ pub(crate) fn part<Q>(
         count: own.len(),
         of: positions.len(),
     };
-    let questions = questions.into_iter();
-    let questions = questions.filter(|question| own.contains(&positions[&source(question)]));
+    let questions = questions
+        .into_iter()
+        .filter(|question| own.contains(&positions[&source(question)]));
     Ok((questions.collect(), Some(place)))
 }
 
@@ -130,11 +131,13 @@ mod tests {
     }
 
     fn divided_costs(costs: &[u64]) -> Vec<Divided> {
-        let sources = costs.iter().map(|cost| Divided {
-            scene: String::new(),
-            cost: *cost,
-        });
-        sources.collect()
+        costs
+            .iter()
+            .map(|cost| Divided {
+                scene: String::new(),
+                cost: *cost,
+            })
+            .collect()
     }
 
     #[test]

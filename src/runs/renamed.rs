@@ -175,13 +175,19 @@ fn left_out(
     moves: &BTreeMap<String, String>,
     settings: OtherSettings,
 ) -> BTreeSet<String> {
-    let known = manifest.columns.get("model").into_iter().flatten();
-    let known: BTreeSet<String> = known.map(|(name, _)| name.clone()).collect();
+    let known: BTreeSet<String> = manifest
+        .columns
+        .get("model")
+        .into_iter()
+        .flatten()
+        .map(|(name, _)| name.clone())
+        .collect();
     let earlier: BTreeSet<String> = left_out_models(stored).into_iter().collect();
-    let earlier = earlier
+    let earlier: BTreeSet<String> = earlier
         .iter()
-        .map(|name| moves.get(name).unwrap_or(name).clone());
-    let earlier: BTreeSet<String> = earlier.chain(moves.values().cloned()).collect();
+        .map(|name| moves.get(name).unwrap_or(name).clone())
+        .chain(moves.values().cloned())
+        .collect();
     let is_listed = |name: &str| {
         // A control is asked with the observer.
         let asked = Control::from_model_name(name).map_or(name, |_| OBSERVER);

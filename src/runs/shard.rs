@@ -213,10 +213,11 @@ mod tests {
             tokens: Some(number(1)),
         };
         let shares = |workers: Option<u32>| -> Vec<u32> {
-            let quotas = parts
+            parts
                 .iter()
-                .map(|part| part.quota(whole, workers.map(number)));
-            quotas.map(|quota| quota.requests.unwrap().get()).collect()
+                .map(|part| part.quota(whole, workers.map(number)))
+                .map(|quota| quota.requests.unwrap().get())
+                .collect()
         };
         assert_eq!(shares(None), [167, 167, 166]);
         assert_eq!(shares(Some(2)), [250, 250, 250]);

@@ -153,9 +153,11 @@ impl<D: Detail> StoredRun<D> {
     /// # Errors
     /// As for [`record`](Self::record).
     pub(crate) fn records_of(&self, question: &str) -> Result<Vec<Record<D>>> {
-        let trials = self.trials.iter();
-        let trials = trials.filter(|trial| trial.question().0 == question);
-        trials.map(|trial| self.record(trial)).collect()
+        self.trials
+            .iter()
+            .filter(|trial| trial.question().0 == question)
+            .map(|trial| self.record(trial))
+            .collect()
     }
 
     /// Name of the run: that of its folder.
@@ -286,8 +288,10 @@ const MOST_LISTED: usize = 8;
 
 /// The folders with a manifest in a folder, for a message; the last text says how many more there are.
 fn runs_below(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut runs: Vec<String> = entries
+    let mut runs: Vec<String> = fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .flatten()
         .map(|entry| entry.path())
         .filter(|path| store::holds_run(path))
         .map(|path| path.display().to_string())

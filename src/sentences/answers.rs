@@ -80,24 +80,23 @@ fn largest_gain<'f>(
     findings: &'f Findings<'_>,
     fidelity: &'f FidelityFindings,
 ) -> Option<Gain<'f>> {
-    let enhanced = fidelity
+    fidelity
         .conditions
         .iter()
-        .filter(|row| row.enhancer.is_some());
-    let gains = enhanced.filter_map(|row| {
-        let raw = fidelity.conditions.iter().find(|raw| {
-            raw.enhancer.is_none() && raw.level == row.level && raw.variant == row.variant
-        })?;
-        let answers = findings.pooled.iter().find(|finding| {
-            finding.kind == PooledKind::Enhancer
-                && finding.family.is_none()
-                && finding.level == row.level
-                && finding.variant == row.variant
-                && finding.enhancer == row.enhancer
-        })?;
-        Some((row.means[0]? - raw.means[0]?, (row, raw, answers)))
-    });
-    gains
+        .filter(|row| row.enhancer.is_some())
+        .filter_map(|row| {
+            let raw = fidelity.conditions.iter().find(|raw| {
+                raw.enhancer.is_none() && raw.level == row.level && raw.variant == row.variant
+            })?;
+            let answers = findings.pooled.iter().find(|finding| {
+                finding.kind == PooledKind::Enhancer
+                    && finding.family.is_none()
+                    && finding.level == row.level
+                    && finding.variant == row.variant
+                    && finding.enhancer == row.enhancer
+            })?;
+            Some((row.means[0]? - raw.means[0]?, (row, raw, answers)))
+        })
         .filter(|(gain, _)| *gain > 0.0)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, gain)| gain)

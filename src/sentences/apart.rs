@@ -20,12 +20,16 @@ pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {
         return Vec::new();
     }
     let topics = Topic::all(findings);
-    let sentences = names(findings).into_iter().filter_map(|name| {
-        let variants = topics.iter().flat_map(|topic| &topic.lights);
-        let of_variant = variants.filter_map(|variant| sentence(findings, name, &others, variant));
-        of_variant.into_iter().next()
-    });
-    sentences.collect()
+    names(findings)
+        .into_iter()
+        .filter_map(|name| {
+            let of_variant = topics
+                .iter()
+                .flat_map(|topic| &topic.lights)
+                .filter_map(|variant| sentence(findings, name, &others, variant));
+            of_variant.into_iter().next()
+        })
+        .collect()
 }
 
 /// The people and the models that some finding leaves out, in the order of tables.
@@ -38,14 +42,14 @@ fn names<'f>(findings: &'f Findings<'_>) -> Vec<&'f str> {
         .map(String::as_str)
         .collect();
     let listing = &findings.grid.listing;
-    let names = findings
+    let mut names: Vec<&str> = findings
         .grid
         .subjects
         .iter()
         .filter(|subject| subject.view == Some(View::Image))
         .map(|subject| &*subject.model)
-        .filter(|name| listing.is_people(name) || left_out.contains(name));
-    let mut names: Vec<&str> = names.collect();
+        .filter(|name| listing.is_people(name) || left_out.contains(name))
+        .collect();
     names.dedup();
     names
 }
@@ -82,12 +86,13 @@ impl OnSameQuestions {
         let cell = findings
             .summary
             .cell(&grid.subjects[own], None, ReadingMode::Strict)?;
-        let answered = (0..grid.items.len()).filter(|item| grid.result(own, *item).is_reply());
-        let answered: Vec<usize> = answered.collect();
-        let shares = others
+        let answered: Vec<usize> = (0..grid.items.len())
+            .filter(|item| grid.result(own, *item).is_reply())
+            .collect();
+        let shares: Vec<f64> = others
             .iter()
-            .filter_map(|model| accuracy(grid, find(model)?, &answered));
-        let shares: Vec<f64> = shares.collect();
+            .filter_map(|model| accuracy(grid, find(model)?, &answered))
+            .collect();
         let why = |item: &&usize| grid.trial(own, **item)?.strict()?.why;
         let cannot_tell = answered
             .iter()

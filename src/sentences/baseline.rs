@@ -20,15 +20,17 @@ pub(crate) fn against_baseline(
     unit: ClusterUnit,
 ) -> Vec<Sentence> {
     let judged = judged(rows.iter().map(|row| &*row.subject.model));
-    let rows = rows.iter();
     let rows: Vec<&BaselineRow> = rows
+        .iter()
         .filter(|row| judged.contains(&*row.subject.model))
         .collect();
     let mut sentences = Vec::new();
     for of_model in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
         for verdict in [Significance::Worse, Significance::Better] {
-            let shown = of_model.iter().copied();
-            let shown = shown.filter(|row| row.significance == verdict);
+            let shown = of_model
+                .iter()
+                .copied()
+                .filter(|row| row.significance == verdict);
             sentences.extend(shown_against(&shown.collect::<Vec<_>>(), old, unit));
         }
     }
@@ -96,8 +98,9 @@ fn nothing_shown(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
         let detail = "no model answered the same question about the same image in both".to_owned();
         return numbers.sentence("baseline", Tone::Note, text, detail);
     }
-    let possible = rows.iter().copied();
-    let possible: Vec<&BaselineRow> = possible
+    let possible: Vec<&BaselineRow> = rows
+        .iter()
+        .copied()
         .filter(|row| row.significance.is_possible())
         .collect();
     let Some(largest) = largest(&possible, |row| row.paired.difference) else {

@@ -40,18 +40,18 @@ impl<'f> Confidence<'f> {
         let Some(level) = dark.clone().filter_map(|row| row.subject.level).max() else {
             return Vec::new();
         };
-        let darkest = dark.filter(|row| row.subject.level == Some(level));
-        let all = darkest.map(|dark| {
-            let model = &*dark.subject.model;
-            let clean = Subject::seeing(model, AxisLevel::L0, variant, None);
-            Self {
-                model,
-                level,
-                dark,
-                clean: rows().find(|row| row.subject.matches_up_to_group(&clean)),
-            }
-        });
-        all.collect()
+        dark.filter(|row| row.subject.level == Some(level))
+            .map(|dark| {
+                let model = &*dark.subject.model;
+                let clean = Subject::seeing(model, AxisLevel::L0, variant, None);
+                Self {
+                    model,
+                    level,
+                    dark,
+                    clean: rows().find(|row| row.subject.matches_up_to_group(&clean)),
+                }
+            })
+            .collect()
     }
 
     /// Whether the confidence is shown to be above the accuracy.

@@ -18,10 +18,10 @@ use darkqa_score::significance::Significance;
 /// The cost of darkness, or of another cause, in each topic.
 pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
     let topics = Topic::all(findings);
-    let sentences = topics
+    topics
         .iter()
-        .flat_map(|topic| topic_sentences(findings, topic));
-    sentences.collect()
+        .flat_map(|topic| topic_sentences(findings, topic))
+        .collect()
 }
 
 /// The cost of darkness with the last kind of degradation, in each of its lights; then with another kind, if the last
@@ -59,8 +59,10 @@ fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> 
     }
     for other in others {
         let found = verdict_with(other);
-        let mut beside = lights.iter().filter(|variant| is_of_runs(other, variant));
-        let is_said = beside.any(|variant| verdict_with(variant) == found);
+        let is_said = lights
+            .iter()
+            .filter(|variant| is_of_runs(other, variant))
+            .any(|variant| verdict_with(variant) == found);
         if !is_said && found.is_some_and(Significance::is_shown) {
             let name = name(other);
             let sentence = with_variant(&levels(other), mean(other), Some(&name), findings.unit);
@@ -72,13 +74,13 @@ fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> 
 
 /// The verdict over all levels: a loss, else a gain, else nothing; `None` without a verdict.
 fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
-    let mut verdicts = [
+    [
         Significance::Worse,
         Significance::Better,
         Significance::NotShown,
     ]
-    .into_iter();
-    verdicts.find(|verdict| !with_verdict(levels, *verdict).is_empty())
+    .into_iter()
+    .find(|verdict| !with_verdict(levels, *verdict).is_empty())
 }
 
 /// The verdict over several levels together; `None` if nothing is detected.

@@ -61,20 +61,23 @@ impl<'f> TopAnswer<'f> {
         let Some(level) = asked.filter_map(|subject| subject.level).max() else {
             return Vec::new();
         };
-        let confusions = findings.confusions.iter().filter(|confusion| {
-            of_variant(&confusion.subject) && confusion.subject.level == Some(level)
-        });
-        let answers = confusions.filter_map(|confusion| {
-            let subject = &confusion.subject;
-            let collapse = confusion.collapse.as_ref()?;
-            Some(Self {
-                model: &subject.model,
-                family: &confusion.family,
-                level,
-                collapse,
+        findings
+            .confusions
+            .iter()
+            .filter(|confusion| {
+                of_variant(&confusion.subject) && confusion.subject.level == Some(level)
             })
-        });
-        answers.collect()
+            .filter_map(|confusion| {
+                let subject = &confusion.subject;
+                let collapse = confusion.collapse.as_ref()?;
+                Some(Self {
+                    model: &subject.model,
+                    family: &confusion.family,
+                    level,
+                    collapse,
+                })
+            })
+            .collect()
     }
 
     /// By how much the answer is given too often.

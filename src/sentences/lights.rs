@@ -33,8 +33,10 @@ impl<'f> Topic<'f> {
                 .iter()
                 .copied()
                 .partition(|variant| Some(variant.kind) == last);
-            let mut earlier = topics.iter().flat_map(|topic| &topic.lights);
-            let shares_levels = earlier.any(|other| axis(other) == axis(group[0]));
+            let shares_levels = topics
+                .iter()
+                .flat_map(|topic| &topic.lights)
+                .any(|other| axis(other) == axis(group[0]));
             topics.push(Self {
                 lights,
                 others,
@@ -90,13 +92,18 @@ pub(super) fn findings_of_kind<'f>(
     kind: PooledKind,
     variant: &KindReading,
 ) -> Vec<&'f PooledFinding> {
-    let of_set = findings.pooled.iter().filter(|finding| {
-        finding.kind == kind
-            && finding.family.as_ref() == kind.only_family()
-            && finding.variant == *variant
-    });
-    let of_set: Vec<&PooledFinding> = of_set.collect();
+    let of_set: Vec<&PooledFinding> = findings
+        .pooled
+        .iter()
+        .filter(|finding| {
+            finding.kind == kind
+                && finding.family.as_ref() == kind.only_family()
+                && finding.variant == *variant
+        })
+        .collect();
     let sets = of_set.chunk_by(|a, b| a.enhancer == b.enhancer);
-    let possible = sets.filter(|set| !is_impossible(set));
-    possible.flatten().copied().collect()
+    sets.filter(|set| !is_impossible(set))
+        .flatten()
+        .copied()
+        .collect()
 }

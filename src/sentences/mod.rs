@@ -108,16 +108,19 @@ fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> 
 
 /// Sentences about enhancers on the clean frames.
 fn about_clean(findings: &Findings<'_>) -> Vec<Sentence> {
-    let clean = findings
+    let clean: BTreeSet<&KindReading> = findings
         .pooled
         .iter()
-        .filter(|finding| finding.kind == PooledKind::Enhancer && finding.variant.kind.is_none());
-    let clean: BTreeSet<&KindReading> = clean.map(|finding| &finding.variant).collect();
-    let sentences = clean.into_iter().flat_map(|variant| {
-        let levels = findings_of_kind(findings, PooledKind::Enhancer, variant);
-        pooled::enhancers(&levels, &[], findings.unit)
-    });
-    sentences.collect()
+        .filter(|finding| finding.kind == PooledKind::Enhancer && finding.variant.kind.is_none())
+        .map(|finding| &finding.variant)
+        .collect();
+    clean
+        .into_iter()
+        .flat_map(|variant| {
+            let levels = findings_of_kind(findings, PooledKind::Enhancer, variant);
+            pooled::enhancers(&levels, &[], findings.unit)
+        })
+        .collect()
 }
 
 /// Sentences about false answers, one answer to everything, confidence, and the families.

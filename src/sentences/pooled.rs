@@ -44,12 +44,14 @@ impl<'f> Shown<'f> {
             let mut shown = shown.iter();
             !shown.any(|finding| mean.mean_over.contains(&finding.level))
         };
-        let means = with_verdict(means, verdict).into_iter().filter(is_alone);
-        let means = means.map(|mean| Self {
-            largest: mean,
-            at: mean_levels(mean, levels),
-            are_several: true,
-        });
+        let means = with_verdict(means, verdict)
+            .into_iter()
+            .filter(is_alone)
+            .map(|mean| Self {
+                largest: mean,
+                at: mean_levels(mean, levels),
+                are_several: true,
+            });
         let levels = Self::levels(levels, verdict);
         levels.into_iter().chain(means).collect()
     }
@@ -156,8 +158,9 @@ pub(super) fn enhancers(
 ) -> Vec<Sentence> {
     let mut sentences = Vec::new();
     for levels in all.chunk_by(|a, b| a.enhancer == b.enhancer) {
-        let own = means.iter().copied();
-        let own: Vec<&PooledFinding> = own
+        let own: Vec<&PooledFinding> = means
+            .iter()
+            .copied()
             .filter(|mean| mean.enhancer == levels[0].enhancer)
             .collect();
         let shown = [Significance::Worse, Significance::Better]
@@ -260,8 +263,10 @@ pub(super) fn with_verdict<'f>(
 /// The levels of some findings among all of a set.
 pub(super) fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
     let [some, all] = [some, all].map(|findings| {
-        let levels = findings.iter().map(|finding| finding.level);
-        levels.collect::<Vec<AxisLevel>>()
+        findings
+            .iter()
+            .map(|finding| finding.level)
+            .collect::<Vec<AxisLevel>>()
     });
     level_runs(&some, &all)
 }

@@ -7,9 +7,10 @@ use darkqa_score::cluster::ClusterUnit;
 /// How many findings about noise hold under which readings; `None` with one reading. The levels of one finding count once.
 pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<Sentence> {
     let readings = found.first()?.effects.len();
-    let whole = found.iter();
-    let whole = whole.filter(|one| !matches!(one.claim, NoiseHypothesis::NoiseCompounds(Some(_))));
-    let whole: Vec<&FindingByReading> = whole.collect();
+    let whole: Vec<&FindingByReading> = found
+        .iter()
+        .filter(|one| !matches!(one.claim, NoiseHypothesis::NoiseCompounds(Some(_))))
+        .collect();
     let of = |robustness: Robustness| {
         whole
             .iter()

@@ -15,12 +15,15 @@ pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
     let models = judged(findings.grid.subjects.iter().map(|subject| &*subject.model));
     let mut sentences = Vec::new();
     for pair in &findings.pairs {
-        let rows = findings.comparisons.iter().filter(|row| {
-            row.family.is_none()
-                && row.first.variant.photograph() == Some(&pair.name)
-                && models.contains(&*row.first.model)
-        });
-        let rows: Vec<&Comparison> = rows.collect();
+        let rows: Vec<&Comparison> = findings
+            .comparisons
+            .iter()
+            .filter(|row| {
+                row.family.is_none()
+                    && row.first.variant.photograph() == Some(&pair.name)
+                    && models.contains(&*row.first.model)
+            })
+            .collect();
         let of = |kind: ComparisonKind| rows.iter().copied().filter(move |row| row.kind == kind);
         sentences.extend(of(ComparisonKind::Level).map(|row| cost(row, pair, findings.unit)));
         let raw = of(ComparisonKind::RealSynthetic).filter(|row| row.first.enhancer.is_none());

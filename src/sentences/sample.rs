@@ -36,8 +36,11 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
         .grid
         .main_variant()
         .and_then(|variant| variant.kind);
-    let whole = findings.pooled.iter();
-    let whole: Vec<&PooledFinding> = whole.filter(|finding| finding.family.is_none()).collect();
+    let whole: Vec<&PooledFinding> = findings
+        .pooled
+        .iter()
+        .filter(|finding| finding.family.is_none())
+        .collect();
     let is_one_set = |a: &&PooledFinding, b: &&PooledFinding| {
         (a.kind, &a.variant, &a.enhancer) == (b.kind, &b.variant, &b.enhancer)
     };
@@ -144,43 +147,45 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
             None => grouped.push((set, vec![about])),
         }
     }
-    let sentences = grouped.into_iter().map(|(set, topics)| {
-        let mut numbers = Numbers::new(findings.unit);
-        let is_one = set.models.len() == 1;
-        let models = if set.models.len() > MAX_NAMED {
-            format!("{} models", numbers.count("models", set.models.len()))
-        } else {
-            listed(&set.models)
-        };
-        if set.is_more {
-            let were = if is_one { "was" } else { "were" };
+    grouped
+        .into_iter()
+        .map(|(set, topics)| {
+            let mut numbers = Numbers::new(findings.unit);
+            let is_one = set.models.len() == 1;
+            let models = if set.models.len() > MAX_NAMED {
+                format!("{} models", numbers.count("models", set.models.len()))
+            } else {
+                listed(&set.models)
+            };
+            if set.is_more {
+                let were = if is_one { "was" } else { "were" };
+                let text = format!(
+                    "Only {models} {were} asked at {}: no mean is made there.",
+                    runs(set)
+                );
+                let detail = format!("left out of the findings about {}", listed(&topics));
+                return numbers.sentence("left out", Tone::Note, text, detail);
+            }
+            let [all, answered] = set.items;
+            let why = match (answered, is_one) {
+                (0, true) => "it was not asked".to_owned(),
+                (0, false) => "they were not asked".to_owned(),
+                (_, is_one) => format!(
+                    "{} answered {} of {} questions",
+                    if is_one { "it" } else { "each" },
+                    numbers.count("answered", answered),
+                    numbers.count("questions", all)
+                ),
+            };
             let text = format!(
-                "Only {models} {were} asked at {}: no mean is made there.",
+                "{models} {} apart from the other models: {why} at {}.",
+                if is_one { "stands" } else { "stand" },
                 runs(set)
             );
-            let detail = format!("left out of the findings about {}", listed(&topics));
-            return numbers.sentence("left out", Tone::Note, text, detail);
-        }
-        let [all, answered] = set.items;
-        let why = match (answered, is_one) {
-            (0, true) => "it was not asked".to_owned(),
-            (0, false) => "they were not asked".to_owned(),
-            (_, is_one) => format!(
-                "{} answered {} of {} questions",
-                if is_one { "it" } else { "each" },
-                numbers.count("answered", answered),
-                numbers.count("questions", all)
-            ),
-        };
-        let text = format!(
-            "{models} {} apart from the other models: {why} at {}.",
-            if is_one { "stands" } else { "stand" },
-            runs(set)
-        );
-        let detail = format!("in no mean about {}", listed(&topics));
-        numbers.sentence("left out", Tone::Note, text, detail)
-    });
-    sentences.collect()
+            let detail = format!("in no mean about {}", listed(&topics));
+            numbers.sentence("left out", Tone::Note, text, detail)
+        })
+        .collect()
 }
 
 /// The levels at which models answered less.

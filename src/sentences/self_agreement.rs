@@ -94,7 +94,7 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let pairs = found.between.iter();
     let pairs =
         pairs.filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
-    let sentences = pairs.map(|pair| {
+    pairs.map(|pair| {
         let mut numbers = Numbers::new(found.unit);
         let same = numbers.percent("same", pair.same.value);
         let text = format!(
@@ -112,20 +112,23 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
             "[{low}, {high}] %, {kappa}, n = {n}; each is compared with itself, so that their agreements in the dark can be compared only as far as this"
         );
         numbers.sentence("models_in_light", Tone::Note, text, detail)
-    });
-    sentences.collect()
+    }).collect()
 }
 
 /// The degraded variants of a model, sorted.
 fn variants(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<KindReading> {
-    let cells = found.whole().filter(|cell| cell.subject.model == model);
-    let variants = cells.map(|cell| cell.subject.variant.clone());
-    variants.filter(|variant| variant.kind.is_some()).collect()
+    found
+        .whole()
+        .filter(|cell| cell.subject.model == model)
+        .map(|cell| cell.subject.variant.clone())
+        .filter(|variant| variant.kind.is_some())
+        .collect()
 }
 
 fn enhancers(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<EnhancerName> {
-    let cells = found.whole().filter(|cell| cell.subject.model == model);
-    cells
+    found
+        .whole()
+        .filter(|cell| cell.subject.model == model)
         .filter_map(|cell| cell.subject.enhancer.clone())
         .collect()
 }
@@ -254,17 +257,19 @@ fn enhanced(
     enhancer: &EnhancerName,
 ) -> Option<Sentence> {
     let all = compared(found, ComparisonKind::Enhancer, model);
-    let own = all.filter(|comparison| {
-        let subject = &comparison.first;
-        subject.variant == *variant && subject.enhancer.as_ref() == Some(enhancer)
-    });
-    let own: Vec<&Comparison> = own.collect();
+    let own: Vec<&Comparison> = all
+        .filter(|comparison| {
+            let subject = &comparison.first;
+            subject.variant == *variant && subject.enhancer.as_ref() == Some(enhancer)
+        })
+        .collect();
     let levels: Vec<AxisLevel> = own.iter().filter_map(|c| c.first.level).collect();
     let at = |significance: Significance| {
-        let shown = own
+        let shown: Vec<AxisLevel> = own
             .iter()
-            .filter(|c| c.claim() == Claim::Detected(significance));
-        let shown: Vec<AxisLevel> = shown.filter_map(|c| c.first.level).collect();
+            .filter(|c| c.claim() == Claim::Detected(significance))
+            .filter_map(|c| c.first.level)
+            .collect();
         (!shown.is_empty()).then(|| level_runs(&shown, &levels))
     };
     let strongest = own.iter().max_by(|one, other| {
@@ -359,12 +364,14 @@ fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (T
 /// How often a model says that it cannot tell, where it may.
 fn way_out(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
     let light = found.light_of(model).filter(|light| light.has_way_out)?;
-    let cells = found.whole().filter(|cell| {
-        cell.subject.model == model
-            && cell.role() == CellRole::Other
-            && cell.subject.enhancer.is_none()
-    });
-    let dark = cells.max_by_key(|cell| cell.subject.level)?;
+    let dark = found
+        .whole()
+        .filter(|cell| {
+            cell.subject.model == model
+                && cell.role() == CellRole::Other
+                && cell.subject.enhancer.is_none()
+        })
+        .max_by_key(|cell| cell.subject.level)?;
     let (level, share) = (dark.subject.level?, dark.cannot_tell?);
     let mut numbers = Numbers::new(found.unit);
     let in_light = light.cannot_tell as f64 / light.replies().max(1) as f64;

@@ -287,18 +287,23 @@ pub(super) fn models(names: &[String], numbers: &mut Numbers) -> String {
 /// A text with its first letter as a capital.
 pub(super) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    first.chain(letters).collect()
+    letters
+        .next()
+        .into_iter()
+        .flat_map(char::to_uppercase)
+        .chain(letters)
+        .collect()
 }
 
 /// Levels that follow each other in `all` joined by a dash, as `L1–L3, L5`.
 pub(super) fn level_runs<T: PartialEq + ToString>(levels: &[T], all: &[T]) -> String {
     let place = |level: &T| all.iter().position(|other| other == level);
     let runs = levels.chunk_by(|a, b| place(a).map(|place| place + 1) == place(b));
-    let texts = runs.map(|run| match run {
+    runs.map(|run| match run {
         [one] => one.to_string(),
         [first, .., last] => format!("{}–{}", first.to_string(), last.to_string()),
         [] => String::new(),
-    });
-    texts.collect::<Vec<_>>().join(", ")
+    })
+    .collect::<Vec<_>>()
+    .join(", ")
 }

@@ -22,8 +22,10 @@ const WITHOUT: &str = "without images";
 pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let shown = with_verdict(levels, Significance::Worse);
     let Some(largest) = PooledFinding::largest(&shown) else {
-        let worse = levels.iter().copied();
-        let worse = worse.filter(|of| of.claim() == Claim::StrictOnly(Significance::Worse));
+        let worse = levels
+            .iter()
+            .copied()
+            .filter(|of| of.claim() == Claim::StrictOnly(Significance::Worse));
         return format_alone(&worse.collect::<Vec<_>>(), unit);
     };
     let mut numbers = Numbers::new(unit);
@@ -100,15 +102,18 @@ pub(super) fn by_family<'f>(
     variant: &KindReading,
 ) -> Vec<&'f Comparison> {
     let models = findings.models_of(variant);
-    let comparisons = findings.comparisons.iter().filter(|comparison| {
-        let first = &comparison.first;
-        comparison.kind == ComparisonKind::Blind
-            && comparison.family.is_some()
-            && first.variant == *variant
-            && first.enhancer.is_none()
-            && models.contains(&&*first.model)
-    });
-    comparisons.collect()
+    findings
+        .comparisons
+        .iter()
+        .filter(|comparison| {
+            let first = &comparison.first;
+            comparison.kind == ComparisonKind::Blind
+                && comparison.family.is_some()
+                && first.variant == *variant
+                && first.enhancer.is_none()
+                && models.contains(&&*first.model)
+        })
+        .collect()
 }
 
 /// The family in which a model is furthest below its score without images, and how many models do in that family. `all` are the
@@ -126,8 +131,11 @@ pub(super) fn in_a_family(
     if said.iter().any(|finding| finding.models == [&**model]) {
         return None;
     }
-    let of_family = all.iter().copied().filter(|of| of.family == most.family);
-    let of_family: Vec<&Comparison> = of_family.collect();
+    let of_family: Vec<&Comparison> = all
+        .iter()
+        .copied()
+        .filter(|of| of.family == most.family)
+        .collect();
     let below: Vec<&Comparison> = of_family
         .iter()
         .copied()
@@ -177,8 +185,7 @@ fn than(comparison: &Comparison) -> String {
 /// The levels at which a model is below the second side of a comparison. A model that was not asked without images is compared with
 /// every model that was: the levels are those of one of them.
 fn levels_below(of_family: &[&Comparison], of: &Comparison) -> String {
-    let pair = of_family.iter().copied();
-    let pair = pair.filter(|other| {
+    let pair = of_family.iter().copied().filter(|other| {
         other.first.model == of.first.model && other.second.model == of.second.model
     });
     let sorted = |pair: Vec<&Comparison>| -> Vec<AxisLevel> {

@@ -86,18 +86,20 @@ pub(crate) fn counted_answers(
     due: &'static str,
     confusions: &[Confusion],
 ) -> Table {
-    let cells = confusions.iter().flat_map(|confusion| {
-        let cells = confusion
-            .counts
-            .iter()
-            .enumerate()
-            .flat_map(|(truth, row)| {
-                let answer = row.iter().enumerate();
-                answer.map(move |(answer, count)| (truth, answer, *count))
-            });
-        cells.map(move |cell| (confusion, cell))
-    });
-    let non_empty = cells.filter(|(_, (_, _, count))| *count > 0);
+    let non_empty = confusions
+        .iter()
+        .flat_map(|confusion| {
+            confusion
+                .counts
+                .iter()
+                .enumerate()
+                .flat_map(|(truth, row)| {
+                    let answer = row.iter().enumerate();
+                    answer.map(move |(answer, count)| (truth, answer, *count))
+                })
+                .map(move |cell| (confusion, cell))
+        })
+        .filter(|(_, (_, _, count))| *count > 0);
     TableBuilder::new(name, non_empty)
         .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
         .family(|(confusion, _)| Some(&confusion.family))

@@ -60,8 +60,11 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
             pair.significance.is_shown().to_string()
         })
         .column(Text, "csv levels", |(best, _)| {
-            let levels = best.levels.iter().map(ToString::to_string);
-            levels.collect::<Vec<_>>().join(";")
+            best.levels
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
+                .join(";")
         })
         .build();
     table.is_folded = true;

@@ -131,14 +131,17 @@ fn shown(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
 
 /// The raw curves of a finding's model with noise, all families together.
 fn thresholds<'f>(findings: &'f Findings<'_>, finding: &FindingByReading) -> Vec<&'f Curve> {
-    let curves = findings.curves.iter().filter(|curve| {
-        curve.model == finding.model
-            && curve.variant.group == finding.group
-            && curve.variant.kind.is_some_and(Kind::has_readings)
-            && curve.enhancer.is_none()
-            && curve.family.is_none()
-    });
-    curves.collect()
+    findings
+        .curves
+        .iter()
+        .filter(|curve| {
+            curve.model == finding.model
+                && curve.variant.group == finding.group
+                && curve.variant.kind.is_some_and(Kind::has_readings)
+                && curve.enhancer.is_none()
+                && curve.family.is_none()
+        })
+        .collect()
 }
 
 fn threshold(curves: &[&Curve], reading: &ReadingName) -> String {
@@ -179,11 +182,11 @@ fn effect(effect: Option<&TestedEffect>) -> String {
 }
 
 fn items(finding: &FindingByReading) -> usize {
-    let mut numbers = finding
+    finding
         .effects
         .iter()
-        .filter_map(|effect| Some(effect.effect?.difference.n));
-    numbers.next().unwrap_or(0)
+        .find_map(|effect| Some(effect.effect?.difference.n))
+        .unwrap_or(0)
 }
 
 fn level_names(levels: &[AxisLevel], by: &str) -> String {
@@ -255,10 +258,11 @@ fn clause(finding: &FindingByReading) -> String {
 /// The findings by reading, as `Noise compounds the drop under paper, eld; open under physical (−1.2 to 5.0 points).`
 fn sentence(finding: &FindingByReading) -> String {
     let of = |standing: Support| -> Vec<String> {
-        let effects = finding.effects.iter();
-        let effects = effects.filter_map(|one| Some((&one.reading, one.effect.as_ref()?)));
-        let effects = effects.filter(|(_, effect)| effect.standing == standing);
-        effects
+        finding
+            .effects
+            .iter()
+            .filter_map(|one| Some((&one.reading, one.effect.as_ref()?)))
+            .filter(|(_, effect)| effect.standing == standing)
             .map(|(reading, effect)| match standing {
                 Support::Holds => reading.to_string(),
                 Support::Opposite | Support::Open => {
@@ -270,16 +274,21 @@ fn sentence(finding: &FindingByReading) -> String {
             })
             .collect()
     };
-    let unasked = finding.effects.iter().filter(|one| one.effect.is_none());
-    let unasked: Vec<String> = unasked.map(|one| one.reading.to_string()).collect();
+    let unasked: Vec<String> = finding
+        .effects
+        .iter()
+        .filter(|one| one.effect.is_none())
+        .map(|one| one.reading.to_string())
+        .collect();
     let parts = [
         ("holds under", of(Support::Holds)),
         ("the opposite under", of(Support::Opposite)),
         ("open under", of(Support::Open)),
         ("not asked under", unasked),
     ];
-    let parts = parts.iter().filter(|(_, readings)| !readings.is_empty());
     let parts: Vec<String> = parts
+        .iter()
+        .filter(|(_, readings)| !readings.is_empty())
         .map(|(words, readings)| format!("{words} {}", readings.join(", ")))
         .collect();
     format!("{}: {}.", clause(finding), parts.join("; "))
@@ -288,11 +297,12 @@ fn sentence(finding: &FindingByReading) -> String {
 /// A sentence for each finding that some reading decides, and what is left out.
 fn notes(found: &[FindingByReading]) -> Vec<String> {
     let models: BTreeSet<String> = found.iter().map(subject).collect();
-    let decided = found.iter().filter(|finding| {
-        let is_detail = matches!(finding.claim, NoiseHypothesis::NoiseCompounds(Some(_)));
-        finding.robustness != Robustness::Open && !is_detail
-    });
-    let mut notes: Vec<String> = decided
+    let mut notes: Vec<String> = found
+        .iter()
+        .filter(|finding| {
+            let is_detail = matches!(finding.claim, NoiseHypothesis::NoiseCompounds(Some(_)));
+            finding.robustness != Robustness::Open && !is_detail
+        })
         .map(|finding| {
             if models.len() > 1 {
                 format!("{}: {}", subject(finding), sentence(finding))

@@ -17,8 +17,11 @@ const MAX_ROWS: usize = 40;
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = tables_of(&findings.comparisons, findings.unit, titles);
     for kind in ComparisonKind::ALL {
-        let all = findings.comparisons.iter();
-        let all: Vec<&Comparison> = all.filter(|comparison| comparison.kind == kind).collect();
+        let all: Vec<&Comparison> = findings
+            .comparisons
+            .iter()
+            .filter(|comparison| comparison.kind == kind)
+            .collect();
         tables.push(table(kind, "", &all, ReadingMode::Lenient).in_files_only());
     }
     tables
@@ -171,10 +174,10 @@ fn titles_against_light(kind: ComparisonKind) -> (&'static str, Option<&'static 
 
 /// A line about the rows whose sides share too few items for a verdict.
 fn too_few(comparisons: &[&Comparison]) -> Option<String> {
-    let small = comparisons
+    let count = comparisons
         .iter()
-        .filter(|comparison| comparison.is_too_small());
-    let count = small.count();
+        .filter(|comparison| comparison.is_too_small())
+        .count();
     (count > 0).then(|| {
         let rows = counted(count, "row");
         format!(

@@ -220,11 +220,13 @@ pub(crate) fn unread(summary: &AccuracySummary) -> Option<String> {
         (UnreadReason::Filtered, "withheld by a filter"),
         (UnreadReason::Empty, "empty"),
     ];
-    let counts = reasons.iter().filter_map(|(reason, what)| {
-        let count = summary.unread.get(reason).filter(|count| **count > 0)?;
-        Some(format!("{count} {what}"))
-    });
-    let counts: Vec<String> = counts.collect();
+    let counts: Vec<String> = reasons
+        .iter()
+        .filter_map(|(reason, what)| {
+            let count = summary.unread.get(reason).filter(|count| **count > 0)?;
+            Some(format!("{count} {what}"))
+        })
+        .collect();
     let unparsed =
         (!counts.is_empty()).then(|| format!("of the unparsed replies {}", counts.join(", ")));
     let cannot_tell = summary.unread.get(&UnreadReason::CannotTell);

@@ -53,8 +53,9 @@ pub(crate) fn tables(findings: &Findings<'_>) -> Vec<Table> {
     let Some(shown) = &findings.without_observer else {
         return all(findings);
     };
-    let files = all(findings).into_iter().map(Table::in_files_only);
-    files
+    all(findings)
+        .into_iter()
+        .map(Table::in_files_only)
         .chain(all(shown).into_iter().map(Table::without_file))
         .collect()
 }

@@ -149,8 +149,13 @@ pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
                 .to_owned(),
         ];
     }
-    let own = observer.cells.iter().filter(|cell| !cell.is_control());
-    own.filter(|cell| cell.seen <= 0.0).map(blank).collect()
+    observer
+        .cells
+        .iter()
+        .filter(|cell| !cell.is_control())
+        .filter(|cell| cell.seen <= 0.0)
+        .map(blank)
+        .collect()
 }
 
 /// The image of a standing control, to follow `shown …`.

@@ -19,8 +19,11 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         .pooled
         .iter()
         .partition(|finding| finding.family.is_none());
-    let numbers = findings.pooled.iter().map(|finding| finding.models.len());
-    let numbers: BTreeSet<usize> = numbers.collect();
+    let numbers: BTreeSet<usize> = findings
+        .pooled
+        .iter()
+        .map(|finding| finding.models.len())
+        .collect();
     let models = numbers.last().copied();
     let of_models = if numbers.len() > 1 {
         // The column of models says over how many each row is pooled.
@@ -53,8 +56,7 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         ReadingMode::Strict,
     );
     by_family.is_folded = true;
-    let all = findings.pooled.iter().chain(&findings.averaged);
-    let all: Vec<&PooledFinding> = all.collect();
+    let all: Vec<&PooledFinding> = findings.pooled.iter().chain(&findings.averaged).collect();
     let lenient = table("", column, &all, ReadingMode::Lenient).in_files_only();
     vec![total, by_family, lenient]
 }
@@ -179,9 +181,12 @@ fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
 
 /// How p was found where not all swaps were counted.
 fn not_counted(findings: &[&PooledFinding]) -> Option<String> {
-    let methods = findings.iter().map(|finding| finding.strict.p_by);
-    let methods = methods.filter(|method| *method != SwapMethod::Counted);
-    let methods: BTreeSet<String> = methods.map(|method| method.to_string()).collect();
+    let methods: BTreeSet<String> = findings
+        .iter()
+        .map(|finding| finding.strict.p_by)
+        .filter(|method| *method != SwapMethod::Counted)
+        .map(|method| method.to_string())
+        .collect();
     let methods: Vec<String> = methods.into_iter().collect();
     (!methods.is_empty()).then(|| {
         let methods = methods.join(" or ");

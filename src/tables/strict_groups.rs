@@ -81,8 +81,10 @@ fn table(
     caption: &str,
     is_shown: impl Fn(Option<&Family>) -> bool,
 ) -> Table {
-    let cells = score.cells.iter();
-    let cells = cells.filter(|cell| is_shown(cell.family.as_ref()));
+    let cells = score
+        .cells
+        .iter()
+        .filter(|cell| is_shown(cell.family.as_ref()));
     let chance = score.chance.iter();
     let chance = chance.filter(|chance| is_shown(chance.family.as_ref()));
     let lines = cells
@@ -218,8 +220,12 @@ impl Line<'_> {
 
 /// The name of the group of runs of a subject, if it has one.
 fn light(subject: &Subject) -> Option<String> {
-    let group = subject.variant.group.as_ref().map(LightGroup::name);
-    group.map(str::to_owned)
+    subject
+        .variant
+        .group
+        .as_ref()
+        .map(LightGroup::name)
+        .map(str::to_owned)
 }
 
 fn guess() -> Subject {

@@ -15,8 +15,11 @@ use darkqa_score::threshold::{CurveSummary, NoThreshold, ThinLevel};
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
     for axis in Axis::ALL {
-        let curves = findings.curves.iter();
-        let curves: Vec<&Curve> = curves.filter(|curve| curve.axis() == axis).collect();
+        let curves: Vec<&Curve> = findings
+            .curves
+            .iter()
+            .filter(|curve| curve.axis() == axis)
+            .collect();
         // Only light has tables without a row: it is what a run is about.
         if !curves.is_empty() || axis == Axis::LIGHT {
             tables.extend(axis_tables(findings, axis, curves));
@@ -136,8 +139,10 @@ fn thin(level: &ThinLevel) -> String {
 
 /// Why the threshold of a curve is not known, or which levels are left out; empty if neither.
 fn reason(summary: &CurveSummary) -> String {
-    let left_out = summary.left_out.iter();
-    let left_out = left_out.map(|level| format!("left out: {}", thin(level)));
+    let left_out = summary
+        .left_out
+        .iter()
+        .map(|level| format!("left out: {}", thin(level)));
     let unknown = summary.threshold.as_ref().err().map(why);
     let reasons: Vec<String> = unknown.into_iter().chain(left_out).collect();
     reasons.join("; ")
@@ -177,22 +182,24 @@ const LEAST_STEP: f64 = 0.25;
 /// All items and models are then asked there alike. A search that places levels by the answers of each model gains little, since the
 /// spread between items makes most of the error, and it would compare models at different levels.
 fn finer(findings: &Findings<'_>) -> Option<String> {
-    let raw = findings.curves.iter().filter(|curve| {
-        curve.family.is_none() && curve.enhancer.is_none() && curve.axis() == Axis::LIGHT
-    });
-    let intervals: Vec<[f64; 2]> = raw
+    let intervals: Vec<[f64; 2]> = findings
+        .curves
+        .iter()
+        .filter(|curve| {
+            curve.family.is_none() && curve.enhancer.is_none() && curve.axis() == Axis::LIGHT
+        })
         .filter_map(|curve| {
             let threshold = curve.summary.threshold.as_ref().ok()?;
             Some([threshold.low, threshold.high])
         })
         .collect();
-    let levels = findings
+    let levels: BTreeSet<AxisLevel> = findings
         .grid
         .subjects
         .iter()
-        .filter_map(|subject| subject.level);
-    let levels = levels.filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT));
-    let levels: BTreeSet<AxisLevel> = levels.collect();
+        .filter_map(|subject| subject.level)
+        .filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT))
+        .collect();
     let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();
     let more = levels_within(&intervals, &drops)?;
     let more: Vec<String> = more.iter().map(ToString::to_string).collect();
@@ -212,9 +219,11 @@ fn levels_within(intervals: &[[f64; 2]], drops: &[f64]) -> Option<Vec<f64>> {
     let below = drops.iter().rev().find(|drop| **drop <= low)?;
     let above = drops.iter().find(|drop| **drop >= high)?;
     let step = (above - below) / (MORE_LEVELS + 1) as f64;
-    let places = (1..=MORE_LEVELS).map(|index| below + step * index as f64);
-    let rounded = places.map(|drop| (drop * 100.0).round() / 100.0);
-    let new: Vec<f64> = rounded.filter(|drop| !drops.contains(drop)).collect();
+    let new: Vec<f64> = (1..=MORE_LEVELS)
+        .map(|index| below + step * index as f64)
+        .map(|drop| (drop * 100.0).round() / 100.0)
+        .filter(|drop| !drops.contains(drop))
+        .collect();
     (step >= LEAST_STEP && !new.is_empty()).then_some(new)
 }
 

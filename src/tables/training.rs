@@ -24,11 +24,12 @@ pub(crate) fn with_training(mut tables: Vec<Table>, listing: &ModelListing) -> V
 /// Whether a row is about an enhancer.
 fn has_results(table: &Table, enhancer: &str) -> bool {
     table.rows.iter().any(|row| {
-        let cells = row.cells.iter().filter_map(|cell| match cell {
-            TableCell::Text(text) => Some(&**text),
-            _ => None,
-        });
-        cells
+        row.cells
+            .iter()
+            .filter_map(|cell| match cell {
+                TableCell::Text(text) => Some(&**text),
+                _ => None,
+            })
             .chain(row.group.as_deref())
             .any(|text| names_enhancer(text, enhancer))
     })

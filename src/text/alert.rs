@@ -82,6 +82,8 @@ pub enum AlertKind {
 /// The alerts as lines of the terminal, each marked with `!`; empty without an alert.
 #[must_use]
 pub(crate) fn lines(alerts: &[Alert]) -> String {
-    let lines = alerts.iter().map(|alert| line(["! ", &alert.text, "  "]));
-    lines.collect()
+    alerts
+        .iter()
+        .map(|alert| line(["! ", &alert.text, "  "]))
+        .collect()
 }

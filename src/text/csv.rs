@@ -151,13 +151,16 @@ pub(crate) fn write<T: Borrow<Table>>(
                 .flat_map(|(column, cell)| fields(cell, column.heads.csv.len()))
                 .collect();
             let texts: Vec<Cow<'_, str>> = cells.iter().map(safe_text).collect();
-            let fields = cells.iter().zip(&texts).map(|(field, text)| match *field {
-                CsvField::Text(_) => CsvField::Text(text),
-                // `summary.csv` and `summary.json` write numbers in the same way.
-                CsvField::Number(number) if table.name != SUMMARY => CsvField::Plain(number),
-                field => field,
-            });
-            let row: Vec<CsvField<'_>> = fields.collect();
+            let row: Vec<CsvField<'_>> = cells
+                .iter()
+                .zip(&texts)
+                .map(|(field, text)| match *field {
+                    CsvField::Text(_) => CsvField::Text(text),
+                    // `summary.csv` and `summary.json` write numbers in the same way.
+                    CsvField::Number(number) if table.name != SUMMARY => CsvField::Plain(number),
+                    field => field,
+                })
+                .collect();
             file.serialize(row).map_err(failed)?;
         }
     }

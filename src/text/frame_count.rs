@@ -10,8 +10,9 @@ use darkqa_score::grid::Grid;
 pub(crate) fn frames(grid: &Grid<'_>) -> String {
     let mut images = BTreeMap::<&FrameId, usize>::new();
     for (place, item) in grid.items.iter().enumerate() {
-        let trials = (0..grid.subjects.len()).filter_map(|subject| grid.trial(subject, place));
-        let shown = trials.map(|trial| trial.images().map_or(0, SentImages::count));
+        let shown = (0..grid.subjects.len())
+            .filter_map(|subject| grid.trial(subject, place))
+            .map(|trial| trial.images().map_or(0, SentImages::count));
         let most = images.entry(&*item.asked.frame).or_default();
         *most = shown.max().unwrap_or(0).max(*most);
     }

@@ -142,8 +142,8 @@ impl<'a, C> Ladder<'a, C> {
             .into_iter()
             .partition(|(series, _)| is_clean(series));
         for (series, cells) in clean {
-            let same_model = degraded.iter_mut();
-            let mut same_model = same_model
+            let mut same_model = degraded
+                .iter_mut()
                 .filter(|(other, _)| {
                     let groups = [other, &series].map(|series| series.variant.group.as_ref());
                     (other.model, other.enhancer) == (series.model, series.enhancer)
@@ -163,8 +163,8 @@ impl<'a, C> Ladder<'a, C> {
     /// The ladder of each axis, light first. Series and cells without an axis are in each of them.
     pub(crate) fn by_axis(&self) -> Vec<(Axis, Self)> {
         let is_on = |series: &Series<'_>, axis| series.axis() == Some(axis);
-        let axes = Axis::ALL.into_iter();
-        let axes: Vec<Axis> = axes
+        let axes: Vec<Axis> = Axis::ALL
+            .into_iter()
             .filter(|axis| self.series.keys().any(|series| is_on(series, *axis)))
             .collect();
         let axes = if axes.is_empty() {
@@ -172,23 +172,24 @@ impl<'a, C> Ladder<'a, C> {
         } else {
             axes
         };
-        let ladders = axes.into_iter().map(|axis| {
-            let series = self.series.iter();
-            let series = series.filter(|(series, _)| series.axis().is_none_or(|on| on == axis));
-            let levels = self.levels.iter().copied();
-            let ladder = Self {
-                models: self.models.clone(),
-                levels: levels.filter(|level| level.is_shown_on(axis)).collect(),
-                series: series
-                    .map(|(series, cells)| (series.clone(), cells.clone()))
-                    .collect(),
-                without_level: self.without_level.clone(),
-                pairs: self.pairs,
-                set: self.set,
-            };
-            (axis, ladder)
-        });
-        ladders.collect()
+        axes.into_iter()
+            .map(|axis| {
+                let series = self.series.iter();
+                let series = series.filter(|(series, _)| series.axis().is_none_or(|on| on == axis));
+                let levels = self.levels.iter().copied();
+                let ladder = Self {
+                    models: self.models.clone(),
+                    levels: levels.filter(|level| level.is_shown_on(axis)).collect(),
+                    series: series
+                        .map(|(series, cells)| (series.clone(), cells.clone()))
+                        .collect(),
+                    without_level: self.without_level.clone(),
+                    pairs: self.pairs,
+                    set: self.set,
+                };
+                (axis, ladder)
+            })
+            .collect()
     }
 
     /// The cell of a series at L0, [with the clean frames](Self::with_clean); for an enhancer that was not asked about them, the cell

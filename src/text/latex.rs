@@ -78,8 +78,10 @@ fn table(caption: &str, table: &Table) -> String {
     let rows: Vec<(Option<&str>, String)> = table
         .headed_rows_in(TableFormat::Latex)
         .map(|(heading, row)| {
-            let cells = table.cells(row).filter(|(column, _)| named(column));
-            let cells = cells.map(|(column, cell)| cell_text(column.kind, cell));
+            let cells = table
+                .cells(row)
+                .filter(|(column, _)| named(column))
+                .map(|(column, cell)| cell_text(column.kind, cell));
             (heading, line(cells.collect()))
         })
         .collect();

@@ -43,10 +43,14 @@ mod tests {
     #[test]
     fn one_reading_alone_leaves_a_question_open() {
         let of = |conditions: &[&str]| {
-            let conditions = conditions.iter().map(|text| text.parse().unwrap());
-            let conditions: Vec<Condition> = conditions.collect();
-            let subjects = conditions.iter().map(|c| Subject::new("m", Some(c)));
-            let subjects: Vec<Subject> = subjects.collect();
+            let conditions: Vec<Condition> = conditions
+                .iter()
+                .map(|text| text.parse().unwrap())
+                .collect();
+            let subjects: Vec<Subject> = conditions
+                .iter()
+                .map(|c| Subject::new("m", Some(c)))
+                .collect();
             LightReadings::new(&subjects)
         };
         let one = of(&["L0", "L3-ev", "L3-noise@eld", "L5-noise@eld+lift"]);

@@ -63,8 +63,10 @@ mod tests {
         let reasons: std::collections::BTreeSet<&str> =
             UnreadReason::ALL.into_iter().map(unread).collect();
         assert_eq!(reasons.len(), UnreadReason::ALL.len());
-        let kinds = FailureKind::ALL.into_iter().map(|kind| failed(kind, None));
-        let kinds: std::collections::BTreeSet<String> = kinds.collect();
+        let kinds: std::collections::BTreeSet<String> = FailureKind::ALL
+            .into_iter()
+            .map(|kind| failed(kind, None))
+            .collect();
         assert_eq!(kinds.len(), FailureKind::ALL.len());
         let status = failed(FailureKind::RateLimit, Some(429));
         assert_eq!(status, "refused by a rate limit, HTTP 429");

@@ -26,8 +26,8 @@ use made::record;
 
 /// Eleven conditions of five models on four questions about each of 456 frames: 100,320 records.
 fn records() -> Vec<Record> {
-    let dark = Severity::LADDER.into_iter();
-    let dark = dark
+    let dark = Severity::LADDER
+        .into_iter()
         .flat_map(|severity| Kind::ALL.map(|kind| Degradation::new(kind, severity, None).unwrap()));
     let conditions: Vec<Condition> = std::iter::once(None)
         .chain(dark.map(Some))

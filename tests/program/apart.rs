@@ -20,11 +20,13 @@ fn copied(bench: &Bench, from: &str, to: &str, change: impl Fn(&mut Value)) {
 
 /// The records of a run, changed, as those of another.
 fn write_records(from: &Path, to: &Path, change: impl Fn(&mut Value)) {
-    let lines = records(from).into_iter().map(|mut record| {
-        change(&mut record);
-        format!("{record}\n")
-    });
-    let lines: String = lines.collect();
+    let lines: String = records(from)
+        .into_iter()
+        .map(|mut record| {
+            change(&mut record);
+            format!("{record}\n")
+        })
+        .collect();
     fs::write(to.join("records.jsonl"), lines).unwrap();
 }
 
@@ -41,8 +43,11 @@ fn answer(record: &mut Value, chosen: u8) {
 
 /// The texts of the alerts that hold a word.
 fn holding<'a>(alerts: &'a [String], word: &str) -> Vec<&'a str> {
-    let texts = alerts.iter().map(String::as_str);
-    texts.filter(|text| text.contains(word)).collect()
+    alerts
+        .iter()
+        .map(String::as_str)
+        .filter(|text| text.contains(word))
+        .collect()
 }
 
 #[test]
@@ -104,10 +109,9 @@ fn a_run_in_other_light_is_compared_although_replies_at_l0_differ() {
     let apart = "m stands apart as m (a) and m (b): 1 of 80 replies to the same trials differ.";
     assert_eq!(holding(&alerts, "m stands"), [apart], "{alerts:#?}");
     let rows = scene.csv("ab/comparisons.csv");
-    let lights = rows
+    let lights: Vec<[&str; 4]> = rows
         .iter()
-        .filter(|row| row[0] == "light" && row[5] == "all" && row.last().unwrap() == "strict");
-    let lights: Vec<[&str; 4]> = lights
+        .filter(|row| row[0] == "light" && row[5] == "all" && row.last().unwrap() == "strict")
         .map(|row| [&*row[1], &*row[2], &*row[3], &*row[4]])
         .collect();
     let expected = [
@@ -143,10 +147,11 @@ fn a_row_that_pools_fewer_models_says_so() {
     let rows = scene.csv("out/pooled.csv");
     let place = |name: &str| rows[0].iter().position(|head| head == name).unwrap();
     let models = |kind: &str| {
-        let rows = rows
+        let mut numbers: Vec<&str> = rows
             .iter()
-            .filter(|row| row[0] == kind && row[place("mode")] == "strict");
-        let mut numbers: Vec<&str> = rows.map(|row| &*row[place("models")]).collect();
+            .filter(|row| row[0] == kind && row[place("mode")] == "strict")
+            .map(|row| &*row[place("models")])
+            .collect();
         numbers.dedup();
         numbers
     };

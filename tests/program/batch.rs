@@ -28,13 +28,15 @@ fn requests(bench: &Bench) -> Vec<Value> {
     let mut paths: Vec<PathBuf> = files(&bench.path("run/batch"));
     paths.retain(|path| !path.ends_with("trials.jsonl"));
     paths.sort();
-    let lines = paths.iter().flat_map(|path| {
-        let text = fs::read_to_string(path).unwrap();
-        text.lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect::<Vec<Value>>()
-    });
-    lines.collect()
+    paths
+        .iter()
+        .flat_map(|path| {
+            let text = fs::read_to_string(path).unwrap();
+            text.lines()
+                .map(|line| serde_json::from_str(line).unwrap())
+                .collect::<Vec<Value>>()
+        })
+        .collect()
 }
 
 fn answer(request: &Value, reply: &str) -> String {

@@ -17,8 +17,7 @@ const KEY: &str = "a-very-secret-word-of-mine";
 fn unpack(zip: &Path, into: &Path) -> Vec<String> {
     let mut archive = ZipArchive::new(Cursor::new(fs::read(zip).unwrap())).unwrap();
     archive.extract(into).unwrap();
-    let names = archive.file_names().map(str::to_owned);
-    names.collect()
+    archive.file_names().map(str::to_owned).collect()
 }
 
 /// Every text in a folder, with the data that the page has packed.

@@ -53,8 +53,9 @@ fn columns(run: &Path, file: &str, names: &[&str]) -> Vec<Vec<String>> {
         .iter()
         .map(|name| head.iter().position(|column| column == name).unwrap())
         .collect();
-    let rows = lines.map(|row| places.iter().map(|at| row[*at].to_owned()).collect());
-    rows.collect()
+    lines
+        .map(|row| places.iter().map(|at| row[*at].to_owned()).collect())
+        .collect()
 }
 
 /// Every table and figure of a run with all four variants keeps exposure times and exposure drops apart.
@@ -81,10 +82,10 @@ fn exposure_times_have_an_axis_of_their_own() {
         .map(|line| line.split_whitespace().collect())
         .collect();
     let after = |name: &str| {
-        let mut lines = lines
+        lines
             .iter()
-            .filter(|line| line.first() == Some(&"script:m.jsonl"));
-        lines.any(|line| line[1..].join(" ") == format!("{name} 95 %"))
+            .filter(|line| line.first() == Some(&"script:m.jsonl"))
+            .any(|line| line[1..].join(" ") == format!("{name} 95 %"))
     };
     assert!(after("L0 L1 L2 L3 L4 L5"), "{stdout}");
     assert!(after("L0 T8.33 T16.67 T33.33 T66.67 T133.33"), "{stdout}");
@@ -110,10 +111,12 @@ fn exposure_times_have_an_axis_of_their_own() {
         &["kind", "variant", "family", "level", "mode"],
     );
     let levels = |kind: &str, variant: &str| -> String {
-        let rows = pooled
+        pooled
             .iter()
-            .filter(|row| row[..3] == [kind, variant, "all"] && row[4] == "strict");
-        rows.map(|row| &*row[3]).collect::<Vec<_>>().join(" ")
+            .filter(|row| row[..3] == [kind, variant, "all"] && row[4] == "strict")
+            .map(|row| &*row[3])
+            .collect::<Vec<_>>()
+            .join(" ")
     };
     assert_eq!(
         levels("motion blur", "motion"),
@@ -165,11 +168,11 @@ fn the_observer_loses_what_moves() {
     let run = bench.path("run");
     let seen = |condition: &str| -> u64 {
         let records = records(&run);
-        let of_condition = records
+        records
             .iter()
-            .filter(|record| record["condition"] == condition && record["model"] == "observer");
-        let seen = of_condition.map(|record| record["observed"]["seen"].as_u64().unwrap());
-        seen.sum()
+            .filter(|record| record["condition"] == condition && record["model"] == "observer")
+            .map(|record| record["observed"]["seen"].as_u64().unwrap())
+            .sum()
     };
     let [clean, auto, short, long] = ["L0", "L3-auto", "T8.33-motion", "T133.33-motion"].map(seen);
     assert!(short * 10 > clean * 9, "{short} of {clean}");
@@ -218,10 +221,9 @@ fn what_the_camera_made_is_made_again() {
     assert_eq!(exported.code, Some(0), "{exported:?}");
     assert!(exported.stdout.contains("in 5 conditions"), "{exported:?}");
     let digests = |condition: &str| -> Vec<String> {
-        let of_condition = sent
+        let mut digests: Vec<String> = sent
             .iter()
-            .filter(|record| record["condition"] == condition);
-        let mut digests: Vec<String> = of_condition
+            .filter(|record| record["condition"] == condition)
             .map(|record| record["image"]["digest"].as_str().unwrap().to_owned())
             .collect();
         digests.sort();
@@ -230,12 +232,15 @@ fn what_the_camera_made_is_made_again() {
     };
     let made = |condition: &str| -> Vec<String> {
         let images = crate::support::run::files(&bench.path("set"));
-        let of_condition = images.iter().filter(|path| {
-            let is_of_it = path.to_str().unwrap().contains(condition);
-            is_of_it && path.extension() == Some("png".as_ref())
-        });
-        let digests = of_condition.map(|path| blake3::hash(&fs::read(path).unwrap()).to_hex());
-        let mut digests: Vec<String> = digests.map(|digest| digest.to_string()).collect();
+        let mut digests: Vec<String> = images
+            .iter()
+            .filter(|path| {
+                let is_of_it = path.to_str().unwrap().contains(condition);
+                is_of_it && path.extension() == Some("png".as_ref())
+            })
+            .map(|path| blake3::hash(&fs::read(path).unwrap()).to_hex())
+            .map(|digest| digest.to_string())
+            .collect();
         digests.sort();
         digests.dedup();
         digests

@@ -24,11 +24,13 @@ fn path(name: &str) -> PathBuf {
 fn words(manifest: &str) -> Vec<String> {
     let text = file(manifest);
     let lines = text.lines().skip_while(|line| line.trim() != "args:");
-    let words = lines.skip(1).map_while(|line| {
-        let word = line.trim().strip_prefix("- ")?;
-        Some(word.to_owned())
-    });
-    words.collect()
+    lines
+        .skip(1)
+        .map_while(|line| {
+            let word = line.trim().strip_prefix("- ")?;
+            Some(word.to_owned())
+        })
+        .collect()
 }
 
 /// The value of a field of a manifest that has it once.
@@ -80,11 +82,13 @@ fn the_manifests_are_of_one_run() {
     let planned: BTreeSet<&String> = plan[1..].iter().collect();
     let asked: BTreeSet<&String> = job.iter().collect();
     assert!(planned.is_subset(&asked), "{planned:?} {asked:?}");
-    let others = asked.difference(&planned).map(|word| {
-        let flag = word.split('=').next();
-        flag.unwrap_or_default()
-    });
-    let others: Vec<&str> = others.collect();
+    let others: Vec<&str> = asked
+        .difference(&planned)
+        .map(|word| {
+            let flag = word.split('=').next();
+            flag.unwrap_or_default()
+        })
+        .collect();
     let expected = ["--quiet", "--rpm", "--shard", "--stop"];
     assert_eq!(others, expected);
     assert_eq!(merge[..2], ["report", "merge"]);
@@ -114,8 +118,11 @@ fn a_pod_that_its_node_ends_has_not_failed() {
         let text = file(manifest);
         let rules = text.split_once("rules:\n").unwrap().1;
         let rules = rules.split_once("  template:").unwrap().0;
-        let lines = rules.lines().map(str::trim);
-        let rules: Vec<&str> = lines.filter(|line| !line.starts_with('#')).collect();
+        let rules: Vec<&str> = rules
+            .lines()
+            .map(str::trim)
+            .filter(|line| !line.starts_with('#'))
+            .collect();
         let codes =
             format!("onExitCodes: {{containerName: darkqa, operator: In, values: {codes}}}");
         let expected = [

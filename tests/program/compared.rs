@@ -92,8 +92,10 @@ impl Scene {
             "whatever the image",
             "signal-to-noise ratio is the same",
         ];
-        let lines = lines.filter(|line| of_all.iter().all(|part| !line.contains(part)));
-        lines.map(str::to_owned).collect()
+        lines
+            .filter(|line| of_all.iter().all(|part| !line.contains(part)))
+            .map(str::to_owned)
+            .collect()
     }
 
     pub(crate) fn csv(&self, path: &str) -> Vec<Vec<String>> {
@@ -172,8 +174,8 @@ fn other_light_stands_apart_and_shared_light_is_shared() {
     scene.bench.complete(&words("report a b c --out abc"));
     scene.bench.complete(&words("report c b a --out cba"));
     let files = fs::read_dir(scene.bench.path("abc")).unwrap();
-    let files = files.map(|file| file.unwrap().file_name().into_string().unwrap());
     let tables: Vec<String> = files
+        .map(|file| file.unwrap().file_name().into_string().unwrap())
         .filter(|name| name.contains(".csv") || name.contains(".tex"))
         .collect();
     assert!(tables.len() > 6, "{tables:?}");
@@ -184,10 +186,9 @@ fn other_light_stands_apart_and_shared_light_is_shared() {
     }
     let rows = scene.csv("abc/comparisons.csv");
     let of_kind = |kind: &str| -> Vec<[&str; 4]> {
-        let rows = rows
-            .iter()
-            .filter(|row| row[0] == kind && row[5] == "all" && row.last().unwrap() == "strict");
-        rows.map(|row| [&*row[1], &*row[2], &*row[3], &*row[4]])
+        rows.iter()
+            .filter(|row| row[0] == kind && row[5] == "all" && row.last().unwrap() == "strict")
+            .map(|row| [&*row[1], &*row[2], &*row[3], &*row[4]])
             .collect()
     };
     // Models are compared in the same light alone; c has the light of a.
@@ -205,10 +206,9 @@ fn other_light_stands_apart_and_shared_light_is_shared() {
     assert_eq!(lights, expected);
     // L0 and the exposure drop are shown by all runs, and belong to the curve of each.
     let thresholds = scene.csv("abc/thresholds.csv");
-    let rows = thresholds
+    let curves: Vec<String> = thresholds
         .iter()
-        .filter(|row| row[3] == "all" && row.last().unwrap() == "strict");
-    let curves: Vec<String> = rows
+        .filter(|row| row[3] == "all" && row.last().unwrap() == "strict")
         .map(|row| [&*row[0], &*row[1], &*row[2]].join(" "))
         .collect();
     let expected = [

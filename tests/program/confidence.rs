@@ -96,8 +96,9 @@ fn simulated(
 ) -> Vec<Calibration> {
     let mut random = StdRng::seed_from_u64(seed);
     let draws = Resamples::new(frames);
-    let runs = (0..runs).map(|_| of(&replies(&mut random, frames, size, truth), &draws));
-    runs.collect()
+    (0..runs)
+        .map(|_| of(&replies(&mut random, frames, size, truth), &draws))
+        .collect()
 }
 
 /// How often an interval holds a number, in percent.

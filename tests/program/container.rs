@@ -44,8 +44,10 @@ fn libraries(file: &Path) -> BTreeSet<PathBuf> {
     let output = Command::new("ldd").arg(file).output().unwrap();
     ended_well("ldd", &output);
     let text = String::from_utf8(output.stdout).unwrap();
-    let words = text.split_whitespace().filter(|word| word.starts_with('/'));
-    words.map(PathBuf::from).collect()
+    text.split_whitespace()
+        .filter(|word| word.starts_with('/'))
+        .map(PathBuf::from)
+        .collect()
 }
 
 /// The files of the image in `folder/files`, with what they are linked to.

@@ -168,8 +168,9 @@ fn the_page_draws_the_numbers_of_the_file(bench: &Bench, table: &str) {
             .iter()
             .map(|point| point["y"][0].as_f64().unwrap())
             .collect();
-        let rows = table.lines().skip(1);
-        let filed: Vec<f64> = rows
+        let filed: Vec<f64> = table
+            .lines()
+            .skip(1)
             .map(|row| row.split(',').nth(column).unwrap().parse().unwrap())
             .collect();
         assert_eq!(drawn.len(), filed.len());

@@ -62,8 +62,9 @@ fn data(scene: &Scene, name: &str) -> (BTreeMap<String, String>, Vec<BTreeMap<St
     });
     let heads: Vec<&str> = rows[0].split(' ').collect();
     let rows = rows[1..].iter().map(|row| {
-        let cells = heads.iter().zip(row.split(' '));
-        cells
+        heads
+            .iter()
+            .zip(row.split(' '))
             .map(|(head, cell)| ((*head).to_owned(), cell.to_owned()))
             .collect()
     });

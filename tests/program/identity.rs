@@ -590,10 +590,14 @@ fn class_of_row(row: &'static str) -> Option<(&'static str, &'static str)> {
 #[test]
 fn every_flag_is_held_to_what_it_decides() {
     let first = |args: &&'static str| args.split(' ').next().unwrap();
-    let refused = REFUSED.iter().chain(&OPEN_REFUSED);
-    let refused = refused.map(|(_, args)| first(args));
-    let added = ADDITIONS.iter().chain(&OPEN_ADDITIONS);
-    let added = added.map(|(_, args, _)| first(args));
+    let refused = REFUSED
+        .iter()
+        .chain(&OPEN_REFUSED)
+        .map(|(_, args)| first(args));
+    let added = ADDITIONS
+        .iter()
+        .chain(&OPEN_ADDITIONS)
+        .map(|(_, args, _)| first(args));
     // Of `--llie one.onnx --llie-on both` the last flag is the one that is tried.
     let on = std::iter::once("--llie-on");
     let decide: BTreeSet<&str> = refused.chain(added).chain(on).collect();

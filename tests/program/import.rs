@@ -569,8 +569,10 @@ fn hypersim_is_read_with_its_maps_in_hdf5() {
             ))
         };
         let sides = |left: u16, right: u16| -> Vec<u8> {
-            let row = (0..WIDTH).map(|x| if x < WIDTH / 2 { left } else { right });
-            let row: Vec<u8> = row.flat_map(u16::to_le_bytes).collect();
+            let row: Vec<u8> = (0..WIDTH)
+                .map(|x| if x < WIDTH / 2 { left } else { right })
+                .flat_map(u16::to_le_bytes)
+                .collect();
             row.repeat(HEIGHT as usize)
         };
         let size = [u64::from(HEIGHT), u64::from(WIDTH)];

@@ -40,13 +40,14 @@ fn rows(bench: &Bench, file: &str) -> Vec<Vec<(String, String)>> {
     let table = fs::read_to_string(bench.path("run").join(file)).unwrap();
     let mut lines = table.lines();
     let head: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let rows = lines.map(|line| {
-        let cells = head.iter().zip(line.split(','));
-        cells
-            .map(|(name, cell)| ((*name).to_owned(), cell.to_owned()))
-            .collect()
-    });
-    rows.collect()
+    lines
+        .map(|line| {
+            head.iter()
+                .zip(line.split(','))
+                .map(|(name, cell)| ((*name).to_owned(), cell.to_owned()))
+                .collect()
+        })
+        .collect()
 }
 
 fn cell<'r>(row: &'r [(String, String)], name: &str) -> &'r str {
@@ -184,8 +185,9 @@ fn findings_stand_beside_each_other_under_every_reading() {
     assert_eq!(records.len(), FRAMES * (1 + 3 + 3 * 3));
     assert_eq!(records[..first.len()], first);
     let of_kind = |kind: &str| {
-        let conditions = records.iter().map(|record| record["condition"].as_str());
-        conditions
+        records
+            .iter()
+            .map(|record| record["condition"].as_str())
             .filter(|name| name.unwrap().ends_with(kind))
             .count()
     };

@@ -116,10 +116,10 @@ impl Scene {
     fn assert_whole(&self, out: &str, beyond: usize) {
         self.complete(out);
         let run = self.bench.path(out);
-        let keys = records(&run)
+        let keys: Vec<String> = records(&run)
             .into_iter()
-            .map(|record| record["key"].to_string());
-        let keys: Vec<String> = keys.collect();
+            .map(|record| record["key"].to_string())
+            .collect();
         let distinct: BTreeSet<&String> = keys.iter().collect();
         assert_eq!((distinct.len(), keys.len()), (self.trials, self.trials));
         let sent = self.endpoint.requests().len();

@@ -8,8 +8,7 @@ use serde_json::Value;
 
 /// The lines of the only table in a text of Markdown.
 fn table(text: &str) -> Vec<&str> {
-    let rows = text.lines().filter(|line| line.starts_with('|'));
-    rows.collect()
+    text.lines().filter(|line| line.starts_with('|')).collect()
 }
 
 #[test]

@@ -28,17 +28,18 @@ fn accuracies(bench: &Bench) -> BTreeMap<String, String> {
     let text = fs::read_to_string(bench.path("run/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&text).unwrap();
     let rows = summary["rows"].as_array().unwrap();
-    let rows = rows.iter().filter(|row| {
-        (&row["mode"], &row["family"]) == (&"strict".into(), &"all".into())
-            && row["model"] != "chance"
-    });
-    rows.map(|row| {
-        (
-            row["model"].as_str().unwrap().to_owned(),
-            row["value"].to_string(),
-        )
-    })
-    .collect()
+    rows.iter()
+        .filter(|row| {
+            (&row["mode"], &row["family"]) == (&"strict".into(), &"all".into())
+                && row["model"] != "chance"
+        })
+        .map(|row| {
+            (
+                row["model"].as_str().unwrap().to_owned(),
+                row["value"].to_string(),
+            )
+        })
+        .collect()
 }
 
 fn names(bench: &Bench) -> Vec<String> {

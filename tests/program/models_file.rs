@@ -41,11 +41,13 @@ fn refusal(models: &str, line: &str) -> String {
 fn keys(bench: &Bench, run: &str) -> BTreeMap<(String, String), String> {
     let text = |record: &Value, field: &str| record[field].as_str().unwrap().to_owned();
     let records = records(&bench.path(run));
-    let keys = records.iter().map(|record| {
-        let place = (text(record, "model"), text(record, "question"));
-        (place, text(record, "key"))
-    });
-    keys.collect()
+    records
+        .iter()
+        .map(|record| {
+            let place = (text(record, "model"), text(record, "question"));
+            (place, text(record, "key"))
+        })
+        .collect()
 }
 
 #[test]
@@ -361,8 +363,9 @@ fn some_of_the_models_and_some_of_the_questions() {
     );
     complete(&bench, "--only m-1.5,m-1 --set m-1.5.max-tokens=7");
     let sent = |model: &str| {
-        let requests = mock.requests().into_iter().map(|request| request.json());
-        requests
+        mock.requests()
+            .into_iter()
+            .map(|request| request.json())
             .filter(|body| body["model"] == *model)
             .collect::<Vec<Value>>()
     };

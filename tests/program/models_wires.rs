@@ -52,12 +52,14 @@ fn table(id: &str, url: &str, more: &str) -> String {
 
 /// The request of each model, by its name.
 fn by_model(requests: &[Request]) -> BTreeMap<String, &Request> {
-    let named = requests.iter().filter(|request| !request.body.is_empty());
-    let named = named.map(|request| {
-        let body = request.json();
-        (body["model"].as_str().unwrap().to_owned(), request)
-    });
-    named.collect()
+    requests
+        .iter()
+        .filter(|request| !request.body.is_empty())
+        .map(|request| {
+            let body = request.json();
+            (body["model"].as_str().unwrap().to_owned(), request)
+        })
+        .collect()
 }
 
 #[test]

@@ -171,7 +171,7 @@ fn simulate(setting: Setting) -> (f64, bool) {
     });
     let base = mock.base_url();
     let codes: Vec<Option<i32>> = thread::scope(|scope| {
-        let shards = (1..=SHARDS).map(|shard| {
+        let shards: Vec<_> = (1..=SHARDS).map(|shard| {
             let line = format!(
                 "--data set.jsonl --levels L0 --model m --base-url {base} --prices prices.toml --out run --shard {shard}/{SHARDS} \
                  --max-tokens {} --concurrency {} --max-cost {} --timeout 0.5 --retries 2 --threads 1",
@@ -179,8 +179,7 @@ fn simulate(setting: Setting) -> (f64, bool) {
             );
             let bench = &bench;
             scope.spawn(move || bench.call(&words(&line)).code)
-        });
-        let shards: Vec<_> = shards.collect();
+        }).collect();
         shards
             .into_iter()
             .map(|shard| shard.join().unwrap())

@@ -90,15 +90,18 @@ fn corpus() -> Vec<Vec<u8>> {
         DynamicImage::ImageLumaA8(colour.to_luma_alpha8()),
     ];
     let formats = [ImageFormat::Png, ImageFormat::WebP, ImageFormat::Tiff];
-    let written = kinds.iter().flat_map(|image| {
-        formats.map(|format| {
-            let mut file = Cursor::new(Vec::new());
-            let written = image.write_to(&mut file, format);
-            // WebP has no 16 bits, and TIFF no alpha channel beside grey.
-            written.is_ok().then(|| file.into_inner())
+    let mut files: Vec<Vec<u8>> = kinds
+        .iter()
+        .flat_map(|image| {
+            formats.map(|format| {
+                let mut file = Cursor::new(Vec::new());
+                let written = image.write_to(&mut file, format);
+                // WebP has no 16 bits, and TIFF no alpha channel beside grey.
+                written.is_ok().then(|| file.into_inner())
+            })
         })
-    });
-    let mut files: Vec<Vec<u8>> = written.flatten().collect();
+        .flatten()
+        .collect();
     assert!(files.len() > 10);
     let lossy = "UklGRloAAABXRUJQVlA4IE4AAADQAgCdASoQABAAAMASJbACdHMBMAH6ALEAE3ctuVroAP7/25Ju3CH22WwE6y5cQSCFn/xykcgP6B0+y8YTRif/7lC9F//3pm9Ank0AAAA=";
     files.push(STANDARD.decode(lossy).unwrap());

@@ -103,8 +103,9 @@ fn sets_are_exported_in_parts() {
         let (whole, parts) = in_parts(&bench, &format!("export {kind} frames --levels L0,L3"));
         let is_image = |name: &str| Path::new(name).extension() == Some(OsStr::new("png"));
         let images = |files: &Files| {
-            let files = files.iter().filter(|(name, _)| is_image(name));
             files
+                .iter()
+                .filter(|(name, _)| is_image(name))
                 .map(|(name, image)| (name.clone(), image.clone()))
                 .collect()
         };

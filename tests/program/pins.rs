@@ -55,8 +55,10 @@ fn sign_test(gained: usize, lost: usize) -> f64 {
 fn holm(set: &[f64], p: f64) -> f64 {
     let mut sorted = set.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let up_to = sorted.iter().enumerate().filter(|(_, other)| **other <= p);
-    up_to
+    sorted
+        .iter()
+        .enumerate()
+        .filter(|(_, other)| **other <= p)
         .map(|(j, other)| (set.len() - j) as f64 * other)
         .fold(0.0, f64::max)
         .min(1.0)
@@ -78,10 +80,11 @@ fn exam() -> Bench {
         .map(|i| FAMILIES.map(|family| format!("{family}{i}")))
         .collect();
     let question = |family: usize, id: &String| json!({"id": id, "image": "a.png", "family": FAMILIES[family], "question": format!("Which, {id}?"), "choices": ["one", "two", "three"], "answer": "three"});
-    let all = ids
+    let all: Vec<String> = ids
         .iter()
-        .flat_map(|pair| [question(0, &pair[0]), question(1, &pair[1])]);
-    let all: Vec<String> = all.map(|question| question.to_string()).collect();
+        .flat_map(|pair| [question(0, &pair[0]), question(1, &pair[1])])
+        .map(|question| question.to_string())
+        .collect();
     bench.file("set.jsonl", all.join("\n"));
     check_rows(SKILLS, |(model, skill)| {
         let mut script = vec![json!({"default": "A"}).to_string()];
@@ -161,8 +164,10 @@ fn holm_corrects_within_a_pair_of_models_and_a_kind() {
         }
     }
     let counts = |kind: &str, all: bool| -> Vec<usize> {
-        let of = sets.iter().filter(|((k, a, ..), _)| k == kind && *a == all);
-        of.map(|(_, values)| values.len()).collect()
+        sets.iter()
+            .filter(|((k, a, ..), _)| k == kind && *a == all)
+            .map(|(_, values)| values.len())
+            .collect()
     };
     // Each pair of models in five conditions; each model dark with L0, and noisy with its exposure alone.
     for (kind, each) in [("model", 5), ("level", 4), ("variant", 2)] {
@@ -282,10 +287,10 @@ fn small_copies_are_kept_of_the_frames_of_lowest_digest() {
     let stored = |run: &str| {
         let lines = lines(&bench.path(&format!("{run}/thumbnails.jsonl")));
         let text = |line: &Value, field: &str| line[field].as_str().unwrap().to_owned();
-        let places = lines
+        let places: BTreeSet<(String, String)> = lines
             .iter()
-            .map(|line| (text(line, "frame"), text(line, "condition")));
-        let places: BTreeSet<(String, String)> = places.collect();
+            .map(|line| (text(line, "frame"), text(line, "condition")))
+            .collect();
         assert_eq!(places.len(), lines.len(), "{run}: none twice");
         let images = lines
             .iter()

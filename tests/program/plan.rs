@@ -21,8 +21,9 @@ fn with_frames() -> Bench {
 
 fn lines(path: &Path) -> Vec<Value> {
     let text = fs::read_to_string(path).unwrap();
-    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
-    lines.collect()
+    text.lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
 }
 
 fn json(path: &Path) -> Value {
@@ -87,10 +88,11 @@ fn a_part_opens_only_the_frames_that_it_asks_about() {
     assert_eq!(found.code, Some(0), "{found:?}");
     let own: BTreeSet<String> = {
         let records = records(&bench.path("run/shard-2-of-4"));
-        let frames = records
+        records
             .iter()
-            .map(|record| record["frame"].as_str().unwrap());
-        frames.map(str::to_owned).collect()
+            .map(|record| record["frame"].as_str().unwrap())
+            .map(str::to_owned)
+            .collect()
     };
     assert!((2..=4).contains(&own.len()), "{own:?}");
     fs::remove_dir_all(bench.path("run/shard-2-of-4")).unwrap();

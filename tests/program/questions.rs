@@ -277,10 +277,8 @@ fn nothing_is_denied_that_the_labels_cannot_say() {
         all.extend(flags);
         assert_eq!(data.ask(out.path(), &all).code, 0);
         let text = fs::read_to_string(&candidates).unwrap();
-        let lines = text
-            .lines()
-            .map(|line| serde_json::from_str::<Value>(line).unwrap());
-        lines
+        text.lines()
+            .map(|line| serde_json::from_str::<Value>(line).unwrap())
             .filter(|line| {
                 line["family"] == "presence" && line["answer"] == "no" && line["reason"].is_null()
             })

@@ -24,17 +24,17 @@ type Counts = BTreeMap<[String; 8], [u64; 3]>;
 fn of_summary(run: &Path) -> Counts {
     let mut table = csv::Reader::from_path(run.join("summary.csv")).unwrap();
     let rows = table.deserialize::<BTreeMap<String, String>>();
-    let rows = rows.map(Result::unwrap);
-    let rows = rows.filter(|row| row["model"] != "chance" && row["family"] != "all");
-    let counts = rows.map(|row| {
-        let columns = [
-            "model", "view", "level", "variant", "enhancer", "family", "mode", "reading",
-        ];
-        let number = |name: &str| row[name].parse::<u64>().unwrap();
-        let counts = [number("n"), number("right"), number("failed")];
-        (columns.map(|name| row[name].clone()), counts)
-    });
-    counts.collect()
+    rows.map(Result::unwrap)
+        .filter(|row| row["model"] != "chance" && row["family"] != "all")
+        .map(|row| {
+            let columns = [
+                "model", "view", "level", "variant", "enhancer", "family", "mode", "reading",
+            ];
+            let number = |name: &str| row[name].parse::<u64>().unwrap();
+            let counts = [number("n"), number("right"), number("failed")];
+            (columns.map(|name| row[name].clone()), counts)
+        })
+        .collect()
 }
 
 /// The same counts of a table of records.
@@ -188,8 +188,7 @@ fn written_again_and_from_parts_it_is_the_same() {
     assert_eq!(timeless(&merged), timeless(&path));
     // It stands in the order in which merge writes the records.
     let keys = |rows: Vec<Value>| -> Vec<Value> {
-        let keys = rows.into_iter().map(|mut row| row["key"].take());
-        keys.collect()
+        rows.into_iter().map(|mut row| row["key"].take()).collect()
     };
     let table = rows(&merged).into_iter().map(Value::Object).collect();
     assert_eq!(keys(table), keys(records(&bench.path("merged"))));

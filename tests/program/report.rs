@@ -15,10 +15,9 @@ fn run(bench: &Bench, out: &str, more: &str) {
 
 fn csv(path: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(path).unwrap();
-    let lines = text
-        .lines()
-        .map(|line| line.split(',').map(str::to_owned).collect());
-    lines.collect()
+    text.lines()
+        .map(|line| line.split(',').map(str::to_owned).collect())
+        .collect()
 }
 
 #[test]
@@ -83,10 +82,10 @@ fn several_runs_become_one_comparison() {
     assert!(missing.is_empty(), "not in src/docs/files.md: {missing:?}");
     let rows = csv(&bench.path("all/comparisons.csv"));
     let place = |name: &str| rows[0].iter().position(|head| head == name).unwrap();
-    let models = rows
+    let scripted = rows
         .iter()
-        .filter(|row| row[0] == "model" && row[place("family")] == "all");
-    let scripted = models.filter(|row| row[place("against_model")] == "script:said.jsonl");
+        .filter(|row| row[0] == "model" && row[place("family")] == "all")
+        .filter(|row| row[place("against_model")] == "script:said.jsonl");
     // The scripted model is always right: whoever is held against it gains nothing.
     for row in scripted {
         assert_eq!(row[place("only_first")], "0", "{row:?}");

@@ -25,11 +25,13 @@ fn ask(bench: &Bench, more: &str, run: &str) -> Vec<Value> {
 /// The images of the rooms, in the order of their names.
 fn images(bench: &Bench) -> Vec<PathBuf> {
     let frames = fs::read_to_string(bench.path("frames/frames.jsonl")).unwrap();
-    let paths = frames.lines().map(|line| {
-        let frame: Value = serde_json::from_str(line).unwrap();
-        bench.path("frames").join(frame["rgb"].as_str().unwrap())
-    });
-    paths.collect()
+    frames
+        .lines()
+        .map(|line| {
+            let frame: Value = serde_json::from_str(line).unwrap();
+            bench.path("frames").join(frame["rgb"].as_str().unwrap())
+        })
+        .collect()
 }
 
 /// The share of right answers less that of guessing, and the number of guesses.

@@ -43,11 +43,14 @@ impl Seen {
 
     /// The things of a class that are in view.
     fn of_class(&self, class: &str) -> Vec<&ThingTruth> {
-        let things = self.pixels.keys().filter_map(|number| {
-            let place = (*number as usize).checked_sub(1)?;
-            self.truth.things.get(place)
-        });
-        things.filter(|thing| thing.class == class).collect()
+        self.pixels
+            .keys()
+            .filter_map(|number| {
+                let place = (*number as usize).checked_sub(1)?;
+                self.truth.things.get(place)
+            })
+            .filter(|thing| thing.class == class)
+            .collect()
     }
 }
 
@@ -150,11 +153,14 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
         }
         Family::Closest => {
             let offered = asked.question.choices.texts();
-            let visible = seen.pixels.keys().filter_map(|number| {
-                let place = (*number as usize).checked_sub(1)?;
-                seen.truth.things.get(place)
-            });
-            let offered = visible.filter(|thing| offered.contains(&called(thing)));
+            let offered = seen
+                .pixels
+                .keys()
+                .filter_map(|number| {
+                    let place = (*number as usize).checked_sub(1)?;
+                    seen.truth.things.get(place)
+                })
+                .filter(|thing| offered.contains(&called(thing)));
             let winner = offered.min_by(|a, b| a.near.total_cmp(&b.near));
             called(winner?)
         }
@@ -213,11 +219,12 @@ fn the_questions_are_right_and_even() {
             "{family}: {counts:?}"
         );
     }
-    let chances = made
+    let chance = made
         .asked
         .iter()
-        .map(|asked| 1.0 / asked.question.choices.len() as f64);
-    let chance = chances.sum::<f64>() / made.asked.len() as f64;
+        .map(|asked| 1.0 / asked.question.choices.len() as f64)
+        .sum::<f64>()
+        / made.asked.len() as f64;
     assert!((0.30..0.37).contains(&chance), "{chance}");
 
     // Every class that is asked about is there in at least five frames.

@@ -70,8 +70,9 @@ fn findings(
 
 /// The sentences of a kind.
 fn texts<'f>(findings: &'f [Value], kind: &str) -> Vec<&'f str> {
-    let of_kind = findings.iter().filter(|finding| finding["kind"] == kind);
-    of_kind
+    findings
+        .iter()
+        .filter(|finding| finding["kind"] == kind)
         .map(|finding| finding["text"].as_str().unwrap())
         .collect()
 }

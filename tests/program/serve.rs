@@ -97,13 +97,14 @@ fn over_the_wire_the_observer_sees_what_it_sees_in_the_program() {
             "--out",
             out,
         ]);
-        let kept = records(&bench.path(out)).into_iter();
-        let kept = kept.filter(|record| record["model"] == model);
-        kept.map(|record| {
-            let item = format!("{} {}", record["question"], record["condition"]);
-            (item, record["reply"].to_string())
-        })
-        .collect()
+        records(&bench.path(out))
+            .into_iter()
+            .filter(|record| record["model"] == model)
+            .map(|record| {
+                let item = format!("{} {}", record["question"], record["condition"]);
+                (item, record["reply"].to_string())
+            })
+            .collect()
     };
     let (here, there) = (
         replies("observer", "here"),

@@ -35,16 +35,18 @@ fn parts(body: &Value) -> Vec<Result<String, RgbImage>> {
     let Some(parts) = content.as_array() else {
         return vec![Ok(content.as_str().unwrap().to_owned())];
     };
-    let parts = parts.iter().map(|part| {
-        if let Some(text) = part["text"].as_str() {
-            Ok(text.to_owned())
-        } else {
-            let url = part["image_url"]["url"].as_str().unwrap();
-            let file = STANDARD.decode(url.split_once(',').unwrap().1).unwrap();
-            Err(image::load_from_memory(&file).unwrap().into_rgb8())
-        }
-    });
-    parts.collect()
+    parts
+        .iter()
+        .map(|part| {
+            if let Some(text) = part["text"].as_str() {
+                Ok(text.to_owned())
+            } else {
+                let url = part["image_url"]["url"].as_str().unwrap();
+                let file = STANDARD.decode(url.split_once(',').unwrap().1).unwrap();
+                Err(image::load_from_memory(&file).unwrap().into_rgb8())
+            }
+        })
+        .collect()
 }
 
 /// Words, and the width of each picture.
@@ -158,10 +160,9 @@ fn images_are_made_again(bench: &Bench) {
     let sheet = image::open(bench.path("sheet.png")).unwrap();
     assert!(sheet.width() > 400);
     let questions = fs::read_to_string(bench.path("run/questions.jsonl")).unwrap();
-    let questions = questions
-        .lines()
-        .map(|line| serde_json::from_str::<Value>(line).unwrap());
     let images: Vec<Value> = questions
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap())
         .map(|question| question["images"].clone())
         .collect();
     assert_eq!(

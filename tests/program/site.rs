@@ -12,14 +12,17 @@ use serde_json::Value;
 fn rows(bench: &Bench, path: &str) -> Vec<BTreeMap<String, String>> {
     let mut reader = csv::Reader::from_path(bench.path(path)).unwrap();
     let names = reader.headers().unwrap().clone();
-    let rows = reader.records().map(|row| {
-        let row = row.unwrap();
-        let cells = names.iter().zip(row.iter());
-        cells
-            .map(|(name, cell)| (name.to_owned(), cell.to_owned()))
-            .collect()
-    });
-    rows.collect()
+    reader
+        .records()
+        .map(|row| {
+            let row = row.unwrap();
+            names
+                .iter()
+                .zip(row.iter())
+                .map(|(name, cell)| (name.to_owned(), cell.to_owned()))
+                .collect()
+        })
+        .collect()
 }
 
 fn find<'r>(
@@ -36,13 +39,12 @@ fn find<'r>(
 /// Two scripts for these questions: one is right as long as it is not too dark, one never.
 fn scripts(bench: &Bench) {
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
-    let lines = set.lines().map(|line| {
+    let good = set.lines().map(|line| {
         let question: Value = serde_json::from_str(line).unwrap();
         let dark =
             serde_json::json!({"question": question["id"], "condition": "L5-noise", "reply": "A"});
         format!("{dark}\n")
-    });
-    let good = lines.collect::<String>() + "{\"default\": \"C\"}\n";
+    }).collect::<String>() + "{\"default\": \"C\"}\n";
     bench.file("good.jsonl", good);
     bench.file("bad.jsonl", "{\"default\": \"A\"}\n");
 }
@@ -232,10 +234,10 @@ fn only_what_was_asked_in_the_same_way_shares_a_table() {
     assert!(differs(2).contains("questions is "), "{}", differs(2));
     // The same model in two runs stands twice, and neither is better.
     let board = rows(&bench, "site/leaderboard.csv");
-    let twice = board
+    let twice: Vec<_> = board
         .iter()
-        .filter(|row| row["group"] == "1" && row["model"] == "script:good.jsonl");
-    let twice: Vec<_> = twice.collect();
+        .filter(|row| row["group"] == "1" && row["model"] == "script:good.jsonl")
+        .collect();
     assert_eq!(twice.len(), 2);
     assert_eq!(twice[0]["rank_first"], twice[1]["rank_first"]);
 }

@@ -328,8 +328,10 @@ fn thresholds_are_recovered() {
     let mut random = StdRng::seed_from_u64(11);
     // What the estimator aims at: the curve of straight lines between the levels.
     let levels = Severity::LADDER.map(|severity| AxisLevel::new(Kind::Sensor, severity));
-    let levels = std::iter::once(AxisLevel::L0).chain(levels);
-    let drops: Vec<f64> = levels.map(AxisLevel::value).collect();
+    let drops: Vec<f64> = std::iter::once(AxisLevel::L0)
+        .chain(levels)
+        .map(AxisLevel::value)
+        .collect();
     let middle = f64::midpoint(psychometric(0.0), 1.0 / 3.0);
     let after = drops
         .iter()
@@ -339,11 +341,14 @@ fn thresholds_are_recovered() {
     let (above, below) = (psychometric(near), psychometric(far));
     let truth = near + (above - middle) / (above - below) * (far - near);
     assert!((truth - 6.4).abs() < 0.1, "{truth}");
-    let heights = drops.windows(2).map(|drop| {
-        let mean = f64::midpoint(psychometric(drop[0]), psychometric(drop[1]));
-        (drop[1] - drop[0]) * mean
-    });
-    let true_area = heights.sum::<f64>() / 9.0;
+    let true_area = drops
+        .windows(2)
+        .map(|drop| {
+            let mean = f64::midpoint(psychometric(drop[0]), psychometric(drop[1]));
+            (drop[1] - drop[0]) * mean
+        })
+        .sum::<f64>()
+        / 9.0;
     let (mut sum, mut areas, times) = (0.0, 0, 400);
     let held = percent(times, || {
         let sizes = sizes(&mut random, 60, 3, 7);

@@ -127,8 +127,10 @@ fn a_store_is_not_written_through_links() {
     let line = |run: &str| format!("{COMMAND}{run} --images-cache store");
     bench.complete(&words(&line("1")));
     let before = fs::read_dir(bench.path("store/v1")).unwrap();
-    let folders = before.map(|entry| entry.unwrap().path());
-    let folders: Vec<_> = folders.filter(|path| path.is_dir()).collect();
+    let folders: Vec<_> = before
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.is_dir())
+        .collect();
     assert!(!folders.is_empty());
     for folder in folders {
         fs::remove_dir_all(&folder).unwrap();

@@ -94,8 +94,10 @@ fn names_of_a_run_are_shown_and_do_nothing() {
                 "\u{1b}[32m",
                 "\u{1b}[33m",
             ];
-            let styles = styles.iter().filter(|_| line.ends_with("always"));
-            let text = styles.fold(text.clone(), |text, style| text.replace(style, ""));
+            let text = styles
+                .iter()
+                .filter(|_| line.ends_with("always"))
+                .fold(text.clone(), |text, style| text.replace(style, ""));
             let found = hidden(&text);
             assert!(found.is_empty(), "{line}, {stream}: {text:?}");
         }

@@ -123,8 +123,9 @@ fn a_folder_of_photographs_is_asked_and_no_reply_is_right_or_wrong() {
         .collect();
     assert_eq!(outcomes, BTreeSet::from(["answered"]));
     assert!(records.iter().all(|record| record["truth"].is_null()));
-    let again = records.iter().filter(|record| record["repeat"] == 1);
-    let again: BTreeSet<&str> = again
+    let again: BTreeSet<&str> = records
+        .iter()
+        .filter(|record| record["repeat"] == 1)
         .filter_map(|record| record["condition"].as_str())
         .collect();
     assert_eq!(again, BTreeSet::from(["L0"]));
@@ -280,14 +281,16 @@ fn a_way_out_is_a_measure_of_its_own() {
     let bank = text(&bench, "bank.jsonl").replace("\"no\"]", "\"no\",\"Cannot tell\"]");
     bench.file("bank.jsonl", bank);
     let replies = text(&bench, "eyes.jsonl");
-    let replies = replies.lines().map(|line| {
-        let mut line: Value = serde_json::from_str(line).unwrap();
-        if line.get("condition").is_none() {
-            line["reply"] = "C".into();
-        }
-        format!("{line}\n")
-    });
-    let replies: String = replies.collect();
+    let replies: String = replies
+        .lines()
+        .map(|line| {
+            let mut line: Value = serde_json::from_str(line).unwrap();
+            if line.get("condition").is_none() {
+                line["reply"] = "C".into();
+            }
+            format!("{line}\n")
+        })
+        .collect();
     bench.file("eyes.jsonl", replies);
     let shown = bench.complete(&words(ASKED));
     let shown = on_one_line(&shown);
@@ -455,19 +458,24 @@ fn photographs_in_the_dark_are_asked_as_they_are() {
     );
     // The ceiling is what the records say.
     let chosen = |question: &Value, repeat: u64| {
-        let mut of = all.iter().filter(|record| {
-            record["question"] == *question
-                && record["level"] == "L0"
-                && record["repeat"].as_u64().unwrap_or_default() == repeat
-        });
-        of.next().unwrap()["strict"]["chosen"].clone()
+        all.iter()
+            .find(|record| {
+                record["question"] == *question
+                    && record["level"] == "L0"
+                    && record["repeat"].as_u64().unwrap_or_default() == repeat
+            })
+            .unwrap()["strict"]["chosen"]
+            .clone()
     };
     let questions: BTreeSet<String> = all.iter().map(|r| r["question"].to_string()).collect();
-    let same = questions.iter().filter(|question| {
-        let question: Value = serde_json::from_str(question).unwrap();
-        chosen(&question, 0) == chosen(&question, 1)
-    });
-    let same = same.count() as f64 / 36.0;
+    let same = questions
+        .iter()
+        .filter(|question| {
+            let question: Value = serde_json::from_str(question).unwrap();
+            chosen(&question, 0) == chosen(&question, 1)
+        })
+        .count() as f64
+        / 36.0;
     let own = rows(&bench, "run/own_answers.csv");
     let ceiling = row(
         &own,
@@ -514,16 +522,18 @@ fn photographs_in_the_dark_are_asked_as_they_are() {
 fn an_enhancer_of_photographs_in_the_dark_does_no_harm_in_the_light() {
     let bench = photographs_in_the_dark();
     let replies = text(&bench, "eyes.jsonl");
-    let enhanced = replies.lines().filter_map(|line| {
-        let mut line: Value = serde_json::from_str(line).unwrap();
-        (line["condition"] == "L0").then(|| {
-            // With the enhancer a model sees what it did not see.
-            line["condition"] = "L0+lift".into();
-            line["reply"] = "A".into();
-            format!("{line}\n")
+    let enhanced: String = replies
+        .lines()
+        .filter_map(|line| {
+            let mut line: Value = serde_json::from_str(line).unwrap();
+            (line["condition"] == "L0").then(|| {
+                // With the enhancer a model sees what it did not see.
+                line["condition"] = "L0+lift".into();
+                line["reply"] = "A".into();
+                format!("{line}\n")
+            })
         })
-    });
-    let enhanced: String = enhanced.collect();
+        .collect();
     bench.file("eyes.jsonl", format!("{replies}\n{enhanced}"));
     let line = "--data photos --ask bank.jsonl --model script:eyes.jsonl --llie lift";
     let of = |flags: &str| on_one_line(&bench.complete(&words(&format!("{line} {flags}"))));

@@ -254,15 +254,18 @@ impl MockBatches {
     /// The ids of the requests of all batches that were begun, batch by batch.
     pub fn asked(&self) -> Vec<Vec<String>> {
         self.with(|server| {
-            let begun = server.batches.iter().filter(|batch| batch.is_begun());
-            let ids = begun.map(|batch| {
-                batch
-                    .requests
-                    .iter()
-                    .map(|one| one["custom_id"].as_str().unwrap().to_owned())
-                    .collect()
-            });
-            ids.collect()
+            server
+                .batches
+                .iter()
+                .filter(|batch| batch.is_begun())
+                .map(|batch| {
+                    batch
+                        .requests
+                        .iter()
+                        .map(|one| one["custom_id"].as_str().unwrap().to_owned())
+                        .collect()
+                })
+                .collect()
         })
     }
 
@@ -526,8 +529,10 @@ impl StoredBatch {
     fn object(&self) -> Value {
         let total = self.requests.len();
         let has_ended = self.output.is_some() || self.errors.is_some();
-        let lines = (0..total).map(|i| (self.course.line)(i));
-        let right = lines.filter(|line| matches!(line, Line::Right)).count();
+        let right = (0..total)
+            .map(|i| (self.course.line)(i))
+            .filter(|line| matches!(line, Line::Right))
+            .count();
         let (completed, failed) = if has_ended {
             (right - self.course.uncounted, total - right)
         } else {

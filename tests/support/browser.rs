@@ -224,22 +224,23 @@ impl Browser {
         // Events come in order: after this answer all earlier ones are here.
         self.evaluate("1");
         let events = self.events.drain(..);
-        let complaints = events.filter_map(|event| {
-            let parameters = &event["params"];
-            match event["method"].as_str()? {
-                "Runtime.consoleAPICalled" | "Runtime.exceptionThrown" | "Log.entryAdded" => {
-                    Some(event.to_string())
+        events
+            .filter_map(|event| {
+                let parameters = &event["params"];
+                match event["method"].as_str()? {
+                    "Runtime.consoleAPICalled" | "Runtime.exceptionThrown" | "Log.entryAdded" => {
+                        Some(event.to_string())
+                    }
+                    "Network.requestWillBeSent" => {
+                        let url = parameters["request"]["url"].as_str()?;
+                        let within = url == "about:blank"
+                            || url.starts_with("data:")
+                            || url.split('#').next() == Some(own);
+                        (!within).then(|| url.to_owned())
+                    }
+                    _ => None,
                 }
-                "Network.requestWillBeSent" => {
-                    let url = parameters["request"]["url"].as_str()?;
-                    let within = url == "about:blank"
-                        || url.starts_with("data:")
-                        || url.split('#').next() == Some(own);
-                    (!within).then(|| url.to_owned())
-                }
-                _ => None,
-            }
-        });
-        complaints.collect()
+            })
+            .collect()
     }
 }

@@ -26,8 +26,10 @@ pub fn exr([width, height]: [usize; 2], light: &[f32]) -> Vec<u8> {
 pub fn compressed([width, height]: [usize; 2], light: &[f32], by: Compression) -> Vec<u8> {
     let channel =
         |place: usize| FlatSamples::F32(light.iter().skip(place).step_by(3).copied().collect());
-    let channels = ["R", "G", "B"].into_iter().zip([0, 1, 2].map(channel));
-    let channels = channels.map(|(name, samples)| AnyChannel::new(name, samples));
+    let channels = ["R", "G", "B"]
+        .into_iter()
+        .zip([0, 1, 2].map(channel))
+        .map(|(name, samples)| AnyChannel::new(name, samples));
     let layer = Layer::new(
         (width, height),
         LayerAttributes::default(),

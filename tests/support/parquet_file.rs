@@ -15,23 +15,27 @@ fn open(path: &Path) -> SerializedFileReader<File> {
 /// The rows of a file; bytes as hexadecimal digits.
 pub fn rows(path: &Path) -> Vec<Map<String, Value>> {
     let rows = open(path);
-    let rows = rows.get_row_iter(None).unwrap().map(|row| {
-        let row = row.unwrap();
-        let cells = row.get_column_iter();
-        cells
-            .map(|(name, field)| (name.clone(), value(field)))
-            .collect()
-    });
-    rows.collect()
+    rows.get_row_iter(None)
+        .unwrap()
+        .map(|row| {
+            let row = row.unwrap();
+            let cells = row.get_column_iter();
+            cells
+                .map(|(name, field)| (name.clone(), value(field)))
+                .collect()
+        })
+        .collect()
 }
 
 /// The metadata of a file by key.
 pub fn metadata(path: &Path) -> BTreeMap<String, String> {
     let reader = open(path);
     let pairs = reader.metadata().file_metadata().key_value_metadata();
-    let pairs = pairs.into_iter().flatten();
-    let pairs = pairs.map(|pair| (pair.key.clone(), pair.value.clone().unwrap()));
-    pairs.collect()
+    pairs
+        .into_iter()
+        .flatten()
+        .map(|pair| (pair.key.clone(), pair.value.clone().unwrap()))
+        .collect()
 }
 
 /// The part of a file that holds its values: what stands before its footer.

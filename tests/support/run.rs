@@ -142,8 +142,10 @@ static SCHEMAS: LazyLock<(Schemas, [SchemaIndex; 2])> = LazyLock::new(|| {
 /// The records of a run, in the order of the file; each is held to the schema of its kind.
 pub fn records(run: &Path) -> Vec<Value> {
     let text = fs::read_to_string(run.join("records.jsonl")).unwrap();
-    let lines = text.lines().map(|line| serde_json::from_str(line).unwrap());
-    let records: Vec<Value> = lines.collect();
+    let records: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
     for record in &records {
         let open = record.get("step").is_some();
         let (schemas, indices) = &*SCHEMAS;
@@ -156,10 +158,9 @@ pub fn records(run: &Path) -> Vec<Value> {
 
 /// Every file below a folder.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder)
+    fs::read_dir(folder)
         .unwrap()
-        .map(|entry| entry.unwrap().path());
-    entries
+        .map(|entry| entry.unwrap().path())
         .flat_map(|path| {
             if path.is_dir() {
                 files(&path)

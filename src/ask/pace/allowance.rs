@@ -57,9 +57,12 @@ impl Allowance {
 
     /// The time until a limit of which nothing is left is full again; `None` if something is left of each.
     pub(in crate::ask) fn pause(&self) -> Option<Duration> {
-        let limits = [self.requests, self.tokens].into_iter().flatten();
-        let used_up = limits.filter(|limit| limit.remaining < 1.0 && !limit.reset.is_zero());
-        used_up.map(|limit| limit.reset).max()
+        [self.requests, self.tokens]
+            .into_iter()
+            .flatten()
+            .filter(|limit| limit.remaining < 1.0 && !limit.reset.is_zero())
+            .map(|limit| limit.reset)
+            .max()
     }
 
     /// The advice for requests of `tokens` tokens each.

@@ -201,11 +201,11 @@ impl LearnedRate {
     /// The accepted requests per second in the last [`MEASURED_SECONDS`] before a pause.
     fn late_rate(&self, pause_began: Instant) -> f64 {
         let lately = Duration::from_secs_f64(MEASURED_SECONDS);
-        let late = self
-            .taken_lately
+        self.taken_lately
             .iter()
-            .filter(|sent| pause_began.saturating_duration_since(**sent) < lately);
-        late.count() as f64 / MEASURED_SECONDS
+            .filter(|sent| pause_began.saturating_duration_since(**sent) < lately)
+            .count() as f64
+            / MEASURED_SECONDS
     }
 
     /// Whether a pause began within a second after saved-up requests were used.

@@ -28,21 +28,23 @@ static SENTENCE_END: LazyLock<Regex> = LazyLock::new(|| {
 
 /// The longest wait in the sentences of a text that are about one, as in “Please try again in 7m12s.”
 pub(in crate::ask) fn wait_in_words(text: &str) -> Option<Duration> {
-    let sentences = SENTENCE_END.split(text).filter(|sentence| {
-        let sentence = sentence.to_lowercase();
-        ABOUT_WAITS.iter().any(|words| sentence.contains(words))
-    });
-    let waits = sentences.flat_map(|sentence| {
-        DURATION.captures_iter(sentence).filter_map(|found| {
-            let found = found.get(1)?;
-            // “in 2 months” is not two minutes.
-            let behind = sentence[found.end()..].chars().next();
-            let is_cut = !found.as_str().ends_with(char::is_whitespace)
-                && behind.is_some_and(char::is_alphabetic);
-            (!is_cut).then(|| duration(found.as_str())).flatten()
+    SENTENCE_END
+        .split(text)
+        .filter(|sentence| {
+            let sentence = sentence.to_lowercase();
+            ABOUT_WAITS.iter().any(|words| sentence.contains(words))
         })
-    });
-    waits.max()
+        .flat_map(|sentence| {
+            DURATION.captures_iter(sentence).filter_map(|found| {
+                let found = found.get(1)?;
+                // “in 2 months” is not two minutes.
+                let behind = sentence[found.end()..].chars().next();
+                let is_cut = !found.as_str().ends_with(char::is_whitespace)
+                    && behind.is_some_and(char::is_alphabetic);
+                (!is_cut).then(|| duration(found.as_str())).flatten()
+            })
+        })
+        .max()
 }
 
 /// The sum of all parts of a duration; `None` if it is zero or too long.

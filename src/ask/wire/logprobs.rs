@@ -31,8 +31,11 @@ pub(super) fn positions(logprobs: Option<&Value>) -> Option<Vec<TokenPosition>> 
 fn position(entry: &Value) -> Option<TokenPosition> {
     let (token, own) = chance(entry)?;
     let listed = entry.get("top_logprobs").and_then(Value::as_array);
-    let listed = listed.into_iter().flatten().filter_map(chance);
-    let listed = listed.filter_map(|(token, logprob)| Some((token, logprob?)));
+    let listed = listed
+        .into_iter()
+        .flatten()
+        .filter_map(chance)
+        .filter_map(|(token, logprob)| Some((token, logprob?)));
     Some(TokenPosition {
         likeliest: with_chosen(listed, &token, own),
         token,
@@ -83,19 +86,24 @@ fn with_chosen(
 fn older(logprobs: &Value) -> Option<Vec<TokenPosition>> {
     let list = |field| logprobs.get(field).and_then(Value::as_array);
     let tokens = list("tokens")?;
-    let positions = tokens.iter().take(KEPT).enumerate().map(|(at, token)| {
-        let token = token.as_str()?.to_owned();
-        let own = logarithm(list("token_logprobs").and_then(|list| list.get(at)));
-        let listed = list("top_logprobs").and_then(|list| list.get(at)?.as_object());
-        let listed = listed.into_iter().flatten();
-        let listed =
-            listed.filter_map(|(token, logprob)| Some((token.clone(), logarithm(Some(logprob))?)));
-        Some(TokenPosition {
-            likeliest: with_chosen(listed, &token, own),
-            token,
+    tokens
+        .iter()
+        .take(KEPT)
+        .enumerate()
+        .map(|(at, token)| {
+            let token = token.as_str()?.to_owned();
+            let own = logarithm(list("token_logprobs").and_then(|list| list.get(at)));
+            let listed = list("top_logprobs").and_then(|list| list.get(at)?.as_object());
+            let listed = listed
+                .into_iter()
+                .flatten()
+                .filter_map(|(token, logprob)| Some((token.clone(), logarithm(Some(logprob))?)));
+            Some(TokenPosition {
+                likeliest: with_chosen(listed, &token, own),
+                token,
+            })
         })
-    });
-    positions.collect()
+        .collect()
 }
 
 /// Whether a message has reasoning: tokens of it in the usage, a text of it beside the content, parts of it, or marks in the text.

@@ -96,16 +96,19 @@ fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, UnreadableRe
 
 /// The likeliest tokens of the first text; `None` if it states none. Items of reasoning stand before it if the model thought.
 fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances> {
-    let contents = items
+    let positions = items
         .iter()
-        .filter_map(|item| item.get("content")?.as_array());
-    let mut lists = contents.flatten().map(|part| part.get("logprobs"));
-    let positions = lists.find_map(logprobs::positions)?;
+        .filter_map(|item| item.get("content")?.as_array())
+        .flatten()
+        .map(|part| part.get("logprobs"))
+        .find_map(logprobs::positions)?;
     let thought = logprobs::thought(response, response.get("usage"), text);
-    let summaries = items
+    let summarized = items
         .iter()
-        .filter_map(|item| item.get("summary")?.as_array());
-    let summarized = summaries.flatten().next().is_some();
+        .filter_map(|item| item.get("summary")?.as_array())
+        .flatten()
+        .next()
+        .is_some();
     Some(TokenChances {
         positions,
         thought: if summarized { Thought::Before } else { thought },
@@ -116,8 +119,10 @@ fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances
 fn words(items: &[Value]) -> (String, String) {
     let (mut text, mut refusal) = (String::new(), String::new());
     let is_message = |item: &&Value| item.get("type").is_none_or(|kind| kind == "message");
-    let contents = items.iter().filter(is_message);
-    let parts = contents.filter_map(|item| item.get("content")?.as_array());
+    let parts = items
+        .iter()
+        .filter(is_message)
+        .filter_map(|item| item.get("content")?.as_array());
     for part in parts.flatten() {
         let words = |field| part.get(field).and_then(Value::as_str).unwrap_or_default();
         match part.get("type").and_then(Value::as_str) {

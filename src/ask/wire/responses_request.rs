@@ -114,14 +114,16 @@ fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Vec<Pa
     if parts.is_empty() {
         return vec![Part::InputText { text: "" }];
     }
-    let parts = parts.iter().map(|part| match part {
-        MessagePart::Words(text) => Part::InputText { text },
-        MessagePart::Image(_) => Part::InputImage {
-            detail,
-            image_url: "",
-        },
-    });
-    parts.collect()
+    parts
+        .iter()
+        .map(|part| match part {
+            MessagePart::Words(text) => Part::InputText { text },
+            MessagePart::Image(_) => Part::InputImage {
+                detail,
+                image_url: "",
+            },
+        })
+        .collect()
 }
 
 /// The format of an object with one of the letters, by a JSON schema.

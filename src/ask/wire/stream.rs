@@ -16,8 +16,9 @@ pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
 ///
 /// Lines may end in CR, LF or both; comments, which keep a connection open, and names of events are skipped.
 pub(super) fn events(stream: &str) -> impl Iterator<Item = Value> {
-    let lines = stream.split(['\n', '\r']);
-    let data = lines.filter_map(|line| line.strip_prefix("data:").map(str::trim));
+    let data = stream
+        .split(['\n', '\r'])
+        .filter_map(|line| line.strip_prefix("data:").map(str::trim));
     data.take_while(|data| *data != "[DONE]")
         .map(|data| parse(data).unwrap_or_default())
 }

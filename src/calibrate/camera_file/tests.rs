@@ -100,8 +100,11 @@ fn a_camera_file_is_what_was_measured() {
 /// The comments of a table.
 fn comments<'t>(text: &'t str, table: &str) -> Vec<&'t str> {
     let table = text.split_once(&format!("\n[{table}]\n")).unwrap().1;
-    let lines = table.lines().take_while(|line| !line.is_empty());
-    lines.filter(|line| line.starts_with('#')).collect()
+    table
+        .lines()
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with('#'))
+        .collect()
 }
 
 /// Settings without visible row noise are named, and what is said of a line is true of it.
@@ -111,8 +114,11 @@ fn lines_say_what_they_are_made_from() {
         row_deviation: measured(0.0),
         ..setting(name, gain)
     };
-    let four = ["a", "b", "c", "d"].into_iter().zip([0.1, 0.5, 2.5, 5.0]);
-    let four: Vec<SettingFit> = four.map(|(name, gain)| setting(name, gain)).collect();
+    let four: Vec<SettingFit> = ["a", "b", "c", "d"]
+        .into_iter()
+        .zip([0.1, 0.5, 2.5, 5.0])
+        .map(|(name, gain)| setting(name, gain))
+        .collect();
     let with = |quiet: &[usize], settings: usize| {
         let mut fits = four[..settings].to_vec();
         for index in quiet {

@@ -163,8 +163,9 @@ impl ExposureCheck<'_> {
         let all: usize = self.facts.iter().map(|pair| pair.tiles.len()).sum();
         let share = used as f64 / all.max(1) as f64;
         (share < LEAST_IN_RANGE).then(|| {
-            let means = self.facts.iter().flat_map(|pair| pair.means);
-            let mean = means.sum::<f64>() / (2 * self.facts.len()) as f64 - self.offset();
+            let mean = self.facts.iter().flat_map(|pair| pair.means).sum::<f64>()
+                / (2 * self.facts.len()) as f64
+                - self.offset();
             let [low, high] = range.map(|share| 100.0 * share);
             format!(
                 "exposure {}: {mean:.0} ADU of light are outside of {low} to {high} % of white, {}",

@@ -268,8 +268,10 @@ fn dark(
     let mut noises: Vec<PairNoise> = Vec::new();
     let groups: Vec<&[PathBuf]> = exposure.dark.chunks(2).collect();
     let work = |group: &&[PathBuf]| {
-        let frames = group.iter().map(|path| reader.read(path));
-        let frames: Vec<Frame> = frames.collect::<Result<_>>()?;
+        let frames: Vec<Frame> = group
+            .iter()
+            .map(|path| reader.read(path))
+            .collect::<Result<_>>()?;
         let sums = frames
             .iter()
             .map(|frame| PlaneSums::new(layout, &frame.samples, hot).planes());

@@ -37,15 +37,16 @@ impl Transfer {
     /// The line through some points.
     pub(in super::super) fn fit(points: &[Point], planes: usize) -> Self {
         let gain = gain(points);
-        let by_plane = (0..planes).map(|plane| {
-            let of_plane: Vec<Point> = points
-                .iter()
-                .filter(|point| point.plane == plane)
-                .copied()
-                .collect();
-            (!of_plane.is_empty()).then(|| self::gain(&of_plane))
-        });
-        let by_plane = by_plane.collect();
+        let by_plane = (0..planes)
+            .map(|plane| {
+                let of_plane: Vec<Point> = points
+                    .iter()
+                    .filter(|point| point.plane == plane)
+                    .copied()
+                    .collect();
+                (!of_plane.is_empty()).then(|| self::gain(&of_plane))
+            })
+            .collect();
         let [intercept, intercept_error] = intercept(points, gain);
         Self {
             gain,

@@ -23,8 +23,11 @@ pub(super) struct Folded(Vec<(f64, f64)>);
 impl Folded {
     pub(super) fn new(residuals: &Residuals) -> Self {
         let mut folded: Vec<(i64, u64)> = Vec::new();
-        let all = residuals.counts().into_iter();
-        let mut all: Vec<(i64, u64)> = all.map(|(steps, count)| (steps.abs(), count)).collect();
+        let mut all: Vec<(i64, u64)> = residuals
+            .counts()
+            .into_iter()
+            .map(|(steps, count)| (steps.abs(), count))
+            .collect();
         all.sort_unstable();
         for (steps, count) in all {
             match folded.last_mut() {
@@ -133,15 +136,18 @@ impl Likelihood {
             mirrored.push(1.0 - rising.at((size - 0.5) / scale));
         }
         let mut mirrored = mirrored.into_iter().rev();
-        let terms = residuals.0.iter().map(|(size, count)| {
-            let above = if *size < 0.5 {
-                mirrored.next().unwrap_or(0.5)
-            } else {
-                inner.at((0.5 - size) / scale)
-            };
-            let probability = above - outer.at((-0.5 - size) / scale);
-            count * libm::log(probability.max(LEAST_PROBABILITY))
-        });
-        terms.sum()
+        residuals
+            .0
+            .iter()
+            .map(|(size, count)| {
+                let above = if *size < 0.5 {
+                    mirrored.next().unwrap_or(0.5)
+                } else {
+                    inner.at((0.5 - size) / scale)
+                };
+                let probability = above - outer.at((-0.5 - size) / scale);
+                count * libm::log(probability.max(LEAST_PROBABILITY))
+            })
+            .sum()
     }
 }

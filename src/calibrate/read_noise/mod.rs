@@ -41,8 +41,10 @@ impl ReadNoise {
         let curvature = likelihood.curvature([shape, log_scale]);
         let inverse = inverse(curvature)
             .ok_or("the shape and the scale of the read noise cannot be separated")?;
-        let scores = groups.iter().map(Folded::new);
-        let scores = scores.map(|group| likelihood.score(&group, [shape, log_scale]));
+        let scores = groups
+            .iter()
+            .map(Folded::new)
+            .map(|group| likelihood.score(&group, [shape, log_scale]));
         Ok(Self {
             shape,
             log_scale,

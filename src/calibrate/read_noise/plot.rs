@@ -24,10 +24,11 @@ pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
     let counts = residuals.counts();
     let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();
     let mean = |power: i32| {
-        let terms = counts
+        counts
             .iter()
-            .map(|(steps, count)| *count as f64 * (*steps as f64 / STEPS as f64).powi(power));
-        terms.sum::<f64>() / total.max(1.0)
+            .map(|(steps, count)| *count as f64 * (*steps as f64 / STEPS as f64).powi(power))
+            .sum::<f64>()
+            / total.max(1.0)
     };
     let centre = mean(1);
     // The mean of quantile times residual.

@@ -37,8 +37,11 @@ fn settings_are_ordered_by_number() {
         names.collect::<Vec<_>>(),
         ["iso100", "iso800", "iso1600", "low"]
     );
-    let numbers = recording.settings.iter().map(SettingFiles::number);
-    let numbers: Vec<_> = numbers.collect();
+    let numbers: Vec<_> = recording
+        .settings
+        .iter()
+        .map(SettingFiles::number)
+        .collect();
     assert_eq!(numbers, [Some(100.0), Some(800.0), Some(1600.0), None]);
     assert_eq!(recording.notes, [""; 0]);
     assert!(recording.first().ends_with("iso100/bias/0.png"));
@@ -82,8 +85,12 @@ fn frames_are_ordered_by_number() {
     let exposures = &recording.unwrap().settings[0].exposures;
     let names = exposures.iter().map(|exposure| &*exposure.name);
     assert_eq!(names.collect::<Vec<_>>(), ["1", "2", "3", "10"]);
-    let frames = exposures[1].flats.iter().map(|path| path.file_stem());
-    let frames: Vec<_> = frames.map(|stem| stem.unwrap().to_str().unwrap()).collect();
+    let frames: Vec<_> = exposures[1]
+        .flats
+        .iter()
+        .map(|path| path.file_stem())
+        .map(|stem| stem.unwrap().to_str().unwrap())
+        .collect();
     let taken: Vec<String> = (0..12).map(|frame| frame.to_string()).collect();
     assert_eq!(frames, taken);
 }

@@ -20,10 +20,11 @@ impl PlaneSums {
         let rows = parts.map_init(Vec::new, |part, plane_row| {
             gather(layout, samples, plane_row, part);
             let sum: u64 = part.iter().map(|sample| u64::from(*sample)).sum();
-            let hot = hot.columns(plane_row).map(|column| part[column]);
-            hot.fold([part.len() as u64, sum], |[count, sum], sample| {
-                [count - 1, sum - u64::from(sample)]
-            })
+            hot.columns(plane_row)
+                .map(|column| part[column])
+                .fold([part.len() as u64, sum], |[count, sum], sample| {
+                    [count - 1, sum - u64::from(sample)]
+                })
         });
         Self {
             layout,
@@ -87,22 +88,27 @@ impl TopCode {
 
     /// The greatest code of the frame.
     pub(in super::super) fn greatest(&self) -> u16 {
-        let codes = self.planes.iter().map(|(_, code, _)| *code);
-        codes.max().unwrap_or(0)
+        self.planes
+            .iter()
+            .map(|(_, code, _)| *code)
+            .max()
+            .unwrap_or(0)
     }
 
     /// The plane with the largest share of samples at its greatest code: this share, and the code.
     pub(in super::super) fn largest_share(&self) -> (f64, u16) {
-        let shares = self.planes.iter().map(|(count, code, with_it)| {
-            let share = *with_it as f64 / (*count).max(1) as f64;
-            (share, *code)
-        });
-        shares.fold(
-            (0.0, 0),
-            |most, plane| {
-                if plane.0 > most.0 { plane } else { most }
-            },
-        )
+        self.planes
+            .iter()
+            .map(|(count, code, with_it)| {
+                let share = *with_it as f64 / (*count).max(1) as f64;
+                (share, *code)
+            })
+            .fold(
+                (0.0, 0),
+                |most, plane| {
+                    if plane.0 > most.0 { plane } else { most }
+                },
+            )
     }
 }
 

@@ -270,10 +270,12 @@ impl PairRow {
 
     /// Number, sum and sum of squares of A − B − `mean` over the part of the row.
     fn about(&self, mean: f64) -> [f64; 3] {
-        let cells = self.tiles.iter().map(|cell| cell.about(mean));
-        cells.fold([0.0; 3], |sums, cell| {
-            std::array::from_fn(|i| sums[i] + cell[i])
-        })
+        self.tiles
+            .iter()
+            .map(|cell| cell.about(mean))
+            .fold([0.0; 3], |sums, cell| {
+                std::array::from_fn(|i| sums[i] + cell[i])
+            })
     }
 }
 

@@ -71,15 +71,17 @@ impl Residuals {
             plane_means,
         };
         let starts: Vec<usize> = (0..layout.height).step_by(rows_at_once).collect();
-        let parts = starts.into_par_iter().map(|start| {
-            let mut residuals = Self::default();
-            let mut part = Vec::new();
-            for row in start..(start + rows_at_once).min(layout.height) {
-                counter.count(row, &mut part, &mut residuals);
-            }
-            residuals
-        });
-        let parts: Vec<Self> = parts.collect();
+        let parts: Vec<Self> = starts
+            .into_par_iter()
+            .map(|start| {
+                let mut residuals = Self::default();
+                let mut part = Vec::new();
+                for row in start..(start + rows_at_once).min(layout.height) {
+                    counter.count(row, &mut part, &mut residuals);
+                }
+                residuals
+            })
+            .collect();
         let mut sum = Self::default();
         for part in &parts {
             sum.add(part);
@@ -108,8 +110,10 @@ impl Residuals {
 
     /// The residuals that occur, in steps and in ascending order, with their counts.
     pub(in super::super) fn counts(&self) -> Vec<(i64, u64)> {
-        let near = (-WINDOW * STEPS..).zip(self.near.iter().copied());
-        let mut all: Vec<(i64, u64)> = near.filter(|(_, count)| *count > 0).collect();
+        let mut all: Vec<(i64, u64)> = (-WINDOW * STEPS..)
+            .zip(self.near.iter().copied())
+            .filter(|(_, count)| *count > 0)
+            .collect();
         all.extend(self.far.iter().map(|(steps, count)| (*steps, *count)));
         all.sort_unstable();
         all
@@ -172,9 +176,12 @@ impl Counter<'_> {
                 is_used[column * cfa.step() + parity] = false;
             }
         }
-        let sites = codes.iter().zip(sums).zip(is_used);
-        let sites = sites.filter(|(_, is_used)| *is_used);
-        let sites = sites.map(|((code, sum), _)| (i64::from(*code), f64::from(*sum) / frames));
+        let sites = codes
+            .iter()
+            .zip(sums)
+            .zip(is_used)
+            .filter(|(_, is_used)| *is_used)
+            .map(|((code, sum), _)| (i64::from(*code), f64::from(*sum) / frames));
         let (mut count, mut left) = (0.0, 0.0);
         for (code, mean) in sites.clone() {
             count += 1.0;

@@ -30,26 +30,28 @@ impl Mode {
 
     /// The place of the flag in the words, and its value if it is joined to the flag.
     fn find(&self, words: &[OsString]) -> Option<(usize, Option<OsString>)> {
-        let flags = words.iter().take_while(|word| *word != "--").enumerate();
-        let mut found = flags.filter_map(|(place, word)| {
-            let rest = word.to_str()?.strip_prefix("--")?.strip_prefix(self.flag)?;
-            match rest.strip_prefix('=') {
-                Some(value) if self.has_value => Some((place, Some(value.into()))),
-                None if rest.is_empty() => Some((place, None)),
-                _ => None,
-            }
-        });
-        found.next()
+        words
+            .iter()
+            .take_while(|word| *word != "--")
+            .enumerate()
+            .find_map(|(place, word)| {
+                let rest = word.to_str()?.strip_prefix("--")?.strip_prefix(self.flag)?;
+                match rest.strip_prefix('=') {
+                    Some(value) if self.has_value => Some((place, Some(value.into()))),
+                    None if rest.is_empty() => Some((place, None)),
+                    _ => None,
+                }
+            })
     }
 }
 
 /// The words of a call, with the flag of a mode as the subcommand that replaces it: `enhance m --describe` is `enhance describe m`.
 /// `at` is the place of the command's name.
 pub(super) fn in_current_form(mut words: Vec<OsString>, at: usize) -> Vec<OsString> {
-    let modes = MODES
+    let found = MODES
         .iter()
-        .filter(|mode| words.get(at).is_some_and(|word| word == mode.command));
-    let found = modes.filter_map(|mode| Some((mode, mode.find(&words)?)));
+        .filter(|mode| words.get(at).is_some_and(|word| word == mode.command))
+        .filter_map(|mode| Some((mode, mode.find(&words)?)));
     let Some((mode, (place, value))) = found.min_by_key(|(_, (place, _))| *place) else {
         return words;
     };

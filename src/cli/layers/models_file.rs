@@ -14,17 +14,19 @@ use crate::error::{Error, Result};
 pub(super) fn values(path: &Path, flags: &[String]) -> Result<Vec<(String, String, OsString)>> {
     // A file that cannot be used is an error where its models are read.
     let defaults = run_defaults(path).unwrap_or_default();
-    let values = defaults.into_iter().map(|default| {
-        let RunDefault { flag, value, place } = default;
-        if !flags.contains(&flag) {
-            let problem = format_args!("{flag}: this command has no --{flag}");
-            return Err(Error::usage(place, problem));
-        }
-        let Some(text) = text_of(&value) else {
-            let problem = format_args!("{flag}: a text, a number or a switch expected");
-            return Err(Error::usage(place, problem));
-        };
-        Ok((flag, place, text))
-    });
-    values.collect()
+    defaults
+        .into_iter()
+        .map(|default| {
+            let RunDefault { flag, value, place } = default;
+            if !flags.contains(&flag) {
+                let problem = format_args!("{flag}: this command has no --{flag}");
+                return Err(Error::usage(place, problem));
+            }
+            let Some(text) = text_of(&value) else {
+                let problem = format_args!("{flag}: a text, a number or a switch expected");
+                return Err(Error::usage(place, problem));
+            };
+            Ok((flag, place, text))
+        })
+        .collect()
 }

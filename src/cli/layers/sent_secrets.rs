@@ -112,18 +112,21 @@ fn entry<'a>(
 
 /// The variables of the own tools of each host that the file names.
 fn hosts(values: &BTreeMap<String, &LayeredValue>) -> impl Iterator<Item = Vec<&'static str>> {
-    let addresses = ["base-url", "judge-base-url"].into_iter();
-    let addresses = addresses.filter_map(|flag| values.get(flag));
-    let addresses = addresses.flat_map(|value| &value.values);
-    let urls = addresses.filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok());
-    urls.map(|url| own_variables(url.host()))
+    ["base-url", "judge-base-url"]
+        .into_iter()
+        .filter_map(|flag| values.get(flag))
+        .flat_map(|value| &value.values)
+        .filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok())
+        .map(|url| own_variables(url.host()))
 }
 
 /// Whether one of these addresses is of another machine, and of no known vendor.
 fn goes_elsewhere(addresses: &LayeredValue) -> bool {
-    let urls = addresses.values.iter();
-    let mut urls = urls.filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok());
-    urls.any(|url| !url.is_loopback() && own_variables(url.host()).is_empty())
+    addresses
+        .values
+        .iter()
+        .filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok())
+        .any(|url| !url.is_loopback() && own_variables(url.host()).is_empty())
 }
 
 /// Whether a file lies in the folder of the file of flags or below it, links followed. One that is not there is refused later.

@@ -36,8 +36,12 @@ fn parsed(words: &[&str], variables: &[(&str, &str)], file: &str) -> Result<ArgM
 
 /// The values of a flag of the command that is called.
 fn values(matches: &ArgMatches, id: &str) -> Vec<String> {
-    let values = command_matches(matches).get_raw(id).into_iter().flatten();
-    values.map(|value| value.to_string_lossy().into()).collect()
+    command_matches(matches)
+        .get_raw(id)
+        .into_iter()
+        .flatten()
+        .map(|value| value.to_string_lossy().into())
+        .collect()
 }
 
 /// All commands with the words that call them, nested ones included.

@@ -46,12 +46,14 @@ pub(super) fn option_column<'a>(
             .collect();
         let filled = answers.iter().flatten().count();
         let said = |reading: Reading| -> Said {
-            let rows = items.iter().zip(&answers);
-            rows.map(|(item, answer)| {
-                let options = item.options.as_deref().unwrap_or(&none);
-                reading.by_rule(answer.as_ref()?, options)
-            })
-            .collect()
+            items
+                .iter()
+                .zip(&answers)
+                .map(|(item, answer)| {
+                    let options = item.options.as_deref().unwrap_or(&none);
+                    reading.by_rule(answer.as_ref()?, options)
+                })
+                .collect()
         };
         let all = Reading::ALL.map(said);
         let most = all.iter().map(read).max().unwrap_or(0);
@@ -73,28 +75,28 @@ pub(super) fn option_column<'a>(
 /// The flag for a column of no known name whose cells are an option in every row, in the first way that fits; `None` if there is none.
 pub(super) fn unnamed(table: &Table, roles: &Roles, items: &[Item]) -> Option<String> {
     let none = Offered::default();
-    let free = table
+    let mut fitting = table
         .columns
         .iter()
         .enumerate()
-        .filter(|(at, _)| !roles.holds(*at));
-    let found = free.flat_map(|(at, name)| {
-        let column = Column {
-            at,
-            field: None,
-            name: name.clone(),
-        };
-        Reading::ALL
-            .into_iter()
-            .map(move |reading| (column.clone(), reading))
-    });
-    let mut fitting = found.filter(|(column, reading)| {
-        items.iter().all(|item| {
-            let options = item.options.as_deref().unwrap_or(&none);
-            answer(table, item, column)
-                .is_some_and(|answer| reading.truth(&answer, options).is_some())
+        .filter(|(at, _)| !roles.holds(*at))
+        .flat_map(|(at, name)| {
+            let column = Column {
+                at,
+                field: None,
+                name: name.clone(),
+            };
+            Reading::ALL
+                .into_iter()
+                .map(move |reading| (column.clone(), reading))
         })
-    });
+        .filter(|(column, reading)| {
+            items.iter().all(|item| {
+                let options = item.options.as_deref().unwrap_or(&none);
+                answer(table, item, column)
+                    .is_some_and(|answer| reading.truth(&answer, options).is_some())
+            })
+        });
     let (column, reading) = fitting.next()?;
     Some(flag(Role::Answer, &column.name, Some(reading)))
 }

@@ -108,8 +108,11 @@ pub(super) fn one_reading(rows: &[AnswerOf<'_>]) -> OneReading {
             (0..rows.len()).filter(|&row| reading.by_rule(rows[row].0, rows[row].1).is_none());
         (reading, unfit.collect::<Vec<usize>>())
     });
-    let fitting = unfit.iter().filter(|(_, unfit)| unfit.is_empty());
-    let fitting: Vec<Reading> = fitting.map(|(reading, _)| *reading).collect();
+    let fitting: Vec<Reading> = unfit
+        .iter()
+        .filter(|(_, unfit)| unfit.is_empty())
+        .map(|(reading, _)| *reading)
+        .collect();
     let Some((&first, others)) = fitting.split_first() else {
         let best = unfit
             .into_iter()

@@ -198,8 +198,8 @@ impl Cell {
                 format!("[{}]", cells.join(", "))
             }
             Self::Fields(fields) => {
-                let fields = fields.iter();
                 let fields: Vec<String> = fields
+                    .iter()
                     .map(|(name, cell)| format!("{name}: {}", cell.shown(most)))
                     .collect();
                 format!("{{{}}}", fields.join(", "))

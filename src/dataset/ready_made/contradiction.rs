@@ -24,8 +24,10 @@ pub(super) fn contradictory(answered: &[Answered], digests: &[Digest]) -> Vec<[u
     }
     if !opposed.is_empty() {
         for (at, digest) in digests.iter().enumerate() {
-            let other = opposed.get(digest).copied();
-            let other = other.filter(|_| first[digest] != at && truth(first[digest]) == truth(at));
+            let other = opposed
+                .get(digest)
+                .copied()
+                .filter(|_| first[digest] != at && truth(first[digest]) == truth(at));
             pairs.extend(other.map(|other| [at, other]));
         }
     }

@@ -89,8 +89,7 @@ impl<'a> Frames<'a> {
     /// Names the images in cells: by the least id of the rows that hold one, so that the order of rows does not matter; without ids
     /// that differ, by their content. The images of a row that shows several are numbered behind its id: `7#1`, `7#2`.
     fn name_embedded(&mut self, several: Option<SeveralImages>) {
-        let ids = self.roles.ids.iter();
-        let mut ids = ids.filter(|column| {
+        let mut ids = self.roles.ids.iter().filter(|column| {
             let mut seen = HashSet::new();
             let texts = self.table.rows.iter().map(|row| column.text(row));
             texts

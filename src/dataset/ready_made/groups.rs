@@ -138,11 +138,10 @@ fn run_of(field: &str) -> Option<(&str, &str)> {
 
 /// The columns that a template names.
 pub(super) fn columns(template: &str) -> Vec<&str> {
-    let fields = template
+    template
         .split('{')
         .skip(1)
-        .filter_map(|part| part.split('}').next());
-    fields
+        .filter_map(|part| part.split('}').next())
         .map(|field| run_of(field).map_or(field, |(name, _)| name))
         .collect()
 }
@@ -229,8 +228,10 @@ impl Groups {
                 "more of which every question is left out",
             ),
         ];
-        let facts = facts.into_iter().filter(|(number, _)| *number > 0);
-        let facts = facts.map(|(number, what)| format!(", {number} {what}"));
+        let facts = facts
+            .into_iter()
+            .filter(|(number, _)| *number > 0)
+            .map(|(number, what)| format!(", {number} {what}"));
         let without = match without.count() {
             0 => String::new(),
             number => format!(
@@ -248,6 +249,9 @@ impl Groups {
 
 /// The number of frames that questions are about.
 fn frames(questions: &[&Question]) -> usize {
-    let frames = questions.iter().map(|question| &question.frame);
-    frames.collect::<BTreeSet<_>>().len()
+    questions
+        .iter()
+        .map(|question| &question.frame)
+        .collect::<BTreeSet<_>>()
+        .len()
 }

@@ -58,10 +58,10 @@ impl Frames<'_> {
     /// The ids of the questions: those of the first column in which all differ, or by content.
     pub(super) fn ids(&self, answered: &[Answered]) -> Result<Ids> {
         let texts = |column: &Column| -> Option<Vec<String>> {
-            let rows = answered
+            answered
                 .iter()
-                .map(|answered| &self.table.rows[answered.row]);
-            rows.map(|row| Some(column.text(row)?.trim().to_owned()))
+                .map(|answered| &self.table.rows[answered.row])
+                .map(|row| Some(column.text(row)?.trim().to_owned()))
                 .collect()
         };
         for column in &self.roles.ids {
@@ -100,20 +100,24 @@ impl Frames<'_> {
     /// The digest of each question over its images, its text and its options.
     fn digests(&self, answered: &[Answered], by: ImagesBy) -> Result<Vec<Digest>> {
         let mut files: HashMap<FrameId, Digest> = HashMap::new();
-        let digests = answered.iter().map(|question| {
-            let images = self.in_row(question.row).map(|found| match (found?, by) {
-                (Found::Member(name) | Found::File(name, _), ImagesBy::Name) => {
-                    Ok(Digest::from_bytes(name.0.as_bytes()))
-                }
-                (found, _) => self.image_digest(found, &mut files),
-            });
-            let images: Vec<Digest> = images.collect::<Result<_>>()?;
-            let options = question.choices.texts().iter().map(String::as_bytes);
-            let images = images.iter().map(|image| &image.as_bytes()[..]);
-            let text = question.text.as_bytes();
-            Ok(Digest::from_parts(images.chain([text]).chain(options)))
-        });
-        digests.collect()
+        answered
+            .iter()
+            .map(|question| {
+                let images: Vec<Digest> = self
+                    .in_row(question.row)
+                    .map(|found| match (found?, by) {
+                        (Found::Member(name) | Found::File(name, _), ImagesBy::Name) => {
+                            Ok(Digest::from_bytes(name.0.as_bytes()))
+                        }
+                        (found, _) => self.image_digest(found, &mut files),
+                    })
+                    .collect::<Result<_>>()?;
+                let options = question.choices.texts().iter().map(String::as_bytes);
+                let images = images.iter().map(|image| &image.as_bytes()[..]);
+                let text = question.text.as_bytes();
+                Ok(Digest::from_parts(images.chain([text]).chain(options)))
+            })
+            .collect()
     }
 
     /// The digest of an image. Files that were read are kept in `files`.

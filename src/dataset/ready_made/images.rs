@@ -89,8 +89,11 @@ pub(super) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
 }
 
 fn field_steps(field: Option<&str>) -> Vec<Step> {
-    let fields = field.into_iter().flat_map(|field| field.split('.'));
-    fields.map(|field| Step::Field(field.to_owned())).collect()
+    field
+        .into_iter()
+        .flat_map(|field| field.split('.'))
+        .map(|field| Step::Field(field.to_owned()))
+        .collect()
 }
 
 /// Adds the images of a cell.

@@ -138,8 +138,7 @@ fn parts(
     let [hint, text] = words(row, roles, &mut marks).map_err(NoParts::BadRow)?;
     let (text, whole, options) = match Options::from_row(row, roles) {
         Options::Found(mut options) => {
-            let texts = options.texts.iter();
-            let texts = texts.map(|option| marks.read_option(option));
+            let texts = options.texts.iter().map(|option| marks.read_option(option));
             options.texts = texts.collect::<Result<_, _>>().map_err(NoParts::BadRow)?;
             (endings.cut(&text), None, Some(options))
         }

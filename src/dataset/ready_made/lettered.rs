@@ -51,8 +51,8 @@ pub(super) fn in_question(text: &str) -> Lettered {
         let before = body[..mark.start].trim_end_matches([' ', '\t']);
         before.is_empty() || before.ends_with('\n')
     };
-    let starts = (0..marks.len()).rev();
-    let runs = starts
+    let runs = (0..marks.len())
+        .rev()
         .filter(|&at| marks[at].letter == 'A')
         .map(|start| run(&marks[start..]))
         .filter(|run| run.len() > 1);
@@ -152,8 +152,9 @@ pub(super) fn in_cell(text: &str) -> Option<Vec<String>> {
 
 /// The options without the letters before them, if each has its own: `A. yes`, `B) no`, `(C) maybe`, `D: never`.
 pub(super) fn without_letters(options: Vec<String>) -> Vec<String> {
-    let mut bare = options.iter().enumerate();
-    let bare: Option<Vec<String>> = bare
+    let bare: Option<Vec<String>> = options
+        .iter()
+        .enumerate()
         .by_ref()
         .map(|(index, option)| after_letter(option, index))
         .collect();

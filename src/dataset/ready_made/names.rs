@@ -73,8 +73,9 @@ static KNOWN: LazyLock<Option<Columns>> = LazyLock::new(|| toml::from_str(COLUMN
 
 /// The instructions as expressions that match at the end of a text.
 static ENDINGS: LazyLock<Vec<Regex>> = LazyLock::new(|| {
-    let endings = KNOWN.iter().flat_map(|known| &known.instructions.endings);
-    endings
+    KNOWN
+        .iter()
+        .flat_map(|known| &known.instructions.endings)
         .filter_map(|ending| Regex::new(&format!(r"(?i)\s*(?:{ending})\s*$")).ok())
         .collect()
 });
@@ -87,8 +88,10 @@ pub(super) fn known(role: Role) -> &'static [String] {
 
 /// A name in lower case, letters and digits alone.
 pub(super) fn plain(name: &str) -> String {
-    let letters = name.chars().filter(|c| c.is_alphanumeric());
-    letters.flat_map(char::to_lowercase).collect()
+    name.chars()
+        .filter(|c| c.is_alphanumeric())
+        .flat_map(char::to_lowercase)
+        .collect()
 }
 
 /// A text without the instructions at its end, and these, the last first. An instruction is a sentence or a line of its own, with

@@ -28,8 +28,11 @@ impl Options {
     /// The options of a row in its columns.
     pub(super) fn from_row(row: &Row, roles: &Roles) -> Self {
         let mut found: Vec<(String, Offered)> = Vec::new();
-        let cells = roles.cells.iter().enumerate();
-        let cells = cells.filter_map(|(place, cell)| Some((option(cell.cell(row))?, place)));
+        let cells = roles
+            .cells
+            .iter()
+            .enumerate()
+            .filter_map(|(place, cell)| Some((option(cell.cell(row))?, place)));
         let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
         if !texts.is_empty() {
             let offered = Offered::placed(&without_letters(texts), places);

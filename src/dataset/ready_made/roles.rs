@@ -141,12 +141,21 @@ impl Roles {
             Families::Known(columns) => columns.as_slice(),
             Families::Said(column) => column.as_slice(),
         };
-        let kept = images.iter().chain(&self.ids).chain(families);
-        let kept = kept.chain(&self.evidence).chain(&self.scene);
-        let kept: BTreeSet<usize> = kept.map(|column| column.at).collect();
-        let read = self.question.column().into_iter().chain(&self.hint);
-        let read = read.chain(&self.options).chain(&self.cells);
-        read.chain(&self.answers)
+        let kept: BTreeSet<usize> = images
+            .iter()
+            .chain(&self.ids)
+            .chain(families)
+            .chain(&self.evidence)
+            .chain(&self.scene)
+            .map(|column| column.at)
+            .collect();
+        self.question
+            .column()
+            .into_iter()
+            .chain(&self.hint)
+            .chain(&self.options)
+            .chain(&self.cells)
+            .chain(&self.answers)
             .map(|column| column.at)
             .filter(|at| !kept.contains(at))
             .collect()
@@ -190,16 +199,16 @@ impl Roles {
             return columns.map(|name| column(table, name)).collect();
         }
         let columns = known(role).iter().flat_map(|name| {
-            let same = table
+            table
                 .columns
                 .iter()
                 .enumerate()
-                .filter(move |(_, column)| plain(column) == *name);
-            same.map(|(at, column)| Column {
-                at,
-                field: None,
-                name: column.clone(),
-            })
+                .filter(move |(_, column)| plain(column) == *name)
+                .map(|(at, column)| Column {
+                    at,
+                    field: None,
+                    name: column.clone(),
+                })
         });
         Ok(columns.collect())
     }
@@ -236,19 +245,22 @@ fn no_question(table: &Table) -> String {
         !known.contains(&plain(name)) && !cells(table).iter().any(|cell| cell.name == **name)
     };
     let texts = table.columns.iter().enumerate().filter(is_free);
-    let asking = texts.map(|(at, name)| {
-        let cells = table.rows.iter().filter_map(|row| match row.cell(at) {
-            Cell::Text(text) => Some(text.trim_end().ends_with(['?', '？'])),
-            _ => None,
-        });
-        let cells: Vec<bool> = cells.collect();
-        (
-            cells.iter().filter(|asks| **asks).count(),
-            cells.len(),
-            name,
-        )
-    });
-    let likely = asking
+    let likely = texts
+        .map(|(at, name)| {
+            let cells: Vec<bool> = table
+                .rows
+                .iter()
+                .filter_map(|row| match row.cell(at) {
+                    Cell::Text(text) => Some(text.trim_end().ends_with(['?', '？'])),
+                    _ => None,
+                })
+                .collect();
+            (
+                cells.iter().filter(|asks| **asks).count(),
+                cells.len(),
+                name,
+            )
+        })
         .filter(|(_, texts, _)| *texts > 0)
         .max_by_key(|(asks, texts, _)| (*asks, *texts));
     let remedy = match (Turns::find(table), likely) {
@@ -380,15 +392,22 @@ pub(super) fn shown(table: &Table) -> String {
     let width = table.columns.iter().map(|name| name.chars().count()).max();
     let width = width.unwrap_or(0).min(24);
     let most = (MOST_SHOWN / table.columns.len().clamp(1, 40)).min(60);
-    let lines = table.columns.iter().enumerate().take(40).map(|(at, name)| {
-        let mut cells = table.rows.iter().map(|row| row.cell(at));
-        let cell = cells
-            .find(|cell| !cell.is_absent())
-            .unwrap_or(&Cell::Absent);
-        let name = excerpt(name, LONGEST_SHOWN_NAME);
-        format!("   {name:width$}  {:8} {}", cell.kind(), cell.shown(most))
-    });
-    let mut lines: Vec<String> = lines.collect();
+    let mut lines: Vec<String> = table
+        .columns
+        .iter()
+        .enumerate()
+        .take(40)
+        .map(|(at, name)| {
+            let cell = table
+                .rows
+                .iter()
+                .map(|row| row.cell(at))
+                .find(|cell| !cell.is_absent())
+                .unwrap_or(&Cell::Absent);
+            let name = excerpt(name, LONGEST_SHOWN_NAME);
+            format!("   {name:width$}  {:8} {}", cell.kind(), cell.shown(most))
+        })
+        .collect();
     if table.columns.len() > lines.len() {
         lines.push(format!("   and {} more", table.columns.len() - lines.len()));
     }

@@ -122,9 +122,12 @@ impl Table {
 
     /// The columns of the last file.
     pub(super) fn columns_of_last_file(&self) -> BTreeSet<String> {
-        let columns = self.columns.iter().zip(&self.in_last_file);
-        let columns = columns.filter(|(_, is_there)| **is_there);
-        columns.map(|(column, _)| column.clone()).collect()
+        self.columns
+            .iter()
+            .zip(&self.in_last_file)
+            .filter(|(_, is_there)| **is_there)
+            .map(|(column, _)| column.clone())
+            .collect()
     }
 
     fn saw(&mut self, column: usize) -> usize {
@@ -195,8 +198,9 @@ impl Table {
         let names = maps
             .flat_map(|map| &map.entries)
             .flat_map(|entry| &entry.columns);
-        let inner = names.filter(|name| self.find(name).is_none());
-        let columns = inner.filter_map(|name| self.find(name.split_once('.')?.0));
+        let columns = names
+            .filter(|name| self.find(name).is_none())
+            .filter_map(|name| self.find(name.split_once('.')?.0));
         for column in columns.collect::<BTreeSet<usize>>() {
             for row in &mut self.rows {
                 let Some(cell) = row.cells.get_mut(column) else {

@@ -93,9 +93,11 @@ impl Summary<'_> {
 
     /// How many questions show several images; `None` if all show one.
     fn several(&self) -> Option<String> {
-        let shown = self.questions.iter();
-        let shown = shown.filter_map(|question| Some(self.series.get(&question.frame)?.len()));
-        let counts: Vec<usize> = shown.collect();
+        let counts: Vec<usize> = self
+            .questions
+            .iter()
+            .filter_map(|question| Some(self.series.get(&question.frame)?.len()))
+            .collect();
         let (least, most) = (counts.iter().min()?, counts.iter().max()?);
         let each = if least == most {
             most.to_string()
@@ -159,10 +161,11 @@ impl Summary<'_> {
             };
             *counts.entry(format).or_default() += 1;
         }
-        let counts = counts
+        counts
             .iter()
-            .map(|(format, count)| format!("{format} {count}"));
-        counts.collect::<Vec<String>>().join(", ")
+            .map(|(format, count)| format!("{format} {count}"))
+            .collect::<Vec<String>>()
+            .join(", ")
     }
 }
 

@@ -57,14 +57,16 @@ impl Template {
 
     /// The name with the cells of a row; `None` if one is absent.
     pub(super) fn filled(&self, row: &Row) -> Option<String> {
-        let parts = self.parts.iter().map(|part| match part {
-            Part::Words(words) => Some(words.clone()),
-            Part::Cell { column, width } => {
-                let value = column.text(row)?;
-                Some(format!("{:0>width$}", value.trim()))
-            }
-        });
-        parts.collect()
+        self.parts
+            .iter()
+            .map(|part| match part {
+                Part::Words(words) => Some(words.clone()),
+                Part::Cell { column, width } => {
+                    let value = column.text(row)?;
+                    Some(format!("{:0>width$}", value.trim()))
+                }
+            })
+            .collect()
     }
 }
 

@@ -68,14 +68,16 @@ pub(super) fn truths(
             super::roles::shown(table)
         ));
     }
-    let items = items.into_iter().map(|item| {
-        if names_no_options(table, roles, &item) {
-            item.without_options()
-        } else {
-            item
-        }
-    });
-    let mut listed: Vec<Item> = items.collect();
+    let mut listed: Vec<Item> = items
+        .into_iter()
+        .map(|item| {
+            if names_no_options(table, roles, &item) {
+                item.without_options()
+            } else {
+                item
+            }
+        })
+        .collect();
     let bare = listed.extract_if(.., |item| item.options.is_none());
     let bare: Vec<Item> = bare.collect();
     let mut truths = Truths {
@@ -137,8 +139,11 @@ pub(super) fn is_own(table: &Table) -> bool {
 
 /// Whether every answer is written as a text, and none as a number.
 fn are_texts(table: &Table, column: &Column) -> bool {
-    let mut cells = table.rows.iter().map(|row| column.cell(row));
-    cells.all(|cell| matches!(cell, Cell::Text(_)))
+    table
+        .rows
+        .iter()
+        .map(|row| column.cell(row))
+        .all(|cell| matches!(cell, Cell::Text(_)))
 }
 
 /// Items with an answer each. Those without one, or with several, are counted. `other` is a flag for a column of answers that is not
@@ -308,8 +313,9 @@ fn by_rule(rows: &[AnswerOf<'_>]) -> Result<Reading, ([Reading; 2], usize)> {
         OneReading::Fits(reading) => Ok(reading),
         OneReading::Ambiguous { readings, row } => Err((readings, row)),
         OneReading::None { best, unfit } => {
-            let read = (0..rows.len()).filter(|row| unfit.binary_search(row).is_err());
-            let read: Vec<usize> = read.collect();
+            let read: Vec<usize> = (0..rows.len())
+                .filter(|row| unfit.binary_search(row).is_err())
+                .collect();
             let kept: Vec<AnswerOf<'_>> = read.iter().map(|&row| rows[row]).collect();
             match one_reading(&kept) {
                 OneReading::Ambiguous { readings, row } => Err((readings, read[row])),

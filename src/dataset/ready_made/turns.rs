@@ -24,12 +24,11 @@ impl Turns {
     /// The turns in the first column that holds conversations; `None` if none does.
     pub(super) fn find(table: &Table) -> Option<Self> {
         let row = table.rows.first()?;
-        let mut turns = table
+        table
             .columns
             .iter()
             .enumerate()
-            .filter_map(|(at, name)| Self::from_cell(name, row.cell(at)));
-        turns.next()
+            .find_map(|(at, name)| Self::from_cell(name, row.cell(at)))
     }
 
     /// The turns in a cell of a column.

@@ -67,8 +67,10 @@ impl Overview<'_> {
                 model: None,
             })
         };
-        let panels = [Family::RoomType, Family::Color].into_iter();
-        let panels: Vec<Panel> = panels.filter_map(panel).collect();
+        let panels: Vec<Panel> = [Family::RoomType, Family::Color]
+            .into_iter()
+            .filter_map(panel)
+            .collect();
         let caption = format!(
             "Answer collapse, {}: how often the answer given most often is given, by level.",
             self.light(&variant, None)

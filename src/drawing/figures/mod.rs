@@ -65,16 +65,18 @@ pub(crate) fn drawings(findings: &Findings<'_>, names: &Names) -> Vec<Drawing> {
         ("collapse", overview.collapse()),
         ("confidence", overview.confidence()),
     ];
-    let figures = charts.into_iter().filter_map(|(name, chart)| {
-        let (caption, chart) = chart?;
-        let chart = Drawn::Lines(chart);
-        Some(Drawing {
-            name,
-            caption,
-            chart,
+    let mut figures: Vec<Drawing> = charts
+        .into_iter()
+        .filter_map(|(name, chart)| {
+            let (caption, chart) = chart?;
+            let chart = Drawn::Lines(chart);
+            Some(Drawing {
+                name,
+                caption,
+                chart,
+            })
         })
-    });
-    let mut figures: Vec<Drawing> = figures.collect();
+        .collect();
     figures.extend(overview.photographed());
     figures.extend(overview.thresholds());
     figures
@@ -124,14 +126,18 @@ impl<'a> Overview<'a> {
         enhancer: Option<&EnhancerName>,
         mut number: impl FnMut(&Subject) -> Option<Estimate>,
     ) -> Vec<(AxisLevel, Estimate)> {
-        let points = self.levels.iter().filter_map(|&level| {
-            let grid = &self.findings.grid;
-            let of = |enhancer| grid.stand_in(&Subject::seeing(model, level, variant, enhancer));
-            let raw = || (level == AxisLevel::L0).then(|| of(None)).flatten();
-            let subject = &grid.subjects[of(enhancer).or_else(raw)?];
-            Some((subject.enhancer.as_ref(), level, number(subject)?))
-        });
-        let points: Vec<_> = points.collect();
+        let points: Vec<_> = self
+            .levels
+            .iter()
+            .filter_map(|&level| {
+                let grid = &self.findings.grid;
+                let of =
+                    |enhancer| grid.stand_in(&Subject::seeing(model, level, variant, enhancer));
+                let raw = || (level == AxisLevel::L0).then(|| of(None)).flatten();
+                let subject = &grid.subjects[of(enhancer).or_else(raw)?];
+                Some((subject.enhancer.as_ref(), level, number(subject)?))
+            })
+            .collect();
         if points.iter().all(|(of, ..)| *of != enhancer) {
             return Vec::new();
         }
@@ -170,24 +176,25 @@ impl<'a> Overview<'a> {
             .findings
             .summary
             .family_cells(family, ReadingMode::Strict);
-        let flat = cells.filter(|cell| cell.subject.view != Some(View::Image));
-        let lines = flat.filter_map(|cell| {
-            let model = &*cell.subject.model;
-            let (name, style, of) = if cell.subject.view.is_none() {
-                (CHANCE.to_owned(), LineStyle::REFERENCE, None)
-            } else {
-                let name = format!("{} without images", self.names.shown(model));
-                (name, self.style(model), Some(model.to_owned()))
-            };
-            let content = PanelContent::Flat(cell.accuracy?.value);
-            Some(PlotLine {
-                name,
-                style,
-                content,
-                model: of,
+        cells
+            .filter(|cell| cell.subject.view != Some(View::Image))
+            .filter_map(|cell| {
+                let model = &*cell.subject.model;
+                let (name, style, of) = if cell.subject.view.is_none() {
+                    (CHANCE.to_owned(), LineStyle::REFERENCE, None)
+                } else {
+                    let name = format!("{} without images", self.names.shown(model));
+                    (name, self.style(model), Some(model.to_owned()))
+                };
+                let content = PanelContent::Flat(cell.accuracy?.value);
+                Some(PlotLine {
+                    name,
+                    style,
+                    content,
+                    model: of,
+                })
             })
-        });
-        lines.collect()
+            .collect()
     }
 
     /// The models over which means are taken: without people, and without built-in models and the upper reference if there are others.
@@ -233,13 +240,15 @@ impl<'a> Overview<'a> {
         variant: &KindReading,
         mut number: impl FnMut(&Subject) -> Option<Estimate>,
     ) -> Vec<PlotLine> {
-        let lines = self.models.iter().map(|model| PlotLine {
-            name: self.names.shown(model),
-            style: self.style(model),
-            content: PanelContent::Curve(self.points(model, variant, None, &mut number)),
-            model: Some((*model).to_owned()),
-        });
-        lines.collect()
+        self.models
+            .iter()
+            .map(|model| PlotLine {
+                name: self.names.shown(model),
+                style: self.style(model),
+                content: PanelContent::Curve(self.points(model, variant, None, &mut number)),
+                model: Some((*model).to_owned()),
+            })
+            .collect()
     }
 
     /// Lines of the accuracy of all models, with the flat lines.
@@ -254,14 +263,19 @@ impl<'a> Overview<'a> {
         let mut lines = Vec::new();
         for model in &self.models {
             for pair in &self.findings.pairs {
-                let subjects = self.findings.grid.subjects.iter().filter(|subject| {
-                    subject.model == *model
-                        && subject.enhancer.is_none()
-                        && subject.variant.photograph() == Some(&pair.name)
-                });
-                let shares = subjects.filter_map(|subject| self.accuracy_of(subject, None));
-                let marks = shares.map(|share| DarkMark { ev: pair.ev, share });
-                let marks: Vec<DarkMark> = marks.collect();
+                let marks: Vec<DarkMark> = self
+                    .findings
+                    .grid
+                    .subjects
+                    .iter()
+                    .filter(|subject| {
+                        subject.model == *model
+                            && subject.enhancer.is_none()
+                            && subject.variant.photograph() == Some(&pair.name)
+                    })
+                    .filter_map(|subject| self.accuracy_of(subject, None))
+                    .map(|share| DarkMark { ev: pair.ev, share })
+                    .collect();
                 if !marks.is_empty() {
                     lines.push(PlotLine {
                         name: format!("{}, {} (real)", self.names.shown(model), pair.name),
@@ -319,18 +333,20 @@ impl<'a> Overview<'a> {
 
     fn accuracy(&self) -> Option<(String, Chart)> {
         let variants = self.tested_variants();
-        let panels = variants.iter().map(|variant| {
-            let mut lines = self.accuracies(variant, None);
-            if variant.kind.map(Kind::axis) == Some(Axis::LIGHT) {
-                lines.extend(self.photographs());
-            }
-            Panel {
-                title: format!("{}, n {}", self.light(variant, None), self.n(None)),
-                lines,
-                model: None,
-            }
-        });
-        let mut panels: Vec<Panel> = panels.collect();
+        let mut panels: Vec<Panel> = variants
+            .iter()
+            .map(|variant| {
+                let mut lines = self.accuracies(variant, None);
+                if variant.kind.map(Kind::axis) == Some(Axis::LIGHT) {
+                    lines.extend(self.photographs());
+                }
+                Panel {
+                    title: format!("{}, n {}", self.light(variant, None), self.n(None)),
+                    lines,
+                    model: None,
+                }
+            })
+            .collect();
         let mut marks = self.photographs();
         if panels.is_empty() && !marks.is_empty() {
             let mut lines = self.accuracies(&KindReading::NONE, None);
@@ -389,8 +405,8 @@ impl<'a> Overview<'a> {
     /// A line for each of these variants, the mean over the models, and chance.
     fn lines_of_variants(&self, variants: &[&KindReading], models: &[&str]) -> Vec<PlotLine> {
         let line = |(index, variant): (usize, &&KindReading)| {
-            let curves = models.iter();
-            let curves: Vec<Vec<(AxisLevel, Estimate)>> = curves
+            let curves: Vec<Vec<(AxisLevel, Estimate)>> = models
+                .iter()
                 .map(|model| {
                     self.points(model, variant, None, |subject| {
                         self.accuracy_of(subject, None)
@@ -428,8 +444,11 @@ impl<'a> Overview<'a> {
                         model: Some((*model).to_owned()),
                     })
                 };
-                let lines = self.raw_and_enhanced().enumerate().filter_map(line);
-                let lines: Vec<PlotLine> = lines.collect();
+                let lines: Vec<PlotLine> = self
+                    .raw_and_enhanced()
+                    .enumerate()
+                    .filter_map(line)
+                    .collect();
                 if lines.len() > 1 {
                     let (name, light) = (self.names.shown(model), self.light(&variant, None));
                     let title = format!("{name}, {light}, n {}", self.n(None));
@@ -452,15 +471,17 @@ impl<'a> Overview<'a> {
     fn families(&self) -> Option<(String, Chart)> {
         let variant = &self.main_variant()?;
         let families = self.findings.grid.families();
-        let panels = families.into_iter().map(|family| {
-            let n = self.n(Some(family));
-            Panel {
-                title: format!("{}, n {n}", self.names.shown(family_name(Some(family)))),
-                lines: self.accuracies(variant, Some(family)),
-                model: None,
-            }
-        });
-        let panels: Vec<Panel> = panels.collect();
+        let panels: Vec<Panel> = families
+            .into_iter()
+            .map(|family| {
+                let n = self.n(Some(family));
+                Panel {
+                    title: format!("{}, n {n}", self.names.shown(family_name(Some(family)))),
+                    lines: self.accuracies(variant, Some(family)),
+                    model: None,
+                }
+            })
+            .collect();
         let caption = format!(
             "Accuracy by family, {}. Broken lines: without images, and chance.",
             self.light(variant, None)

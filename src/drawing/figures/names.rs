@@ -63,8 +63,11 @@ fn check(flag: &str, name: &str, sets: &[&BTreeSet<String>]) -> Result<()> {
     if sets.iter().any(|set| set.contains(name)) {
         return Ok(());
     }
-    let known = sets.iter().flat_map(|set| set.iter());
-    let known: Vec<String> = known.map(|name| format!("{name:?}")).collect();
+    let known: Vec<String> = sets
+        .iter()
+        .flat_map(|set| set.iter())
+        .map(|name| format!("{name:?}"))
+        .collect();
     let problem = format!("the runs have no {name:?}; they have {}", known.join(", "));
     Err(Error::usage(flag, problem))
 }
@@ -139,8 +142,9 @@ impl Names {
 
     /// A sentence that says which models have a short form; empty if none has.
     pub(crate) fn said(&self) -> String {
-        let forms = self.shortened.iter();
-        let forms: Vec<String> = forms
+        let forms: Vec<String> = self
+            .shortened
+            .iter()
             .map(|model| format!("{} is {model}", self.shown(model)))
             .collect();
         match &*forms {

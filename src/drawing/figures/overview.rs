@@ -187,8 +187,11 @@ impl Overview<'_> {
                 model: None,
             })
         };
-        let lines = self.raw_and_enhanced().enumerate().filter_map(line);
-        let mut lines: Vec<PlotLine> = lines.collect();
+        let mut lines: Vec<PlotLine> = self
+            .raw_and_enhanced()
+            .enumerate()
+            .filter_map(line)
+            .collect();
         if lines.len() < 2 {
             return None;
         }

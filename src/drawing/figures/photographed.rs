@@ -18,29 +18,33 @@ impl Overview<'_> {
         let mut chance = chance.filter(|cell| cell.subject.view.is_none());
         let line = chance.find_map(|cell| Some(cell.accuracy?.value));
         let panels = self.models.iter().map(|model| {
-            let subjects = findings.grid.subjects.iter().filter(|subject| {
-                subject.model == *model
-                    && subject.view == Some(View::Image)
-                    && !subject.variant.is_degraded()
-            });
-            let bars = subjects.filter_map(|subject| {
-                let name = match &subject.enhancer {
-                    None => "raw".to_owned(),
-                    Some(name) => {
-                        let name = self.names.shown(name.as_str());
-                        format!("{name}{}", subject.variant.group_suffix())
-                    }
-                };
-                let place = self
-                    .enhancers
-                    .iter()
-                    .position(|known| Some(*known) == subject.enhancer.as_ref());
-                Some(Bar {
-                    name,
-                    style: LineStyle(place.map_or(0, |place| place + 1)),
-                    share: self.accuracy_of(subject, None)?,
+            let bars = findings
+                .grid
+                .subjects
+                .iter()
+                .filter(|subject| {
+                    subject.model == *model
+                        && subject.view == Some(View::Image)
+                        && !subject.variant.is_degraded()
                 })
-            });
+                .filter_map(|subject| {
+                    let name = match &subject.enhancer {
+                        None => "raw".to_owned(),
+                        Some(name) => {
+                            let name = self.names.shown(name.as_str());
+                            format!("{name}{}", subject.variant.group_suffix())
+                        }
+                    };
+                    let place = self
+                        .enhancers
+                        .iter()
+                        .position(|known| Some(*known) == subject.enhancer.as_ref());
+                    Some(Bar {
+                        name,
+                        style: LineStyle(place.map_or(0, |place| place + 1)),
+                        share: self.accuracy_of(subject, None)?,
+                    })
+                });
             BarPanel {
                 title: format!(
                     "{}: accuracy in %, n {}",

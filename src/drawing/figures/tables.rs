@@ -91,20 +91,23 @@ impl Overview<'_> {
 
     fn by_level(&self, variant: &KindReading) -> Table {
         let axis = variant.kind.map_or(Axis::LIGHT, Kind::axis);
-        let rows = self.models.iter().map(|model| {
-            let mut below = Vec::new();
-            let points = self.points(model, variant, None, |subject| {
-                if !self.findings.below_blind(subject, None).is_empty() {
-                    below.extend(subject.level);
-                }
-                self.accuracy_of(subject, None)
-            });
-            let cells = points
-                .into_iter()
-                .map(|(level, of)| (level, accuracy(of, below.contains(&level))));
-            (*model, cells.collect())
-        });
-        let rows: Vec<(&str, BTreeMap<AxisLevel, TableCell>)> = rows.collect();
+        let rows: Vec<(&str, BTreeMap<AxisLevel, TableCell>)> = self
+            .models
+            .iter()
+            .map(|model| {
+                let mut below = Vec::new();
+                let points = self.points(model, variant, None, |subject| {
+                    if !self.findings.below_blind(subject, None).is_empty() {
+                        below.extend(subject.level);
+                    }
+                    self.accuracy_of(subject, None)
+                });
+                let cells = points
+                    .into_iter()
+                    .map(|(level, of)| (level, accuracy(of, below.contains(&level))));
+                (*model, cells.collect())
+            })
+            .collect();
         let levels: Vec<AxisLevel> = self
             .levels
             .iter()
@@ -112,16 +115,19 @@ impl Overview<'_> {
             .filter(|level| level.is_shown_on(axis))
             .filter(|level| rows.iter().any(|(_, cells)| cells.contains_key(level)))
             .collect();
-        let rows = rows.into_iter().map(|(model, mut cells)| {
-            let numbers = levels
-                .iter()
-                .map(|level| cells.remove(level).unwrap_or(TableCell::Blank));
-            TableRow {
-                is_best: self.is_best(model, variant),
-                ..row(self.names.shown(model), None, numbers)
-            }
-        });
-        let rows = rows.chain(self.without_images(levels.len())).collect();
+        let rows = rows
+            .into_iter()
+            .map(|(model, mut cells)| {
+                let numbers = levels
+                    .iter()
+                    .map(|level| cells.remove(level).unwrap_or(TableCell::Blank));
+                TableRow {
+                    is_best: self.is_best(model, variant),
+                    ..row(self.names.shown(model), None, numbers)
+                }
+            })
+            .chain(self.without_images(levels.len()))
+            .collect();
         let values: Vec<String> = levels
             .iter()
             .map(|of| format!("{of} {}", of.value()))
@@ -143,19 +149,20 @@ impl Overview<'_> {
             .findings
             .summary
             .family_cells(None, ReadingMode::Strict);
-        let cells = cells.filter(|cell| cell.subject.view != Some(View::Image));
-        cells.filter_map(move |cell| {
-            let of = cell.accuracy?;
-            let first = match cell.subject.view {
-                // The expected share of guesses is known without an interval.
-                None => TableCell::Guess(of),
-                Some(_) => TableCell::Estimate(of),
-            };
-            let mut numbers = vec![TableCell::Blank; columns];
-            *numbers.first_mut()? = first;
-            let name = self.names.shown(&cell.subject.model);
-            Some(row(name, Some("without images"), numbers))
-        })
+        cells
+            .filter(|cell| cell.subject.view != Some(View::Image))
+            .filter_map(move |cell| {
+                let of = cell.accuracy?;
+                let first = match cell.subject.view {
+                    // The expected share of guesses is known without an interval.
+                    None => TableCell::Guess(of),
+                    Some(_) => TableCell::Estimate(of),
+                };
+                let mut numbers = vec![TableCell::Blank; columns];
+                *numbers.first_mut()? = first;
+                let name = self.names.shown(&cell.subject.model);
+                Some(row(name, Some("without images"), numbers))
+            })
     }
 
     fn is_best(&self, model: &str, variant: &KindReading) -> bool {
@@ -169,23 +176,27 @@ impl Overview<'_> {
 
     fn by_family(&self, variant: &KindReading) -> Table {
         let families = self.findings.grid.families();
-        let of_variant = self.models.iter().flat_map(|model| {
-            let points = self.points(model, variant, None, |subject| {
-                self.accuracy_of(subject, None)
-            });
-            points.into_iter().map(|(level, _)| level)
-        });
-        let darkest = of_variant.max().unwrap_or(AxisLevel::L0);
+        let darkest = self
+            .models
+            .iter()
+            .flat_map(|model| {
+                let points = self.points(model, variant, None, |subject| {
+                    self.accuracy_of(subject, None)
+                });
+                points.into_iter().map(|(level, _)| level)
+            })
+            .max()
+            .unwrap_or(AxisLevel::L0);
         let rows = [AxisLevel::L0, darkest]
             .into_iter()
-            .flat_map(|level| self.models.iter().map(move |model| (level, *model)));
-        let rows = rows.map(|(level, model)| {
-            let numbers = families
-                .iter()
-                .map(|family| self.at(model, level, variant, family));
-            row(self.names.shown(model), Some(&level.to_string()), numbers)
-        });
-        let rows = rows.collect();
+            .flat_map(|level| self.models.iter().map(move |model| (level, *model)))
+            .map(|(level, model)| {
+                let numbers = families
+                    .iter()
+                    .map(|family| self.at(model, level, variant, family));
+                row(self.names.shown(model), Some(&level.to_string()), numbers)
+            })
+            .collect();
         let caption = format!(
             "Accuracy in % by family at L0 and at {darkest} ({} {}), {}. {} {BELOW}",
             darkest.value(),
@@ -219,24 +230,34 @@ impl Overview<'_> {
 
     /// The effect of an enhancer over the models, then the accuracy of each model with it; `None` if it was not asked in the variant.
     fn by_enhancer(&self, variant: &KindReading, enhancer: &EnhancerName) -> Option<Table> {
-        let pooled = self.findings.pooled.iter().filter(|of| {
-            of.kind == PooledKind::Enhancer
-                && of.family.is_none()
-                && of.variant == *variant
-                && of.enhancer.as_ref() == Some(enhancer)
-        });
-        let pooled: Vec<_> = pooled.collect();
-        let rows = self.models.iter().map(|model| {
-            let points = self.points(model, variant, Some(enhancer), |subject| {
-                subject.enhancer.as_ref()?;
-                self.accuracy_of(subject, None)
-            });
-            (*model, points)
-        });
-        let rows: Vec<(&str, Vec<(AxisLevel, Estimate)>)> = rows.collect();
-        let asked = rows.iter().flat_map(|(_, points)| points);
-        let asked = asked.map(|(level, _)| *level);
-        let mut levels: Vec<AxisLevel> = asked.chain(pooled.iter().map(|of| of.level)).collect();
+        let pooled: Vec<_> = self
+            .findings
+            .pooled
+            .iter()
+            .filter(|of| {
+                of.kind == PooledKind::Enhancer
+                    && of.family.is_none()
+                    && of.variant == *variant
+                    && of.enhancer.as_ref() == Some(enhancer)
+            })
+            .collect();
+        let rows: Vec<(&str, Vec<(AxisLevel, Estimate)>)> = self
+            .models
+            .iter()
+            .map(|model| {
+                let points = self.points(model, variant, Some(enhancer), |subject| {
+                    subject.enhancer.as_ref()?;
+                    self.accuracy_of(subject, None)
+                });
+                (*model, points)
+            })
+            .collect();
+        let mut levels: Vec<AxisLevel> = rows
+            .iter()
+            .flat_map(|(_, points)| points)
+            .map(|(level, _)| *level)
+            .chain(pooled.iter().map(|of| of.level))
+            .collect();
         levels.sort_unstable();
         levels.dedup();
         if levels.is_empty() {
@@ -254,14 +275,16 @@ impl Overview<'_> {
             several => format!("{several} models, enhanced − raw"),
         };
         let effect = row(name, None, effect);
-        let own = rows.iter().filter(|(_, points)| !points.is_empty());
-        let own = own.map(|(model, points)| {
-            let numbers = levels.iter().map(|level| {
-                let at = points.iter().find(|(at, _)| at == level);
-                at.map_or(TableCell::Blank, |(_, of)| TableCell::Estimate(*of))
+        let own = rows
+            .iter()
+            .filter(|(_, points)| !points.is_empty())
+            .map(|(model, points)| {
+                let numbers = levels.iter().map(|level| {
+                    let at = points.iter().find(|(at, _)| at == level);
+                    at.map_or(TableCell::Blank, |(_, of)| TableCell::Estimate(*of))
+                });
+                row(self.names.shown(model), Some(""), numbers)
             });
-            row(self.names.shown(model), Some(""), numbers)
-        });
         let rows = std::iter::once(effect).chain(own).collect();
         let caption = format!(
             "Effect of {} in points, and accuracy with it in %, {}. {} Bold: a difference that is shown (p < 0.05 after Holm's correction over the levels).",

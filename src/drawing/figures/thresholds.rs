@@ -46,22 +46,23 @@ impl Overview<'_> {
 
     /// A row for each curve, with its threshold and interval on an axis. `None` if no curve has a threshold.
     fn thresholds_on(&self, axis: Axis) -> Option<Drawing> {
-        let rows = curves_on(self.findings, axis).filter_map(|curve| {
-            let threshold = *curve.summary.threshold.as_ref().ok()?;
-            let darkest = curve.summary.darkest.value();
-            let light = self.light(&curve.variant, curve.enhancer.as_ref());
-            Some(ThresholdRow {
-                name: format!("{}, {light}", self.names.shown(&curve.model)),
-                threshold,
-                words: format!(
-                    "{} [{}, {}]",
-                    stops(threshold.value, darkest),
-                    stops(threshold.low, darkest),
-                    stops(threshold.high, darkest)
-                ),
+        let rows: Vec<ThresholdRow> = curves_on(self.findings, axis)
+            .filter_map(|curve| {
+                let threshold = *curve.summary.threshold.as_ref().ok()?;
+                let darkest = curve.summary.darkest.value();
+                let light = self.light(&curve.variant, curve.enhancer.as_ref());
+                Some(ThresholdRow {
+                    name: format!("{}, {light}", self.names.shown(&curve.model)),
+                    threshold,
+                    words: format!(
+                        "{} [{}, {}]",
+                        stops(threshold.value, darkest),
+                        stops(threshold.low, darkest),
+                        stops(threshold.high, darkest)
+                    ),
+                })
             })
-        });
-        let rows: Vec<ThresholdRow> = rows.collect();
+            .collect();
         if rows.is_empty() {
             return None;
         }

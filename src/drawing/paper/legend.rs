@@ -120,8 +120,11 @@ impl<'a> Legend<'a> {
         if !entry.is_without_images() {
             return look.dots();
         }
-        let flat = self.entries.iter().map(|(known, _)| known);
-        let mut flat = flat.filter(|known| known.is_without_images());
+        let mut flat = self
+            .entries
+            .iter()
+            .map(|(known, _)| known)
+            .filter(|known| known.is_without_images());
         look.without_images(flat.position(|known| known.name == entry.name).unwrap_or(0))
     }
 }

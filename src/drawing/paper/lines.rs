@@ -34,9 +34,10 @@ pub(crate) fn lines(chart: &Chart, look: &Look) -> Sheet {
     let mut sheet = Sheet::default();
     let mut top = 0.0;
     for row in chart.panels.chunks(columns) {
-        let titles = row.iter();
-        let titles = titles.map(|panel| Title::new(&panel.title, look, width));
-        let titles: Vec<Title> = titles.collect();
+        let titles: Vec<Title> = row
+            .iter()
+            .map(|panel| Title::new(&panel.title, look, width))
+            .collect();
         top += Title::highest(&titles, look) + 0.65 * look.letters;
         let mut left = first;
         for (index, (panel, title)) in row.iter().zip(&titles).enumerate() {
@@ -68,8 +69,10 @@ fn draw_panel(
     legend: &Legend<'_>,
 ) {
     axes.draw(sheet, look, measure);
-    let curves = panel.lines.iter();
-    let curves = curves.filter(|line| matches!(line.content, PanelContent::Curve(_)));
+    let curves = panel
+        .lines
+        .iter()
+        .filter(|line| matches!(line.content, PanelContent::Curve(_)));
     let intervals = if curves.count() > MOST_BANDS {
         Intervals::Bars
     } else {
@@ -120,8 +123,11 @@ fn draw_intervals(
         Intervals::Bands => {
             let at = |(level, share): (AxisLevel, f64)| [axes.x(level.value()), axes.y(share)];
             let upper = points.iter().map(|(level, at)| (*level, at.high)).map(at);
-            let lower = points.iter().rev();
-            let lower = lower.map(|(level, at)| (*level, at.low)).map(at);
+            let lower = points
+                .iter()
+                .rev()
+                .map(|(level, at)| (*level, at.low))
+                .map(at);
             sheet.area(upper.chain(lower).collect(), colour, BAND);
         }
         Intervals::Bars => {
@@ -142,10 +148,10 @@ fn draw_curve(
     points: &[(AxisLevel, Estimate)],
 ) {
     let Pen { stroke, .. } = &look.pen(style);
-    let places = points
+    let places: Vec<Place> = points
         .iter()
-        .map(|(level, share)| [axes.x(level.value()), axes.y(share.value)]);
-    let places: Vec<Place> = places.collect();
+        .map(|(level, share)| [axes.x(level.value()), axes.y(share.value)])
+        .collect();
     sheet.line(&places, stroke);
     for place in places {
         look.mark(sheet, &look.pen(style), place);
@@ -248,11 +254,13 @@ mod tests {
             words.start[0] + Font::bundled().width(value, words.size) / 2.0
         };
         let (first, last) = (tick("L0"), tick("L5"));
-        let places = places.iter().map(|[x, y]| {
-            let share = 0.2 + 0.8 * (bottom - offset - y) / (bottom - top);
-            [9.0 * (x - first) / (last - first), share]
-        });
-        places.collect()
+        places
+            .iter()
+            .map(|[x, y]| {
+                let share = 0.2 + 0.8 * (bottom - offset - y) / (bottom - top);
+                [9.0 * (x - first) / (last - first), share]
+            })
+            .collect()
     }
 
     #[test]

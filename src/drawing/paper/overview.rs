@@ -55,8 +55,9 @@ pub(crate) fn overview_sheet(
         Ok(part) => parts.push(part),
         Err(why) => left_out.push(("samples", why.to_owned())),
     }
-    let captions = parts.iter().enumerate();
-    let captions: Vec<String> = captions
+    let captions: Vec<String> = parts
+        .iter()
+        .enumerate()
         .map(|(place, (_, caption))| format!("({}) {caption}", letter(place)))
         .collect();
     Ok(OverviewSheet {

@@ -24,9 +24,10 @@ pub(super) fn reliability(chart: &ReliabilityChart, look: &Look) -> Sheet {
     let mut sheet = Sheet::default();
     let mut top = 0.0;
     for row in chart.panels.chunks(columns) {
-        let titles = row.iter();
-        let titles = titles.map(|panel| Title::new(&panel.title, look, side));
-        let titles: Vec<Title> = titles.collect();
+        let titles: Vec<Title> = row
+            .iter()
+            .map(|panel| Title::new(&panel.title, look, side))
+            .collect();
         top += Title::highest(&titles, look) + 0.65 * look.letters;
         for (index, (panel, title)) in row.iter().zip(&titles).enumerate() {
             let corner = [index as f64 * step + left, top];
@@ -68,8 +69,9 @@ fn draw(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: Square
             let ends = [accuracy.low, accuracy.high].map(|share| square.place(*confidence, share));
             sheet.line(&ends, &look.thin(pen.stroke.colour));
         }
-        let places = line.bins.iter();
-        let places: Vec<Place> = places
+        let places: Vec<Place> = line
+            .bins
+            .iter()
             .map(|(confidence, accuracy)| square.place(*confidence, accuracy.value))
             .collect();
         sheet.line(&places, &pen.stroke);
@@ -109,12 +111,15 @@ fn axes(sheet: &mut Sheet, look: &Look, square: Square) {
 
 /// An entry for each name of a line.
 fn legend<'a>(chart: &'a ReliabilityChart, look: &Look) -> Legend<'a> {
-    let lines = chart.panels.iter().flat_map(|panel| &panel.lines);
-    let entries = lines.map(|line| Entry {
-        name: &line.name,
-        style: line.style,
-        sample: Sample::Curve,
-    });
+    let entries = chart
+        .panels
+        .iter()
+        .flat_map(|panel| &panel.lines)
+        .map(|line| Entry {
+            name: &line.name,
+            style: line.style,
+            sample: Sample::Curve,
+        });
     Legend::new(entries, look)
 }
 
@@ -135,12 +140,14 @@ mod tests {
             high: value + 0.1,
             n: 40,
         };
-        let lines = ["L0", "L5"].into_iter().enumerate();
-        let lines = lines.map(|(style, name)| ReliabilityLine {
-            name: name.to_owned(),
-            style: LineStyle(style),
-            bins: vec![(0.25, share(0.5)), (0.75, share(0.6)), (1.0, share(0.8))],
-        });
+        let lines = ["L0", "L5"]
+            .into_iter()
+            .enumerate()
+            .map(|(style, name)| ReliabilityLine {
+                name: name.to_owned(),
+                style: LineStyle(style),
+                bins: vec![(0.25, share(0.5)), (0.75, share(0.6)), (1.0, share(0.8))],
+            });
         let chart = ReliabilityChart {
             panels: vec![ReliabilityPanel {
                 title: "a model".to_owned(),

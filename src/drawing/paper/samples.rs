@@ -48,10 +48,10 @@ pub(super) fn samples(
     let raw = levels.iter().map(|level| stored.at(frame, *level, None));
     rows.push(("raw".to_owned(), raw.collect()));
     if let Some((name, shown)) = enhancer {
-        let row = levels
+        let row: Vec<Option<&Thumbnail>> = levels
             .iter()
-            .map(|level| stored.at(frame, *level, Some(name)));
-        let row: Vec<Option<&Thumbnail>> = row.collect();
+            .map(|level| stored.at(frame, *level, Some(name)))
+            .collect();
         if row.iter().any(Option::is_some) {
             rows.push((shown.clone(), row));
         }
@@ -86,13 +86,17 @@ impl<'a> Stored<'a> {
         let frames: BTreeSet<&FrameId> = self.thumbnails.iter().map(|of| &of.frame).collect();
         let mut best: Option<(usize, &FrameId, Vec<AxisLevel>)> = None;
         for frame in frames {
-            let of_frame = self.thumbnails.iter().filter(|of| of.frame == *frame);
-            let levels = of_frame.filter(|of| {
-                of.condition.enhancer.is_none()
-                    && (of.condition.kind_reading() == *self.variant
-                        || of.condition.level() == AxisLevel::L0)
-            });
-            let levels: BTreeSet<AxisLevel> = levels.map(|of| of.condition.level()).collect();
+            let levels: BTreeSet<AxisLevel> = self
+                .thumbnails
+                .iter()
+                .filter(|of| of.frame == *frame)
+                .filter(|of| {
+                    of.condition.enhancer.is_none()
+                        && (of.condition.kind_reading() == *self.variant
+                            || of.condition.level() == AxisLevel::L0)
+                })
+                .map(|of| of.condition.level())
+                .collect();
             let is_dark = levels.iter().any(|level| *level != AxisLevel::L0);
             let enhanced = levels
                 .iter()
@@ -125,9 +129,11 @@ impl<'a> Stored<'a> {
 /// Up to four of these levels.
 fn chosen(levels: &BTreeSet<AxisLevel>) -> Vec<AxisLevel> {
     let all: Vec<AxisLevel> = levels.iter().copied().collect();
-    let named = all.iter().copied();
-    let named = named.filter(|level| LEVELS.contains(&&*level.to_string()));
-    let named: Vec<AxisLevel> = named.collect();
+    let named: Vec<AxisLevel> = all
+        .iter()
+        .copied()
+        .filter(|level| LEVELS.contains(&&*level.to_string()))
+        .collect();
     if named.len() == LEVELS.len() || all.len() <= LEVELS.len() {
         return if named.len() == LEVELS.len() {
             named

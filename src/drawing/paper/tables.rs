@@ -134,11 +134,11 @@ fn head_lines(head: &str) -> Vec<&str> {
 /// Width in points of the widest name, all on one line.
 fn names_width(table: &Table) -> f64 {
     let font = Font::bundled();
-    let widths = table
+    table
         .rows
         .iter()
-        .map(|row| font.width(&name(row), LETTERS) * WIDER);
-    widths.fold(0.0, f64::max)
+        .map(|row| font.width(&name(row), LETTERS) * WIDER)
+        .fold(0.0, f64::max)
 }
 
 /// The first form in which the table is no wider than `width` points.
@@ -174,8 +174,10 @@ fn form(table: &Table, width: f64) -> Form {
         let parts: Vec<Range<usize>> = starts
             .map(|start| start..(start + each).min(columns))
             .collect();
-        let rooms = parts.iter().map(|part| room(Ends::Whole, part));
-        let room = rooms.fold(f64::INFINITY, f64::min);
+        let room = parts
+            .iter()
+            .map(|part| room(Ends::Whole, part))
+            .fold(f64::INFINITY, f64::min);
         if room >= least || each == 1 {
             return Form {
                 ends: Ends::Whole,
@@ -220,15 +222,17 @@ fn name_lines(name: &str, room: f64) -> Vec<String> {
 
 fn name_text(row: &TableRow, room: f64) -> String {
     let lines = name_lines(&name(row), room);
-    let lines = lines.iter().map(|line| {
-        let line = text(line);
-        if row.is_best {
-            format!("\\textbf{{{line}}}")
-        } else {
-            line
-        }
-    });
-    let lines: Vec<String> = lines.collect();
+    let lines: Vec<String> = lines
+        .iter()
+        .map(|line| {
+            let line = text(line);
+            if row.is_best {
+                format!("\\textbf{{{line}}}")
+            } else {
+                line
+            }
+        })
+        .collect();
     match &*lines {
         [single] => single.clone(),
         _ => format!("\\dqname{{{}}}", lines.join("\\\\")),
@@ -284,8 +288,10 @@ fn body(table: &Table, form: &Form, part: &Range<usize>, after_heads: &str) -> S
                 text(heading)
             );
         }
-        let cells = row.cells[part.clone()].iter();
-        let cells: Vec<String> = cells.map(|cell| cell_text(cell, form.ends)).collect();
+        let cells: Vec<String> = row.cells[part.clone()]
+            .iter()
+            .map(|cell| cell_text(cell, form.ends))
+            .collect();
         let name = name_text(row, form.names);
         let _ = writeln!(body, "    {name} & {} \\\\", cells.join(" & "));
     }
@@ -375,8 +381,7 @@ mod tests {
         let names = table
             .rows
             .iter()
-            .flat_map(|row| name_lines(&name(row), form.names));
-        let names = names
+            .flat_map(|row| name_lines(&name(row), form.names))
             .map(|line| font.width(&line, LETTERS))
             .fold(0.0, f64::max);
         let columns = part

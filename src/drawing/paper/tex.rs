@@ -59,9 +59,12 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
             let _ = write!(text, ", legend to name={{darkqa-{name}}}");
         }
         text += "]\n";
-        let curves = panel.lines.iter();
-        let curves = curves.filter(|line| matches!(line.content, PanelContent::Curve(_)));
-        let bands = curves.count() <= 3;
+        let bands = panel
+            .lines
+            .iter()
+            .filter(|line| matches!(line.content, PanelContent::Curve(_)))
+            .count()
+            <= 3;
         for (place, line) in panel.lines.iter().enumerate() {
             if line.is_empty() {
                 continue;
@@ -98,9 +101,14 @@ fn rows_apart(chart: &Chart, look: &Look, width: f64) -> f64 {
 
 /// Columns of the legend, by its longest name.
 fn legend_columns(chart: &Chart, look: &Look) -> usize {
-    let lines = chart.panels.iter().flat_map(|panel| &panel.lines);
-    let widths = lines.map(|line| Font::bundled().width(&line.name, look.letters));
-    let widest = widths.fold(0.0, f64::max) * WIDER + SAMPLE;
+    let widest = chart
+        .panels
+        .iter()
+        .flat_map(|panel| &panel.lines)
+        .map(|line| Font::bundled().width(&line.name, look.letters))
+        .fold(0.0, f64::max)
+        * WIDER
+        + SAMPLE;
     (look.width / widest).max(1.0) as usize
 }
 
@@ -108,8 +116,11 @@ fn legend_columns(chart: &Chart, look: &Look) -> usize {
 fn head(panel: &Panel, measure: &str) -> String {
     let levels = panel.levels();
     let ticks: Vec<String> = levels.iter().map(|of| of.value().to_string()).collect();
-    let labels = levels.iter().map(|of| format!("{of}\\\\{}", of.value()));
-    let labels: Vec<String> = labels.map(|label| format!("{{{label}}}")).collect();
+    let labels: Vec<String> = levels
+        .iter()
+        .map(|of| format!("{of}\\\\{}", of.value()))
+        .map(|label| format!("{{{label}}}"))
+        .collect();
     format!(
         "\\nextgroupplot[title={{{}}}, xlabel={{{}}}, ylabel={{{}}}, xmin={}, xmax={},\n  xtick={{{}}}, xticklabels={{{}}}, \
          xticklabel style={{align=center}}",
@@ -134,11 +145,15 @@ fn stroke(stroke: &Stroke) -> String {
         stroke.width
     );
     if !stroke.dash.is_empty() {
-        let pattern = stroke.dash.iter().enumerate().map(|(place, length)| {
-            let word = if place % 2 == 0 { "on" } else { "off" };
-            format!("{word} {length:.2}pt")
-        });
-        let pattern: Vec<String> = pattern.collect();
+        let pattern: Vec<String> = stroke
+            .dash
+            .iter()
+            .enumerate()
+            .map(|(place, length)| {
+                let word = if place % 2 == 0 { "on" } else { "off" };
+                format!("{word} {length:.2}pt")
+            })
+            .collect();
         let _ = write!(text, ", dash pattern={}", pattern.join(" "));
     }
     text
@@ -204,12 +219,15 @@ fn plot(
 /// The data of a panel: a row a level; for each curve its value and both ends in percent, `nan` where it has no point.
 fn dat(panel: &Panel) -> String {
     let mut text = String::new();
-    let curves = panel.lines.iter().enumerate();
-    let curves = curves.filter_map(|(place, line)| match &line.content {
-        PanelContent::Curve(points) if !points.is_empty() => Some((place + 1, line, points)),
-        _ => None,
-    });
-    let curves: Vec<_> = curves.collect();
+    let curves: Vec<_> = panel
+        .lines
+        .iter()
+        .enumerate()
+        .filter_map(|(place, line)| match &line.content {
+            PanelContent::Curve(points) if !points.is_empty() => Some((place + 1, line, points)),
+            _ => None,
+        })
+        .collect();
     for (place, line, _) in &curves {
         let name = line.name.replace(['\n', '\r'], " ");
         let name = shown(&name);

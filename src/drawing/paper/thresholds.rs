@@ -15,8 +15,10 @@ const NAMES: f64 = 0.42;
 pub(crate) fn thresholds(chart: &ThresholdChart, look: &Look) -> Sheet {
     let (font, small) = (Font::bundled(), look.small());
     let widest = |texts: Vec<&String>| {
-        let widths = texts.into_iter().map(|text| font.width(text, small));
-        widths.fold(0.0, f64::max)
+        texts
+            .into_iter()
+            .map(|text| font.width(text, small))
+            .fold(0.0, f64::max)
     };
     let names = widest(chart.rows.iter().map(|row| &row.name).collect()).min(NAMES * look.width);
     let numbers = widest(chart.rows.iter().map(|row| &row.words).collect());

@@ -22,8 +22,10 @@ pub(crate) fn contact(columns: &[ContactColumn<'_>]) -> Rgb {
     let largest = |side: usize| sizes.iter().map(|size| size[side]).max().unwrap_or(0);
     let (height, width) = (largest(0), largest(1).max(COLUMN));
     let rows = columns.iter().map(|column| column.images.len()).max();
-    let labels = columns.iter().map(|column| lines(&column.label, width));
-    let labels: Vec<Vec<String>> = labels.collect();
+    let labels: Vec<Vec<String>> = columns
+        .iter()
+        .map(|column| lines(&column.label, width))
+        .collect();
     let label_lines = labels.iter().map(Vec::len).max().unwrap_or(0);
     let head = 2 * GAP + label_lines * LINE;
     let mut sheet = SheetCanvas::new(

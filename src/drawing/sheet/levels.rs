@@ -98,9 +98,10 @@ pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
 
 /// The factors of light of the insets of some images, without duplicates.
 fn insets(blocks: &[LevelBlock]) -> Vec<u16> {
-    let rows = blocks.iter().flat_map(|block| &block.rows);
-    let images = rows.flat_map(|row| &row.images);
-    let factors: BTreeSet<u16> = images
+    let factors: BTreeSet<u16> = blocks
+        .iter()
+        .flat_map(|block| &block.rows)
+        .flat_map(|row| &row.images)
         .filter_map(|image| amplification(image.dark_ev))
         .collect();
     factors.into_iter().collect()
@@ -214,8 +215,11 @@ mod tests {
     fn insets_are_amplified_by_their_level() {
         let sheet = sheet(100, 300, &[Severity::L1, Severity::L5]);
         let has = |code: u8| {
-            let pixels = sheet.samples().chunks(3);
-            pixels.filter(|pixel| **pixel == [code; 3]).count()
+            sheet
+                .samples()
+                .chunks(3)
+                .filter(|pixel| **pixel == [code; 3])
+                .count()
         };
         // The clean frame twice; the cells, less the quarter of the amplified inset and its edge.
         assert!(has(100) >= 2 * 100 * 300);
@@ -271,8 +275,9 @@ mod tests {
         let sheet = levels(&grey(60, 80, 100), &[block], "");
         let rows: Vec<&[u8]> = sheet.samples().chunks(3 * sheet.width()).collect();
         let is_frame = |row: &&[u8]| {
-            let mut runs = row.windows(3 * 80).step_by(3);
-            runs.position(|run| run.iter().all(|sample| *sample == 100))
+            row.windows(3 * 80)
+                .step_by(3)
+                .position(|run| run.iter().all(|sample| *sample == 100))
         };
         let frame: Vec<(&[u8], usize)> = rows
             .iter()

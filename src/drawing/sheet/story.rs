@@ -304,8 +304,11 @@ mod tests {
     }
 
     fn has(image: &Rgb, colour: [u8; 3]) -> usize {
-        let pixels = image.samples().chunks(3);
-        pixels.filter(|pixel| **pixel == colour).count()
+        image
+            .samples()
+            .chunks(3)
+            .filter(|pixel| **pixel == colour)
+            .count()
     }
 
     #[test]

@@ -97,8 +97,11 @@ mod tests {
     use super::*;
 
     fn inked(canvas: &SheetCanvas) -> usize {
-        let samples = canvas.samples.chunks(3);
-        samples.filter(|pixel| **pixel != [255; 3]).count()
+        canvas
+            .samples
+            .chunks(3)
+            .filter(|pixel| **pixel != [255; 3])
+            .count()
     }
 
     #[test]

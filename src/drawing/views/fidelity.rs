@@ -44,10 +44,9 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
         let light = (&row.variant, row.enhancer.as_ref());
         lights.entry(light).or_default().push(row);
     }
-    let panels = Axis::ALL
+    let panels: Vec<Panel> = Axis::ALL
         .into_iter()
-        .flat_map(|axis| PANELS.map(|panel| self::panel(&lights, axis, panel)));
-    let panels: Vec<Panel> = panels
+        .flat_map(|axis| PANELS.map(|panel| self::panel(&lights, axis, panel)))
         .filter(|panel| panel.lines.iter().any(is_curve))
         .collect();
     if panels.is_empty() {
@@ -88,8 +87,8 @@ fn panel(
     let of_axis =
         curves.filter(|(_, ((variant, _), _))| variant.kind.map(Kind::axis) == Some(axis));
     let curves = of_axis.filter_map(|(style, ((variant, enhancer), rows))| {
-        let points = rows.iter();
-        let points: Vec<_> = points
+        let points: Vec<_> = rows
+            .iter()
             .filter_map(|row| Some((row.level, quantity(row)?)))
             .collect();
         (!points.is_empty()).then(|| PlotLine {

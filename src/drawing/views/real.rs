@@ -21,51 +21,52 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
             models.push(&subject.model);
         }
     }
-    let panels = findings
+    let panels: Vec<BarPanel> = findings
         .pairs
         .iter()
-        .flat_map(|pair| models.iter().map(move |model| (pair, *model)));
-    let panels = panels.map(|(pair, model)| {
-        let rows = findings.comparisons.iter().filter(|row| {
-            row.family.is_none()
-                && row.first.model == model
-                && row.first.variant.photograph() == Some(&pair.name)
-        });
-        let mut shown: Vec<&Subject> = Vec::new();
-        let mut bars = Vec::new();
-        for row in rows {
-            // The light, the photograph, what is as dark, and the enhanced photograph, each once.
-            if !matches!(
-                row.kind,
-                ComparisonKind::Level
-                    | ComparisonKind::RealSynthetic
-                    | ComparisonKind::RealEnhanced
-            ) {
-                continue;
-            }
-            for subject in [&row.second, &row.first] {
-                if shown.contains(&subject) {
+        .flat_map(|pair| models.iter().map(move |model| (pair, *model)))
+        .map(|(pair, model)| {
+            let rows = findings.comparisons.iter().filter(|row| {
+                row.family.is_none()
+                    && row.first.model == model
+                    && row.first.variant.photograph() == Some(&pair.name)
+            });
+            let mut shown: Vec<&Subject> = Vec::new();
+            let mut bars = Vec::new();
+            for row in rows {
+                // The light, the photograph, what is as dark, and the enhanced photograph, each once.
+                if !matches!(
+                    row.kind,
+                    ComparisonKind::Level
+                        | ComparisonKind::RealSynthetic
+                        | ComparisonKind::RealEnhanced
+                ) {
                     continue;
                 }
-                shown.push(subject);
-                let cell = findings.summary.cell(subject, None, ReadingMode::Strict);
-                let Some(share) = cell.and_then(|cell| cell.accuracy) else {
-                    continue;
-                };
-                bars.push(Bar {
-                    name: subject.condition(),
-                    style: LineStyle(bars.len()),
-                    share,
-                });
+                for subject in [&row.second, &row.first] {
+                    if shown.contains(&subject) {
+                        continue;
+                    }
+                    shown.push(subject);
+                    let cell = findings.summary.cell(subject, None, ReadingMode::Strict);
+                    let Some(share) = cell.and_then(|cell| cell.accuracy) else {
+                        continue;
+                    };
+                    bars.push(Bar {
+                        name: subject.condition(),
+                        style: LineStyle(bars.len()),
+                        share,
+                    });
+                }
             }
-        }
-        BarPanel {
-            title: format!("{model}: accuracy in %"),
-            bars,
-            line,
-        }
-    });
-    let panels: Vec<BarPanel> = panels.filter(|panel| panel.bars.len() > 1).collect();
+            BarPanel {
+                title: format!("{model}: accuracy in %"),
+                bars,
+                line,
+            }
+        })
+        .filter(|panel| panel.bars.len() > 1)
+        .collect();
     if panels.is_empty() {
         return None;
     }

@@ -17,8 +17,9 @@ const MOST_LEVELS: usize = 4;
 /// Accuracy over confidence of each model in the main variant, raw, a line a level; `None` without probabilities of choices.
 pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
     let variant = findings.grid.main_variant();
-    let rows = findings.calibrations.iter();
-    let rows: Vec<(&Calibration, AxisLevel)> = rows
+    let rows: Vec<(&Calibration, AxisLevel)> = findings
+        .calibrations
+        .iter()
         .filter(|row| !row.bins.is_empty() && row.subject.enhancer.is_none())
         .filter_map(|row| Some((row, row.subject.level?)))
         .filter(|(row, level)| {

@@ -103,10 +103,13 @@ impl<'a> FolderBatches<'a> {
 
     /// Refuses batches of several accounts at the address: the flags name one key, with which the others are not found.
     fn refuse_several_accounts(&self) -> Result<()> {
-        let open = self.journal.parts.iter();
-        let open = open.filter(|part| part.stage != Stage::Ended);
-        let here = open.filter(|part| self.servers.has(&part.facts.base));
-        let accounts = here.map(|part| &*part.facts.account);
+        let accounts = self
+            .journal
+            .parts
+            .iter()
+            .filter(|part| part.stage != Stage::Ended)
+            .filter(|part| self.servers.has(&part.facts.base))
+            .map(|part| &*part.facts.account);
         // Journals of earlier versions name none.
         let accounts: BTreeSet<&str> = accounts.filter(|account| !account.is_empty()).collect();
         if accounts.len() < 2 {
@@ -181,11 +184,12 @@ fn address(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
             ));
         }
     }
-    let open = journal
+    let bases: BTreeSet<&str> = journal
         .parts
         .iter()
-        .filter(|part| part.stage != Stage::Ended);
-    let bases: BTreeSet<&str> = open.map(|part| part.facts.base.as_str()).collect();
+        .filter(|part| part.stage != Stage::Ended)
+        .map(|part| part.facts.base.as_str())
+        .collect();
     let mut bases = bases.into_iter();
     let (Some(base), None) = (bases.next(), bases.next()) else {
         if journal.has_open_parts() {

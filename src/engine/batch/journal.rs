@@ -41,8 +41,8 @@ impl Line {
             _ => &[],
         };
         let names = pieces.iter().map(|piece| &piece.file);
-        let mut names = std::iter::once(&self.file).chain(names);
-        names
+        std::iter::once(&self.file)
+            .chain(names)
             .find(|name| !is_part_name(name))
             .map_or(Ok(()), |name| {
                 Err(format!(
@@ -121,11 +121,15 @@ impl Journal {
 
     /// The first number that no file of this stem has or had.
     pub(super) fn free_number(&self, stem: &str) -> u32 {
-        let numbers = self.parts.iter().filter_map(|part| {
-            let rest = part.name.strip_prefix(stem)?.strip_prefix('-')?;
-            rest.strip_suffix(".jsonl")?.parse::<u32>().ok()
-        });
-        numbers.max().unwrap_or(0) + 1
+        self.parts
+            .iter()
+            .filter_map(|part| {
+                let rest = part.name.strip_prefix(stem)?.strip_prefix('-')?;
+                rest.strip_suffix(".jsonl")?.parse::<u32>().ok()
+            })
+            .max()
+            .unwrap_or(0)
+            + 1
     }
 
     /// Whether something is left to do for a part.
@@ -142,14 +146,20 @@ impl Journal {
     /// Number of requests of parts whose replies are not taken over.
     pub(super) fn open_requests(&self) -> usize {
         let open = |part: &&Part| !matches!(part.stage, Stage::TakenOver | Stage::Ended);
-        let open = self.parts.iter().filter(open);
-        open.map(|part| part.facts.requests).sum()
+        self.parts
+            .iter()
+            .filter(open)
+            .map(|part| part.facts.requests)
+            .sum()
     }
 
     /// The most that batches can cost whose replies are not imported yet, in US dollars.
     pub(crate) fn most_dollars(&self) -> f64 {
-        let parts = self.parts.iter().filter(|part| part.may_cost());
-        parts.map(|part| part.facts.most_cost()).sum()
+        self.parts
+            .iter()
+            .filter(|part| part.may_cost())
+            .map(|part| part.facts.most_cost())
+            .sum()
     }
 
     /// Records that a file was written as a part.

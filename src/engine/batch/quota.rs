@@ -42,8 +42,13 @@ impl<D: Detail> Driver<'_, D> {
         let out = |other: &&Part| {
             other.is_out() && other.facts.place() == place && !self.stopped.has_part(&other.facts)
         };
-        let waiting = self.journal.parts.iter().filter(out);
-        let waiting: f64 = waiting.map(|other| other.facts.tokens).sum();
+        let waiting: f64 = self
+            .journal
+            .parts
+            .iter()
+            .filter(out)
+            .map(|other| other.facts.tokens)
+            .sum();
         let limit = self.limit(part);
         let is_full = |limit: u64| waiting > 0.0 && waiting + of.facts.tokens > limit as f64;
         Ok(limit.is_some_and(is_full) || !self.is_affordable(of)?)

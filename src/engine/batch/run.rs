@@ -84,15 +84,19 @@ pub(crate) fn run<E: Experiment>(
 
 /// The mean tokens of each model's stored replies; `None` if none states them.
 fn reply_lengths(models: &[ModelUnderTest], stored: &[StoredTrial]) -> Vec<Option<f64>> {
-    let lengths = models.iter().map(|model| {
-        let replies = stored.iter().filter(|trial| **trial.model == *model.name);
-        let tokens = replies.filter_map(|trial| trial.usage()?.completion_tokens);
-        let (count, sum) = tokens.fold((0.0, 0.0), |(count, sum), tokens| {
-            (count + 1.0, sum + tokens as f64)
-        });
-        (count > 0.0).then(|| sum / count)
-    });
-    lengths.collect()
+    models
+        .iter()
+        .map(|model| {
+            let tokens = stored
+                .iter()
+                .filter(|trial| **trial.model == *model.name)
+                .filter_map(|trial| trial.usage()?.completion_tokens);
+            let (count, sum) = tokens.fold((0.0, 0.0), |(count, sum), tokens| {
+                (count + 1.0, sum + tokens as f64)
+            });
+            (count > 0.0).then(|| sum / count)
+        })
+        .collect()
 }
 
 /// An open run with its batches.

@@ -88,13 +88,17 @@ impl<'a, D: Detail> Driver<'a, D> {
     fn models_of(&self, part: usize) -> Vec<&'a Model> {
         let facts = &self.part(part).facts;
         let all = || self.models.iter().map(|one| (&*one.name, &*one.model));
-        let named = all().filter(|(name, model)| facts.asks(name, model.name()));
-        let named: Vec<&Model> = named.map(|(_, model)| model).collect();
+        let named: Vec<&Model> = all()
+            .filter(|(name, model)| facts.asks(name, model.name()))
+            .map(|(_, model)| model)
+            .collect();
         if !named.is_empty() {
             return named;
         }
-        let of_id = all().filter(|(_, model)| model.name() == facts.model);
-        of_id.map(|(_, model)| model).collect()
+        all()
+            .filter(|(_, model)| model.name() == facts.model)
+            .map(|(_, model)| model)
+            .collect()
     }
 
     fn say_what_is_missing(&self, part: usize, unread: usize) -> Result<()> {

@@ -50,8 +50,11 @@ impl AskingArgs {
     /// The names of all settings, as flags.
     pub(super) fn flags() -> Vec<String> {
         let command = command();
-        let flags = command.get_arguments().filter_map(|arg| arg.get_long());
-        flags.map(str::to_owned).collect()
+        command
+            .get_arguments()
+            .filter_map(|arg| arg.get_long())
+            .map(str::to_owned)
+            .collect()
     }
 
     /// Takes the key away: it belongs to another address than the one that follows.
@@ -105,11 +108,10 @@ fn command() -> Command {
 /// The text of an error of the parser, on one line.
 fn line(error: &clap::Error) -> String {
     let text = error.render().to_string();
-    let lines = text
+    let lines: Vec<&str> = text
         .lines()
         .map(str::trim)
-        .take_while(|line| !line.starts_with("Usage:"));
-    let lines: Vec<&str> = lines
+        .take_while(|line| !line.starts_with("Usage:"))
         .filter(|line| !line.is_empty() && !line.starts_with("For more"))
         .collect();
     lines.join(" ").trim_start_matches("error: ").to_owned()

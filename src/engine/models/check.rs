@@ -75,8 +75,9 @@ pub(crate) fn check(
                 .served_model
                 .map_or_else(String::new, |name| format!(" (served by {name})"));
             let text = reply.text.trim();
-            let mut words = text.split(|c: char| !c.is_alphanumeric());
-            let is_true = words.any(|word| word == "B" || word.eq_ignore_ascii_case("red"));
+            let is_true = text
+                .split(|c: char| !c.is_alphanumeric())
+                .any(|word| word == "B" || word.eq_ignore_ascii_case("red"));
             let doubt = if model.view == View::Image && !is_true {
                 "; that is not the true answer: perhaps it does not see images"
             } else {

@@ -41,11 +41,12 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
         if let Some(key) = field("key").and_then(Value::as_str) {
             line("key", key);
         }
-        let headers = field("headers")
+        let headers: Vec<&str> = field("headers")
             .and_then(Value::as_array)
             .into_iter()
-            .flatten();
-        let headers: Vec<&str> = headers.filter_map(Value::as_str).collect();
+            .flatten()
+            .filter_map(Value::as_str)
+            .collect();
         if !headers.is_empty() {
             line("headers", &headers.join(", "));
         }

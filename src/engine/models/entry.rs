@@ -192,15 +192,17 @@ pub(super) fn is_of_the_run(key: &str) -> bool {
 
 /// All keys of a model.
 pub(super) fn known_keys() -> BTreeSet<String> {
-    let flags = AskingArgs::flags().into_iter();
-    let flags = flags.filter(|flag| !matches!(&**flag, "header" | "header-env"));
-    let keys = flags.map(
-        |flag| match RENAMED.iter().find(|(_, name)| *name == flag) {
-            Some((key, _)) => (*key).to_owned(),
-            None => flag,
-        },
-    );
-    keys.chain(OWN.map(str::to_owned)).collect()
+    AskingArgs::flags()
+        .into_iter()
+        .filter(|flag| !matches!(&**flag, "header" | "header-env"))
+        .map(
+            |flag| match RENAMED.iter().find(|(_, name)| *name == flag) {
+                Some((key, _)) => (*key).to_owned(),
+                None => flag,
+            },
+        )
+        .chain(OWN.map(str::to_owned))
+        .collect()
 }
 
 /// The flag that a key sets; `None` for keys that are no flags.
@@ -223,17 +225,19 @@ fn words(key: &str, located: &Located) -> Result<Vec<String>> {
     };
     match (key, &located.value) {
         ("headers", Value::Table(headers)) => {
-            let words = headers.iter().map(|(name, value)| match value {
-                Value::String(text) => Ok(format!("--header={name}: {text}")),
-                Value::Table(table) => match (table.len(), table.get("env")) {
-                    (1, Some(Value::String(variable))) => {
-                        Ok(format!("--header-env={name}={variable}"))
-                    }
+            let words: Result<Vec<String>, ()> = headers
+                .iter()
+                .map(|(name, value)| match value {
+                    Value::String(text) => Ok(format!("--header={name}: {text}")),
+                    Value::Table(table) => match (table.len(), table.get("env")) {
+                        (1, Some(Value::String(variable))) => {
+                            Ok(format!("--header-env={name}={variable}"))
+                        }
+                        _ => Err(()),
+                    },
                     _ => Err(()),
-                },
-                _ => Err(()),
-            });
-            let words: Result<Vec<String>, ()> = words.collect();
+                })
+                .collect();
             words.or_else(|()| wrong("{ NAME = \"value\", NAME = { env = \"VARIABLE\" } }"))
         }
         ("headers", _) => wrong("a table of headers"),

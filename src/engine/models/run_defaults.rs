@@ -24,12 +24,14 @@ pub(crate) struct RunDefault {
 /// If the file cannot be read as a file of models.
 pub(crate) fn run_defaults(path: &Path) -> Result<Vec<RunDefault>> {
     let file = ModelsFile::read(path)?;
-    let keys = file.defaults.into_iter();
-    let keys = keys.filter(|(key, _)| is_of_the_run(key));
-    let defaults = keys.map(|(flag, located)| RunDefault {
-        flag,
-        value: located.value,
-        place: located.place,
-    });
+    let defaults = file
+        .defaults
+        .into_iter()
+        .filter(|(key, _)| is_of_the_run(key))
+        .map(|(flag, located)| RunDefault {
+            flag,
+            value: located.value,
+            place: located.place,
+        });
     Ok(defaults.collect())
 }

@@ -20,8 +20,9 @@ pub(super) fn set(entries: &mut [Entry], text: &str) -> Result<()> {
             .map(str::to_owned)
     };
     // The longest name first: a name may begin as another one does.
-    let longest = entries.iter().filter(|entry| of_name(entry).is_some());
-    let longest = longest
+    let longest = entries
+        .iter()
+        .filter(|entry| of_name(entry).is_some())
         .map(|entry| entry.name.clone())
         .max_by_key(String::len);
     let Some(name) = longest else {

@@ -138,15 +138,18 @@ impl AskSettings {
         if context.text_baseline == TextBaseline::Always {
             add_text_baselines(&mut entries);
         }
-        let listed = entries.iter().map(|entry| ListedModel {
-            name: entry.name.clone(),
-            group: entry.group.clone(),
-        });
-        let listed: Vec<ListedModel> = listed.collect();
+        let listed: Vec<ListedModel> = entries
+            .iter()
+            .map(|entry| ListedModel {
+                name: entry.name.clone(),
+                group: entry.group.clone(),
+            })
+            .collect();
         select(&mut entries, &args.only)?;
         if asking.access.base_url.is_empty() {
-            let of_flags = entries.iter().filter(|entry| entry.place.is_none());
-            of_flags
+            entries
+                .iter()
+                .filter(|entry| entry.place.is_none())
                 .map(|entry| &entry.id)
                 .try_for_each(ModelName::refuse_near_miss)?;
         }
@@ -220,10 +223,11 @@ impl AskSettings {
 
 /// Has every model that sees images be asked without any, too, unless it is already.
 fn add_text_baselines(entries: &mut [Entry]) {
-    let blind = entries
+    let blind: BTreeSet<String> = entries
         .iter()
-        .filter(|entry| entry.views.contains(&View::Blind));
-    let blind: BTreeSet<String> = blind.map(|entry| entry.name.clone()).collect();
+        .filter(|entry| entry.views.contains(&View::Blind))
+        .map(|entry| entry.name.clone())
+        .collect();
     let seeing = entries.iter_mut();
     for entry in seeing.filter(|entry| !blind.contains(&entry.name)) {
         entry.views.push(View::Blind);
@@ -254,8 +258,12 @@ fn entries_from_file(
     let mut overridden = BTreeSet::new();
     for keys in &file.models {
         check_keys(keys, false)?;
-        let defaults = file.defaults.clone().into_iter();
-        let defaults: Keys = defaults.filter(|(key, _)| holds(key, keys)).collect();
+        let defaults: Keys = file
+            .defaults
+            .clone()
+            .into_iter()
+            .filter(|(key, _)| holds(key, keys))
+            .collect();
         overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
         entries.push(Entry::from_file(
             keys,
@@ -363,8 +371,10 @@ fn resolve(
 
 /// The value of a header that is not secret.
 fn plain_header(headers: &[String], name: &str) -> Option<String> {
-    let mut headers = headers.iter().filter_map(|text| text.split_once(':'));
-    let found = headers.find(|(other, _)| other.trim().eq_ignore_ascii_case(name));
+    let found = headers
+        .iter()
+        .filter_map(|text| text.split_once(':'))
+        .find(|(other, _)| other.trim().eq_ignore_ascii_case(name));
     found.map(|(_, value)| value.trim().to_owned())
 }
 

@@ -240,8 +240,11 @@ impl Suspect<'_> {
 
 /// The variables that an endpoint names for its key and its headers.
 fn named<'a>(access: &'a AccessArgs, flags: &AccessArgs) -> Vec<Sent<'a>> {
-    let key = access.api_key_env.as_deref().filter(|name| *name != NO_KEY);
-    let key = key.filter(|_| access.api_key_file.is_none());
+    let key = access
+        .api_key_env
+        .as_deref()
+        .filter(|name| *name != NO_KEY)
+        .filter(|_| access.api_key_file.is_none());
     let key = key.map(|variable| Sent {
         key: "key-env",
         variable,

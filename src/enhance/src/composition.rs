@@ -162,15 +162,19 @@ impl Composition {
         part: TileWindow,
         dark: Option<&Planes>,
     ) -> Result<Planes, OutOfRange> {
-        let planes = self.outputs.iter().zip(outputs).map(|(reading, output)| {
-            // The operands of an expression may have any range.
-            let certainty = match self.image {
-                None => reading.certainty,
-                Some(_) => Certainty::Known,
-            };
-            reading.planes(output.samples, output.layout, size, part, certainty)
-        });
-        let mut planes = planes.collect::<Result<Vec<_>, _>>()?;
+        let mut planes = self
+            .outputs
+            .iter()
+            .zip(outputs)
+            .map(|(reading, output)| {
+                // The operands of an expression may have any range.
+                let certainty = match self.image {
+                    None => reading.certainty,
+                    Some(_) => Certainty::Known,
+                };
+                reading.planes(output.samples, output.layout, size, part, certainty)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
         let made = match &self.image {
             None => planes.swap_remove(0),
             Some(image) => self.evaluated(image, &planes, dark)?,

@@ -134,11 +134,10 @@ impl OutputReading {
                 .chain(TensorLayout::ALL)
                 .collect(),
         };
-        let mut all = self
-            .channels
+        self.channels
             .iter()
-            .flat_map(|count| layouts.iter().map(move |layout| (*layout, *count)));
-        all.find(|(layout, count)| fits(*layout, *count))
+            .flat_map(|count| layouts.iter().map(move |layout| (*layout, *count)))
+            .find(|(layout, count)| fits(*layout, *count))
     }
 
     /// The bytes of a part of an output of three channels, as red, green and blue of each pixel; `size` is that of the whole output.

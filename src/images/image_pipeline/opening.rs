@@ -179,20 +179,31 @@ impl<'a> ImagePipeline<'a> {
 
     /// Handles that stop each enhancer.
     pub(crate) fn stoppers(&self) -> Vec<EnhancerStopper> {
-        let all = self.enhancers.iter().chain(self.sets.iter().flatten());
-        let open = all.map(|enhancer| EnhancerStopper::Open(enhancer.stopper()));
+        let open = self
+            .enhancers
+            .iter()
+            .chain(self.sets.iter().flatten())
+            .map(|enhancer| EnhancerStopper::Open(enhancer.stopper()));
         let resting = self.resting.iter().cloned().map(EnhancerStopper::Resting);
         open.chain(resting).collect()
     }
 
     /// The notes of the enhancers, by name.
     pub(crate) fn usages(&self) -> Vec<(EnhancerName, Usage)> {
-        let open = self.enhancers.iter();
-        let open = open.map(|enhancer| (enhancer.name().clone(), enhancer.usage()));
-        let resting = self.resting.iter();
-        let resting = resting.map(|enhancer| (enhancer.name().clone(), enhancer.usage().clone()));
-        let elsewhere = self.steps.recipe.elsewhere.iter();
-        let elsewhere = elsewhere.map(|images| (images.name().clone(), images.usage().clone()));
+        let open = self
+            .enhancers
+            .iter()
+            .map(|enhancer| (enhancer.name().clone(), enhancer.usage()));
+        let resting = self
+            .resting
+            .iter()
+            .map(|enhancer| (enhancer.name().clone(), enhancer.usage().clone()));
+        let elsewhere = self
+            .steps
+            .recipe
+            .elsewhere
+            .iter()
+            .map(|images| (images.name().clone(), images.usage().clone()));
         open.chain(resting).chain(elsewhere).collect()
     }
 }

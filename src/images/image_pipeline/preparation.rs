@@ -86,10 +86,10 @@ impl ImagePipeline<'_> {
             source.frames.iter().map(move |frame| (part, source, frame))
         });
         if let Some(limit) = self.steps.limit {
-            let seen = plan
+            let shown = plan
                 .iter()
-                .filter(|part| part.conditions().next().is_some());
-            let shown = seen.map(|part| sources[part.source].order.len());
+                .filter(|part| part.conditions().next().is_some())
+                .map(|part| sources[part.source].order.len());
             limit.check_request(shown.max().unwrap_or(0), None)?;
         }
         let pixels = |frame: &SourceFrame| u64::from(frame.size.0) * u64::from(frame.size.1);

@@ -102,8 +102,11 @@ impl Overview {
 
     /// The names of the topics with images.
     pub(crate) fn image_topics(&self) -> Vec<&str> {
-        let topics = self.topics.iter().filter(|(_, topic)| topic.has_images());
-        topics.map(|(name, _)| &**name).collect()
+        self.topics
+            .iter()
+            .filter(|(_, topic)| topic.has_images())
+            .map(|(name, _)| &**name)
+            .collect()
     }
 }
 

@@ -78,10 +78,10 @@ mod tests {
 
     fn stretches(times: &[f64]) -> Vec<u64> {
         let mut stretches = Stretches::new(10.0);
-        let numbers = times
+        times
             .iter()
-            .map(|time| stretches.place((time * 1e9) as Nanoseconds).stretch);
-        numbers.collect()
+            .map(|time| stretches.place((time * 1e9) as Nanoseconds).stretch)
+            .collect()
     }
 
     #[test]

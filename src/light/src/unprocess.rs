@@ -405,10 +405,10 @@ mod tests {
     }
 
     fn greatest_difference(one: &Bayer, other: &Bayer) -> f32 {
-        let differences = (0..one.height())
+        (0..one.height())
             .flat_map(|row| (0..one.width()).map(move |at| (row, at)))
-            .map(|(row, at)| (one.sample(row, at) - other.sample(row, at)).abs());
-        differences.fold(0.0, f32::max)
+            .map(|(row, at)| (one.sample(row, at) - other.sample(row, at)).abs())
+            .fold(0.0, f32::max)
     }
 
     #[test]

@@ -46,8 +46,11 @@ pub fn png(image: &Rgb) -> Result<Vec<u8>> {
 /// If a side is too long for the format.
 pub(crate) fn png_16(image: &Codes16) -> Result<Vec<u8>> {
     let (width, height) = (side(image.width())?, side(image.height())?);
-    let samples = image.samples().iter();
-    let samples: Vec<u8> = samples.flat_map(|code| code.to_ne_bytes()).collect();
+    let samples: Vec<u8> = image
+        .samples()
+        .iter()
+        .flat_map(|code| code.to_ne_bytes())
+        .collect();
     let mut file = Vec::new();
     PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive)
         .write_image(&samples, width, height, ExtendedColorType::Rgb16)

@@ -328,11 +328,13 @@ pub(crate) fn noise_keys(
     let items = given
         .try_iter()
         .map_err(|_| wrong_type("key", expected, given))?;
-    let keys = items.take(count + 1).map(|item| {
-        let key = text("key", expected, &item?)?;
-        Ok(noise_key(seed, &key))
-    });
-    let keys: Vec<NoiseKey> = keys.collect::<PyResult<_>>()?;
+    let keys: Vec<NoiseKey> = items
+        .take(count + 1)
+        .map(|item| {
+            let key = text("key", expected, &item?)?;
+            Ok(noise_key(seed, &key))
+        })
+        .collect::<PyResult<_>>()?;
     if keys.len() != count {
         let got = if keys.len() > count { "more" } else { "fewer" };
         return Err(PyValueError::new_err(format!(

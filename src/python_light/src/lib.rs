@@ -293,9 +293,13 @@ fn output<'py, T: Output>(
             if let [only] = &batch.images[..] {
                 return joined(make(0, only));
             }
-            let images = batch.images.par_iter().enumerate();
-            let made = images.map(|(index, clean)| joined(make(index, clean)));
-            made.collect::<Vec<Vec<T>>>().concat()
+            batch
+                .images
+                .par_iter()
+                .enumerate()
+                .map(|(index, clean)| joined(make(index, clean)))
+                .collect::<Vec<Vec<T>>>()
+                .concat()
         })
     });
     arrays::to_numpy(py, samples, &shape)

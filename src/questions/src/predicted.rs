@@ -122,15 +122,18 @@ impl PredictedFrame {
         let largest = self
             .segments(class)
             .max_by_key(|segment| (segment.area, Reverse(segment.id)))?;
-        let median = palette.color(largest.median).map(Color::name);
-        median.filter(|name| is_offered(name)).or_else(|| {
-            Color::ALL
-                .into_iter()
-                .zip(largest.colors)
-                .filter(|(color, pixels)| *pixels > 0 && is_offered(color.name()))
-                .max_by_key(|(_, pixels)| *pixels)
-                .map(|(color, _)| color.name())
-        })
+        palette
+            .color(largest.median)
+            .map(Color::name)
+            .filter(|name| is_offered(name))
+            .or_else(|| {
+                Color::ALL
+                    .into_iter()
+                    .zip(largest.colors)
+                    .filter(|(color, pixels)| *pixels > 0 && is_offered(color.name()))
+                    .max_by_key(|(_, pixels)| *pixels)
+                    .map(|(color, _)| color.name())
+            })
     }
 
     /// Index of the choice whose nearest segment has the smallest median distance, if at least two of the offered things are found:

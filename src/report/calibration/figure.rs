@@ -80,13 +80,13 @@ fn probability(camera: &CameraFit) -> PointPanel {
 /// ln σ over ln K of read and row noise, with their lines.
 fn deviations(camera: &CameraFit) -> PointPanel {
     let series = |style, name: &str, sigma: fn(&SettingFit) -> f64, line: &NoiseLine| {
-        let points = camera
+        let points: Vec<[f64; 2]> = camera
             .settings
             .iter()
             .map(|fit| [fit.gain.value, sigma(fit)])
             .filter(|[_, sigma]| *sigma > 0.0)
-            .map(|point| point.map(libm::log));
-        let points: Vec<[f64; 2]> = points.collect();
+            .map(|point| point.map(libm::log))
+            .collect();
         let at = |[x, _]: &[f64; 2]| [*x, libm::log(line.at(libm::exp(*x)))];
         PointSeries {
             name: name.to_owned(),

@@ -78,8 +78,11 @@ pub(crate) fn table(camera: &CameraFit) -> String {
 /// Offsets of the planes with the largest standard error of them.
 fn bias(camera: &CameraFit, fit: &SettingFit) -> String {
     let bias = camera.bias(fit);
-    let values = bias.iter().map(|bias| number(bias.value, 3));
-    let values = values.collect::<Vec<_>>().join(" / ");
+    let values = bias
+        .iter()
+        .map(|bias| number(bias.value, 3))
+        .collect::<Vec<_>>()
+        .join(" / ");
     let errors = bias.iter().filter_map(|bias| bias.error);
     match errors.reduce(f64::max) {
         Some(error) => format!("{values} ± {error:.3}"),

@@ -16,12 +16,11 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     if whole.levels.len() < 2 {
         return Ok(Vec::new());
     }
-    let categories = report
+    let categories: Vec<Panel> = report
         .summary
         .groups()
         .into_iter()
-        .filter(|group| matches!(group, Group::Category(_)));
-    let categories: Vec<Panel> = categories
+        .filter(|group| matches!(group, Group::Category(_)))
         .flat_map(|group| panels(report, group, &whole))
         .collect();
     let note = format!(
@@ -71,14 +70,17 @@ fn panel(
     ladder: &Ladder<'_, OpenCell>,
 ) -> Panel {
     let seeing = whole.series.len();
-    let lines = ladder.series.iter();
-    let lines = lines.map(|(series, cells)| {
+    let lines = ladder.series.iter().map(|(series, cells)| {
         let index = whole.series.keys().position(|other| other == series);
         let start = ladder.start(series).map(|cell| (AxisLevel::L0, cell));
-        let dark = cells.iter().map(|(level, cell)| (*level, *cell));
-        let dark = dark.filter(|(level, _)| *level != AxisLevel::L0);
-        let points = start.into_iter().chain(dark);
-        let points = points.filter_map(|(level, cell)| Some((level, cell.score?)));
+        let dark = cells
+            .iter()
+            .map(|(level, cell)| (*level, *cell))
+            .filter(|(level, _)| *level != AxisLevel::L0);
+        let points = start
+            .into_iter()
+            .chain(dark)
+            .filter_map(|(level, cell)| Some((level, cell.score?)));
         PlotLine {
             name: format!("{}, {}", series.model, series.light(&[])),
             style: LineStyle(index.unwrap_or(seeing)),
@@ -86,21 +88,25 @@ fn panel(
             model: Some(series.model.to_owned()),
         }
     });
-    let blind = ladder.without_level.iter().enumerate();
-    let blind = blind.filter_map(|(index, (subject, cell))| {
-        Some(PlotLine {
-            name: format!("{} without images", subject.model),
-            style: LineStyle(seeing + index),
-            content: PanelContent::Flat(cell.score?.value),
-            model: Some(subject.model.clone()),
-        })
-    });
+    let blind = ladder
+        .without_level
+        .iter()
+        .enumerate()
+        .filter_map(|(index, (subject, cell))| {
+            Some(PlotLine {
+                name: format!("{} without images", subject.model),
+                style: LineStyle(seeing + index),
+                content: PanelContent::Flat(cell.score?.value),
+                model: Some(subject.model.clone()),
+            })
+        });
     let n = report.questions.len();
     let title = match group {
         Group::All => format!("all, n {n}"),
         part => {
-            let questions = report.questions.iter();
-            let questions = questions
+            let questions = report
+                .questions
+                .iter()
                 .filter(|question| question.family.name() == part.name())
                 .count();
             format!("{}, n {questions}", part.name())

@@ -48,21 +48,24 @@ fn data<'a>(
     limit: SizeLimit,
 ) -> PageData<'a> {
     let (mut frames, mut families) = (Distinct::new(), Distinct::new());
-    let questions = report.questions.iter().map(|question| Question {
-        id: &question.id.0,
-        frame: frames.index_of(&*question.frame.0),
-        family: families.index_of([
-            question.family.name(),
-            words::family(Some(&question.family)),
-        ]),
-        text: &question.text,
-        evidence: None,
-        outlines: Vec::new(),
-        object: None,
-        answer: question.answer.as_deref(),
-        also_right: question.extra_answers.as_deref().unwrap_or_default(),
-    });
-    let questions: Vec<Question<'_>> = questions.collect();
+    let questions: Vec<Question<'_>> = report
+        .questions
+        .iter()
+        .map(|question| Question {
+            id: &question.id.0,
+            frame: frames.index_of(&*question.frame.0),
+            family: families.index_of([
+                question.family.name(),
+                words::family(Some(&question.family)),
+            ]),
+            text: &question.text,
+            evidence: None,
+            outlines: Vec::new(),
+            object: None,
+            answer: question.answer.as_deref(),
+            also_right: question.extra_answers.as_deref().unwrap_or_default(),
+        })
+        .collect();
     let results = results(report, subjects);
     PageData {
         kind: PageKind::Open,

@@ -38,8 +38,10 @@ pub(crate) struct OpenReport<'a> {
 impl OpenReport<'_> {
     /// The names of all runs.
     pub(in crate::report) fn names(&self) -> Vec<String> {
-        let names = self.runs.iter().map(|(name, _)| (*name).to_owned());
-        names.collect()
+        self.runs
+            .iter()
+            .map(|(name, _)| (*name).to_owned())
+            .collect()
     }
 
     /// The light readings of the noisy images.

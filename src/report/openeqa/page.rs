@@ -48,8 +48,10 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
         .iter()
         .map(|alert| alert.text.clone())
         .collect();
-    let unmarked = report.answers.iter();
-    let unmarked = unmarked.filter(|answer| answer.outcome == AnswerOutcome::Unmarked);
+    let unmarked = report
+        .answers
+        .iter()
+        .filter(|answer| answer.outcome == AnswerOutcome::Unmarked);
     match unmarked.count() {
         0 => {}
         n => alerts.push(format!(

@@ -141,19 +141,22 @@ fn axis_table(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>
 
 /// A note for each model without images.
 fn without_images(summary: &OpenSummary, ladder: &Ladder<'_, OpenCell>) -> Vec<String> {
-    let notes = ladder.without_level.iter().map(|(subject, cell)| {
-        let text = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
-        let interval = cell.score.map(|share| format!(" [{}]", ends(share)));
-        let text = text + &interval.unwrap_or_default();
-        let (scored, planned) = (cell.scored(), cell.planned);
-        let of = if scored == planned {
-            String::new()
-        } else {
-            format!(" of {planned}")
-        };
-        format!("{} without images: {text}, n {scored}{of}", subject.model)
-    });
-    notes.collect()
+    ladder
+        .without_level
+        .iter()
+        .map(|(subject, cell)| {
+            let text = texts(ColumnKind::Accuracy, &score(summary, Some(cell))).concat();
+            let interval = cell.score.map(|share| format!(" [{}]", ends(share)));
+            let text = text + &interval.unwrap_or_default();
+            let (scored, planned) = (cell.scored(), cell.planned);
+            let of = if scored == planned {
+                String::new()
+            } else {
+                format!(" of {planned}")
+            };
+            format!("{} without images: {text}, n {scored}{of}", subject.model)
+        })
+        .collect()
 }
 
 /// The scores of one series, with a row for each split and category. In the terminal, the tables of all series are one table,

@@ -51,19 +51,19 @@ pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
         };
         let condition = subject.condition();
         let stem = file_name(&format!("{}-{condition}", subject.model));
-        let answers = answers_by_question
+        let answers: Vec<GivenAnswer<'_>> = answers_by_question
             .iter()
             .map(|(question, reported)| GivenAnswer {
                 question_id: &report.questions[*question].id.0,
                 answer: reported.answer.as_deref(),
                 condition: Some(&*condition).filter(|condition| *condition != "L0"),
-            });
-        let answers: Vec<GivenAnswer<'_>> = answers.collect();
+            })
+            .collect();
         files.push((format!("{FOLDER}/{stem}.json"), json_file(&answers)?));
         let Some(judge) = report.judge else {
             continue;
         };
-        let marks = answers_by_question
+        let marks: serde_json::Map<String, serde_json::Value> = answers_by_question
             .iter()
             .filter_map(|(question, reported)| {
                 let mark = match reported.outcome {
@@ -75,8 +75,7 @@ pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
                     }
                 };
                 Some((&*report.questions[*question].id.0, mark))
-            });
-        let marks: serde_json::Map<String, serde_json::Value> = marks
+            })
             .map(|(id, mark)| (id.to_owned(), mark.into()))
             .collect();
         let name = format!("{FOLDER}/{stem}-{}-metrics.json", file_name(judge));

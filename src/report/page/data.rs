@@ -192,8 +192,11 @@ fn pack(data: &PageData<'_>) -> Result<String> {
 /// Texts, all cut to the greatest length with which they have room.
 pub(in crate::report) fn shortened(texts: &[&str], limit: usize) -> Vec<String> {
     let fits = |longest: &&usize| {
-        let lengths = texts.iter().map(|text| text.len().min(**longest));
-        lengths.sum::<usize>() <= limit
+        texts
+            .iter()
+            .map(|text| text.len().min(**longest))
+            .sum::<usize>()
+            <= limit
     };
     let longest = MAX_REPLY_CHARS
         .iter()
@@ -214,9 +217,10 @@ pub(in crate::report) fn shortened(texts: &[&str], limit: usize) -> Vec<String> 
 
 /// The size of each frame that small copies state.
 pub(in crate::report) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec<Option<[u32; 2]>> {
-    let stated = thumbnails.iter();
-    let stated = stated.filter_map(|thumbnail| Some((&*thumbnail.frame.0, thumbnail.size?)));
-    let stated: HashMap<&str, [u32; 2]> = stated.collect();
+    let stated: HashMap<&str, [u32; 2]> = thumbnails
+        .iter()
+        .filter_map(|thumbnail| Some((&*thumbnail.frame.0, thumbnail.size?)))
+        .collect();
     frames
         .iter()
         .map(|frame| stated.get(frame).copied())
@@ -226,15 +230,17 @@ pub(in crate::report) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec
 /// The name of each level, in the order of tables, and its severity in words: `6 EV`.
 pub(in crate::report) fn levels(levels: impl Iterator<Item = AxisLevel>) -> Vec<[String; 2]> {
     let levels: BTreeSet<AxisLevel> = levels.collect();
-    let named = levels.into_iter().map(|level| {
-        let unit = level.axis().unwrap_or(Axis::LIGHT).unit;
-        let severity = match level {
-            AxisLevel::PAIR => "by frame".to_owned(),
-            _ => format!("{} {unit}", level.value()),
-        };
-        [level.to_string(), severity]
-    });
-    named.collect()
+    levels
+        .into_iter()
+        .map(|level| {
+            let unit = level.axis().unwrap_or(Axis::LIGHT).unit;
+            let severity = match level {
+                AxisLevel::PAIR => "by frame".to_owned(),
+                _ => format!("{} {unit}", level.value()),
+            };
+            [level.to_string(), severity]
+        })
+        .collect()
 }
 
 /// The thumbnails that a page shows of these frames, of which it may have no room for all.
@@ -252,14 +258,15 @@ pub(crate) fn shown_thumbnails<'a>(
         let number = numbers.get(&*thumbnail.frame.0)?;
         shown.get(number)?.get(&thumbnail.condition.to_string())
     };
-    let kept = all.iter().filter_map(|thumbnail| {
-        let objects = picture(thumbnail)?.objects.to_vec();
-        Some(Thumbnail {
-            objects,
-            ..thumbnail.clone()
+    all.iter()
+        .filter_map(|thumbnail| {
+            let objects = picture(thumbnail)?.objects.to_vec();
+            Some(Thumbnail {
+                objects,
+                ..thumbnail.clone()
+            })
         })
-    });
-    kept.collect()
+        .collect()
 }
 
 /// Thumbnails of as many frames as the size limit allows, by the index of the frame; crops of things as there is room behind them.
@@ -281,8 +288,10 @@ pub(in crate::report) fn thumbnails<'a>(
         let Some(number) = numbers.get(&*frame.0) else {
             continue;
         };
-        let sizes = thumbnails.iter().map(|t| t.small.len() + t.crop.len());
-        let size: usize = sizes.sum();
+        let size: usize = thumbnails
+            .iter()
+            .map(|t| t.small.len() + t.crop.len())
+            .sum();
         if size > bytes_left {
             break;
         }
@@ -291,8 +300,11 @@ pub(in crate::report) fn thumbnails<'a>(
     }
     let mut by_number = BTreeMap::new();
     for (number, thumbnails) in kept {
-        let crops = thumbnails.iter().flat_map(|thumbnail| &thumbnail.objects);
-        let size: usize = crops.map(|object| object.crop.len()).sum();
+        let size: usize = thumbnails
+            .iter()
+            .flat_map(|thumbnail| &thumbnail.objects)
+            .map(|object| object.crop.len())
+            .sum();
         let has_room = size <= bytes_left;
         bytes_left -= if has_room { size } else { 0 };
         let pictures = thumbnails.into_iter().map(|t| {

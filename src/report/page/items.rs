@@ -233,13 +233,15 @@ fn confusions_of<'a>(
     grid: &Grid<'_>,
     confusions: &'a [confusion::Confusion],
 ) -> Vec<Confusion<'a>> {
-    let named = confusions.iter().filter_map(|confusion| {
-        Some(Confusion {
-            subject: grid.find(&confusion.subject)?,
-            family: confusion.family.name(),
-            labels: &confusion.labels,
-            counts: &confusion.counts,
+    confusions
+        .iter()
+        .filter_map(|confusion| {
+            Some(Confusion {
+                subject: grid.find(&confusion.subject)?,
+                family: confusion.family.name(),
+                labels: &confusion.labels,
+                counts: &confusion.counts,
+            })
         })
-    });
-    named.collect()
+        .collect()
 }

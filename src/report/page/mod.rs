@@ -302,16 +302,18 @@ fn fact(name: &str, value: impl Into<String>) -> (String, String) {
 
 fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
     let texts = |map: &std::collections::BTreeMap<String, serde_json::Value>| {
-        let rows = map.iter().map(|(name, value)| match value {
-            serde_json::Value::String(text) => (name.clone(), text.clone()),
-            serde_json::Value::Null => (name.clone(), "not set".to_owned()),
-            other => (name.clone(), other.to_string()),
-        });
-        rows.collect::<Vec<_>>()
+        map.iter()
+            .map(|(name, value)| match value {
+                serde_json::Value::String(text) => (name.clone(), text.clone()),
+                serde_json::Value::Null => (name.clone(), "not set".to_owned()),
+                other => (name.clone(), other.to_string()),
+            })
+            .collect::<Vec<_>>()
     };
-    let platform = manifest.platform.iter();
-    let platform = platform.map(|(name, value)| (name.clone(), value.clone()));
-    platform
+    manifest
+        .platform
+        .iter()
+        .map(|(name, value)| (name.clone(), value.clone()))
         .chain(texts(&manifest.identity))
         .chain(texts(&manifest.settings))
         .collect()

@@ -27,13 +27,13 @@ pub(super) fn sections<'a>(
     figures: &'a [Figure],
     thumbnails: &[Thumbnail],
 ) -> Vec<PageSection<'a>> {
-    let sections = sections
+    sections
         .iter()
         .filter_map(|&(id, title, note, figure_names)| {
-            let figures = figures
+            let figures: Vec<&Figure> = figures
                 .iter()
-                .filter(|figure| figure_names.contains(&figure.name));
-            let figures: Vec<&Figure> = figures.collect();
+                .filter(|figure| figure_names.contains(&figure.name))
+                .collect();
             let samples = match id {
                 ENHANCERS => samples(thumbnails),
                 _ => Vec::new(),
@@ -48,6 +48,6 @@ pub(super) fn sections<'a>(
                 samples,
                 tables,
             })
-        });
-    sections.collect()
+        })
+        .collect()
 }

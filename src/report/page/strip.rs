@@ -76,16 +76,15 @@ impl Strip {
         let rows = rows(grid, &thumbnails);
         let models = models(grid);
         let changes = |item: usize| {
-            let places = rows
-                .iter()
-                .flat_map(|row| levels.iter().map(move |level| (row, *level)));
-            let lost = places.filter(|(row, level)| {
-                models.iter().any(|model| {
-                    row.seen(grid, model, item, *level).is_right() == Some(false)
-                        && row.seen(grid, model, item, AxisLevel::L0).is_right() == Some(true)
+            rows.iter()
+                .flat_map(|row| levels.iter().map(move |level| (row, *level)))
+                .filter(|(row, level)| {
+                    models.iter().any(|model| {
+                        row.seen(grid, model, item, *level).is_right() == Some(false)
+                            && row.seen(grid, model, item, AxisLevel::L0).is_right() == Some(true)
+                    })
                 })
-            });
-            lost.count()
+                .count()
         };
         let items = grid.items.iter().enumerate();
         // Of equal ones the first.

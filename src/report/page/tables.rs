@@ -51,34 +51,35 @@ struct PageCell {
 
 /// The tables of a section that have a row.
 pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTable<'a>> {
-    let in_section = tables.iter().filter(|table| table.section == section);
-    let tables = in_section.map(|table| {
-        let head = table.columns.iter();
-        let all = table.rows_in(TableFormat::Page);
-        let (unshown, shown): (Vec<&TableRow>, Vec<&TableRow>) =
-            all.partition(|row| is_unshown(row));
-        let (unshown, shown) = match unshown.len() {
-            0..LEAST_UNSHOWN => (Vec::new(), table.rows_in(TableFormat::Page).collect()),
-            _ => (unshown, shown),
-        };
-        let rows = page_rows(table, &shown);
-        PageTable {
-            caption: &table.caption,
-            folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,
-            unshown: (!unshown.is_empty()).then(|| UnshownRows {
-                summary: summary(table, &unshown),
-                rows: page_rows(table, &unshown),
-            }),
-            foot: table.foot.as_deref(),
-            head: head
-                .filter_map(|column| column.heads.page.as_deref())
-                // A column without a head holds verdicts; whoever hears the table needs its name.
-                .map(|head| if head.is_empty() { "verdict" } else { head })
-                .collect(),
-            rows,
-        }
-    });
     tables
+        .iter()
+        .filter(|table| table.section == section)
+        .map(|table| {
+            let head = table.columns.iter();
+            let all = table.rows_in(TableFormat::Page);
+            let (unshown, shown): (Vec<&TableRow>, Vec<&TableRow>) =
+                all.partition(|row| is_unshown(row));
+            let (unshown, shown) = match unshown.len() {
+                0..LEAST_UNSHOWN => (Vec::new(), table.rows_in(TableFormat::Page).collect()),
+                _ => (unshown, shown),
+            };
+            let rows = page_rows(table, &shown);
+            PageTable {
+                caption: &table.caption,
+                folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,
+                unshown: (!unshown.is_empty()).then(|| UnshownRows {
+                    summary: summary(table, &unshown),
+                    rows: page_rows(table, &unshown),
+                }),
+                foot: table.foot.as_deref(),
+                head: head
+                    .filter_map(|column| column.heads.page.as_deref())
+                    // A column without a head holds verdicts; whoever hears the table needs its name.
+                    .map(|head| if head.is_empty() { "verdict" } else { head })
+                    .collect(),
+                rows,
+            }
+        })
         .filter(|table| !table.rows.is_empty() || table.unshown.is_some())
         .collect()
 }
@@ -94,19 +95,21 @@ fn is_unshown(row: &TableRow) -> bool {
 /// Rows as the template reads them, with a heading where a group begins or ends.
 fn page_rows<'a>(table: &'a Table, rows: &[&'a TableRow]) -> Vec<PageRow<'a>> {
     let mut above: Option<&str> = None;
-    let rows = rows.iter().map(|row| {
-        let group = row.group.as_deref();
-        let heading = (group != above).then(|| group.unwrap_or_default());
-        above = group;
-        let cells = table.cells(row);
-        let cells = cells.filter(|(column, _)| column.heads.page.is_some());
-        let cells = cells.map(|(column, cell)| text(column.kind, cell));
-        PageRow {
-            heading,
-            cells: cells.collect(),
-        }
-    });
-    rows.collect()
+    rows.iter()
+        .map(|row| {
+            let group = row.group.as_deref();
+            let heading = (group != above).then(|| group.unwrap_or_default());
+            above = group;
+            let cells = table.cells(row);
+            let cells = cells
+                .filter(|(column, _)| column.heads.page.is_some())
+                .map(|(column, cell)| text(column.kind, cell));
+            PageRow {
+                heading,
+                cells: cells.collect(),
+            }
+        })
+        .collect()
 }
 
 /// The number of rows in which nothing is shown, and the largest difference among them with the texts that stand before it.

@@ -13,8 +13,10 @@ use darkqa_questions::summary::{ClassCoverage, QuestionSummary};
 /// If the figure cannot be written.
 pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
     let classes = |title: &str, count: fn(&ClassCoverage) -> u64| {
-        let counts = summary.classes.iter();
-        let counts = counts.map(|(class, coverage)| (class.clone(), count(coverage)));
+        let counts = summary
+            .classes
+            .iter()
+            .map(|(class, coverage)| (class.clone(), count(coverage)));
         CountPanel::ranked(title, counts)
     };
     let families = summary.candidates.iter();

@@ -69,13 +69,15 @@ pub(crate) fn table(summary: &QuestionSummary) -> String {
 
 /// The most frequent reasons for rejected candidates, with counts.
 fn reasons(candidates: &CandidateCounts) -> String {
-    let rejected = candidates.fallen.iter();
-    let mut rejected: Vec<(String, u64)> = rejected
+    let mut rejected: Vec<(String, u64)> = candidates
+        .fallen
+        .iter()
         .map(|(reason, count)| (variant_words(reason), *count))
         .collect();
     rejected.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-    let reasons = rejected.iter().take(REASONS);
-    let reasons: Vec<String> = reasons
+    let reasons: Vec<String> = rejected
+        .iter()
+        .take(REASONS)
         .map(|(reason, count)| format!("{reason} {count}"))
         .collect();
     reasons.join(", ")

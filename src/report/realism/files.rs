@@ -36,8 +36,9 @@ impl PairRow<'_> {
 pub(crate) fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
     let rows = pairs.iter().flat_map(|pair| {
         let noise = pair.noise.iter().map(Some);
-        let methods = std::iter::once(None).chain(noise);
-        methods.map(|noise| PairRow { pair, noise })
+        std::iter::once(None)
+            .chain(noise)
+            .map(|noise| PairRow { pair, noise })
     });
     let table = TableBuilder::new("pairs", rows)
         .column(Text, "csv pair", |row| row.pair.pair.clone())
@@ -78,8 +79,11 @@ pub(crate) struct PooledResiduals {
 /// CSV file with the mean and standard deviation of real and synthetic residuals by clean code.
 pub(crate) fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
     let rows = residuals.noise.iter().flat_map(|(method, noise)| {
-        let codes = residuals.real.by_code().zip(noise.by_code());
-        codes.map(move |(real, noise)| (method, real, noise))
+        residuals
+            .real
+            .by_code()
+            .zip(noise.by_code())
+            .map(move |(real, noise)| (method, real, noise))
     });
     let table = TableBuilder::new("residuals", rows)
         .column(Text, "csv code", |(_, (code, ..), _)| code.to_string())
@@ -125,9 +129,9 @@ fn histogram(
         .split(|(_, share)| *share <= MIN_SHARE)
         .filter(|run| !run.is_empty())
         .map(|run| {
-            let places = run.iter();
-            let places = places.map(|(size, share)| [f64::from(*size), libm::log10(*share)]);
-            places.collect::<Vec<_>>()
+            run.iter()
+                .map(|(size, share)| [f64::from(*size), libm::log10(*share)])
+                .collect::<Vec<_>>()
         })
         .partition(|run| run.len() == 1);
     PointSeries {

@@ -53,8 +53,12 @@ fn mean(fit: &ReadingFit, gains: &PooledGain, factor: f64) -> String {
         let [low, high] = ends.map(&number);
         return format!("{} ({low} to {high})", number(*value));
     }
-    let values = fit.pairs.iter().filter_map(|pair| pair.fit.fitted());
-    values.map(number).collect::<Vec<_>>().join(", ")
+    fit.pairs
+        .iter()
+        .filter_map(|pair| pair.fit.fitted())
+        .map(number)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// A line of text for each pair and each light reading.

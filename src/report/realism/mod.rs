@@ -98,8 +98,10 @@ impl LeftOut {
             (&self.swapped, "left out as swapped"),
             (&self.two_scenes, "left out as images of two scenes"),
         ];
-        let parts = parts.into_iter().filter(|(names, _)| !names.is_empty());
-        parts.map(|(names, why)| format!("{} {why}", counted(names.len(), "pair")))
+        parts
+            .into_iter()
+            .filter(|(names, _)| !names.is_empty())
+            .map(|(names, why)| format!("{} {why}", counted(names.len(), "pair")))
     }
 }
 
@@ -223,11 +225,14 @@ impl RealismSummary {
             "D_KL is least with more noise than a picture has, because residuals also hold misalignment and tone: --fit goes by the spread of smooth blocks, never by D_KL"
                 .to_owned(),
         );
-        let clean = self.noise.iter().map(|row| {
-            let psnr = mean_text(&row.clean_psnr, 2);
-            format!("{} {psnr} dB", row.method.reading)
-        });
-        let mut clean: Vec<String> = clean.collect();
+        let mut clean: Vec<String> = self
+            .noise
+            .iter()
+            .map(|row| {
+                let psnr = mean_text(&row.clean_psnr, 2);
+                format!("{} {psnr} dB", row.method.reading)
+            })
+            .collect();
         clean.dedup();
         notes.push(format!(
             "drop {} EV; PSNR of the sensor branch without noise: {}",

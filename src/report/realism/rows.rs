@@ -59,24 +59,28 @@ impl NoiseRow {
     /// The rows of all ways of making noise, which are the same, in the same order, for all pairs.
     pub(super) fn all(pairs: &[&PairComparison]) -> Vec<Self> {
         let first = pairs.iter().take(1).flat_map(|pair| &pair.noise);
-        let rows = first.enumerate().filter_map(|(index, first)| {
-            let of_pairs = pairs.iter().filter_map(|pair| {
-                let noise = pair.noise.get(index)?;
-                Some((&pair.exposure, noise))
-            });
-            let of_pairs: Vec<(&ImageComparison, &NoiseComparison)> = of_pairs.collect();
-            Self::new(&first.method, &of_pairs)
-        });
-        rows.collect()
+        first
+            .enumerate()
+            .filter_map(|(index, first)| {
+                let of_pairs: Vec<(&ImageComparison, &NoiseComparison)> = pairs
+                    .iter()
+                    .filter_map(|pair| {
+                        let noise = pair.noise.get(index)?;
+                        Some((&pair.exposure, noise))
+                    })
+                    .collect();
+                Self::new(&first.method, &of_pairs)
+            })
+            .collect()
     }
 
     fn new(method: &NoiseMethod, pairs: &[(&ImageComparison, &NoiseComparison)]) -> Option<Self> {
         let images: Vec<&ImageComparison> = pairs.iter().map(|(_, noise)| &noise.image).collect();
         let clean: Vec<f64> = pairs.iter().map(|(_, noise)| noise.clean_psnr).collect();
-        let differences = pairs
+        let differences: Vec<[f64; 3]> = pairs
             .iter()
-            .map(|(exposure, noise)| noise.image.differences(exposure));
-        let differences: Vec<[f64; 3]> = differences.collect();
+            .map(|(exposure, noise)| noise.image.differences(exposure))
+            .collect();
         let mean = |index: usize| {
             let numbers: Vec<f64> = differences.iter().map(|numbers| numbers[index]).collect();
             Mean::from_values(&numbers)

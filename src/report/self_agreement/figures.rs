@@ -92,15 +92,17 @@ fn panels(
             None => panels.push((title, vec![line])),
         }
     }
-    let panels = panels.into_iter().map(|(title, mut lines)| {
-        add(&mut lines);
-        Panel {
-            title: format!("{title}, n {}", found.items()),
-            lines,
-            model: None,
-        }
-    });
-    panels.collect()
+    panels
+        .into_iter()
+        .map(|(title, mut lines)| {
+            add(&mut lines);
+            Panel {
+                title: format!("{title}, n {}", found.items()),
+                lines,
+                model: None,
+            }
+        })
+        .collect()
 }
 
 fn line(
@@ -109,10 +111,10 @@ fn line(
     cells: &SeriesByLevel<'_, AgreementCell>,
     number: impl Fn(&AgreementCell) -> Option<Estimate>,
 ) -> PlotLine {
-    let points = cells
+    let points: Vec<(AxisLevel, Estimate)> = cells
         .iter()
-        .filter_map(|(level, cell)| Some((*level, number(cell)?)));
-    let points: Vec<(AxisLevel, Estimate)> = points.collect();
+        .filter_map(|(level, cell)| Some((*level, number(cell)?)))
+        .collect();
     PlotLine {
         name: series.model.to_owned(),
         style: style(found, series.model),
@@ -130,15 +132,17 @@ fn style(found: &SelfAgreement<'_>, model: &str) -> LineStyle {
 
 /// A flat line for each model that was asked without images.
 fn floors(found: &SelfAgreement<'_>) -> Vec<PlotLine> {
-    let floors = found.whole().filter(|cell| cell.role() == CellRole::Floor);
-    let lines = floors.filter_map(|cell| {
-        let model = &*cell.subject.model;
-        Some(PlotLine {
-            name: format!("{model} without images"),
-            style: style(found, model),
-            content: PanelContent::Flat(cell.agreement?.value),
-            model: Some(model.to_owned()),
+    found
+        .whole()
+        .filter(|cell| cell.role() == CellRole::Floor)
+        .filter_map(|cell| {
+            let model = &*cell.subject.model;
+            Some(PlotLine {
+                name: format!("{model} without images"),
+                style: style(found, model),
+                content: PanelContent::Flat(cell.agreement?.value),
+                model: Some(model.to_owned()),
+            })
         })
-    });
-    lines.collect()
+        .collect()
 }

@@ -140,7 +140,7 @@ pub(super) fn levels(found: &SelfAgreement<'_>) -> Vec<Table> {
     ladder.set = found.set.light;
     let ladders = ladder.by_axis();
     let last = ladders.len().saturating_sub(1);
-    let tables = ladders
+    ladders
         .into_iter()
         .enumerate()
         .map(|(index, (axis, ladder))| {
@@ -149,8 +149,8 @@ pub(super) fn levels(found: &SelfAgreement<'_>) -> Vec<Table> {
                 table.notes = notes(found);
             }
             table
-        });
-    tables.collect()
+        })
+        .collect()
 }
 
 fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementCell>) -> Table {
@@ -159,8 +159,9 @@ fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, Agreeme
     levels.insert(AxisLevel::L0);
     let mut rows = Vec::new();
     for (series, cells) in &ladder.series {
-        let measures = Measure::ALL.into_iter();
-        let measures = measures.filter(|measure| measure.says_something(found, cells));
+        let measures = Measure::ALL
+            .into_iter()
+            .filter(|measure| measure.says_something(found, cells));
         let model = found.grid.listing.label(series.model);
         for measure in measures {
             let cell = |level: &AxisLevel| match cells.get(level) {

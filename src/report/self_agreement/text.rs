@@ -61,10 +61,10 @@ pub(super) fn head(report: &AgreementReport<'_>) -> String {
         [one] => (*one).to_owned(),
         several => counted(several.len(), "model"),
     };
-    let questions = items.iter().map(|item| &*item.asked.question);
-    let questions: std::collections::BTreeSet<_> = questions.collect();
-    let frames = items.iter().map(|item| &*item.asked.frame);
-    let frames: std::collections::BTreeSet<_> = frames.collect();
+    let questions: std::collections::BTreeSet<_> =
+        items.iter().map(|item| &*item.asked.question).collect();
+    let frames: std::collections::BTreeSet<_> =
+        items.iter().map(|item| &*item.asked.frame).collect();
     let replies: usize = found.health.iter().map(|health| health.replies).sum();
     let failed: usize = found.health.iter().map(Health::failures).sum();
     format!(

@@ -114,11 +114,14 @@ pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String
         text += &wrapped(" ", &format!("{enhancer}: {training}"), "   ");
     }
     for model in models.iter().filter(|model| **model != CHANCE) {
-        let facts = listing.columns().iter().map(|column| {
-            let fact = Some(listing.fact(*column, model)).filter(|fact| !fact.is_empty());
-            format!("{} {}", column.head(), fact.unwrap_or("–"))
-        });
-        let facts: Vec<String> = facts.collect();
+        let facts: Vec<String> = listing
+            .columns()
+            .iter()
+            .map(|column| {
+                let fact = Some(listing.fact(*column, model)).filter(|fact| !fact.is_empty());
+                format!("{} {}", column.head(), fact.unwrap_or("–"))
+            })
+            .collect();
         if !facts.is_empty() {
             text += &wrapped(" ", &format!("{model}: {}", facts.join(" · ")), "   ");
         }

@@ -19,8 +19,11 @@ impl NameColumn {
     pub(super) fn new<'a>(names: impl Iterator<Item = &'a str>, width: usize) -> Self {
         let names: BTreeSet<&str> = names.collect();
         let mut seen = BTreeSet::new();
-        let cut = names.into_iter().map(|name| shortened(name, width));
-        let alike = cut.filter(|name| !seen.insert(name.clone())).collect();
+        let alike = names
+            .into_iter()
+            .map(|name| shortened(name, width))
+            .filter(|name| !seen.insert(name.clone()))
+            .collect();
         Self { width, alike }
     }
 
@@ -36,8 +39,10 @@ impl NameColumn {
             text = format!(" {name}\n");
             short.clear();
         }
-        let values = values.map(|value| format!("{value:>LEVEL$}"));
-        let values = values.collect::<Vec<_>>().concat();
+        let values = values
+            .map(|value| format!("{value:>LEVEL$}"))
+            .collect::<Vec<_>>()
+            .concat();
         let line = format!(" {short:<width$}{values}  {reach}");
         text + line.trim_end() + "\n"
     }

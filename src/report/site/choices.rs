@@ -71,8 +71,11 @@ impl ChoiceRow {
     }
 
     fn below_text(&self, by: &str) -> String {
-        let levels = self.below.iter().map(ToString::to_string);
-        levels.collect::<Vec<_>>().join(by)
+        self.below
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join(by)
     }
 }
 

@@ -42,17 +42,18 @@ pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
         if is_clean && !is_alone(model) {
             continue;
         }
-        let own = seeing().filter(|cell| {
-            let subject = &cell.subject;
-            let is_own = subject.variant == **variant && subject.enhancer.as_ref() == *enhancer;
-            // The untouched frames are where every light begins; those of an enhancer are its own.
-            let is_start = subject.variant.is_untouched() && subject.enhancer.is_none();
-            subject.model == **model && (is_own || is_start && enhancer.is_none())
-        });
-        let levels = own.filter_map(|cell| {
-            let level = cell.subject.level?;
-            Some((level, (cell.score, cell.scored(), cell.planned)))
-        });
+        let levels = seeing()
+            .filter(|cell| {
+                let subject = &cell.subject;
+                let is_own = subject.variant == **variant && subject.enhancer.as_ref() == *enhancer;
+                // The untouched frames are where every light begins; those of an enhancer are its own.
+                let is_start = subject.variant.is_untouched() && subject.enhancer.is_none();
+                subject.model == **model && (is_own || is_start && enhancer.is_none())
+            })
+            .filter_map(|cell| {
+                let level = cell.subject.level?;
+                Some((level, (cell.score, cell.scored(), cell.planned)))
+            });
         let mut blind = cells()
             .filter(|cell| cell.subject.view == Some(View::Blind) && cell.subject.model == **model);
         rows.push(OpenRow {

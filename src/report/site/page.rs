@@ -118,10 +118,13 @@ fn digests(group: &SiteGroup) -> String {
         ("light", &digests.light),
         ("prompts", &digests.prompts),
     ];
-    let named = named.iter().filter(|(_, digest)| !digest.is_empty());
-    let named = named.map(|(name, digest)| {
-        let first: String = digest.chars().take(8).collect();
-        format!("{name} {}", readable(&first))
-    });
-    named.collect::<Vec<_>>().join(" · ")
+    named
+        .iter()
+        .filter(|(_, digest)| !digest.is_empty())
+        .map(|(name, digest)| {
+            let first: String = digest.chars().take(8).collect();
+            format!("{name} {}", readable(&first))
+        })
+        .collect::<Vec<_>>()
+        .join(" · ")
 }

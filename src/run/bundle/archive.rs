@@ -87,8 +87,9 @@ mod tests {
     fn the_same_files_in_any_order_are_the_same_bytes() {
         let files = [("b.txt", "two"), ("a/c.txt", "one")];
         let named = |files: Vec<(&str, &str)>| {
-            let files = files.into_iter();
-            let files = files.map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
+            let files = files
+                .into_iter()
+                .map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
             zipped("run", files.collect()).unwrap()
         };
         let bytes = named(files.to_vec());

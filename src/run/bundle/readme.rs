@@ -138,13 +138,14 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
         let is_of_images = manifest.images.contains_key(flag.trim_start_matches("--"));
         is_of_images || words.iter().any(|known| known == flag)
     };
-    let identity = manifest.identity.iter();
-    let identity = identity.filter(|(flag, value)| {
-        // Digests stand for files, which the flags of images name.
-        let is_plain = value.as_str().is_none_or(|text| text.len() < 64);
-        flag.starts_with("--") && !has(flag) && is_plain && *flag != "--data"
-    });
-    let more: Vec<String> = identity
+    let more: Vec<String> = manifest
+        .identity
+        .iter()
+        .filter(|(flag, value)| {
+            // Digests stand for files, which the flags of images name.
+            let is_plain = value.as_str().is_none_or(|text| text.len() < 64);
+            flag.starts_with("--") && !has(flag) && is_plain && *flag != "--data"
+        })
         .flat_map(|(flag, value)| flag_words(flag, value))
         .collect();
     words.extend(more);
@@ -156,9 +157,13 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
 
 /// The settings of the models at endpoints, by their names.
 fn remote_models(manifest: &RunManifest) -> BTreeMap<&String, &Value> {
-    let models = manifest.columns.get("model").into_iter().flatten();
-    let remote = models.filter(|(_, content)| content.get("--base-url").is_some());
-    remote.collect()
+    manifest
+        .columns
+        .get("model")
+        .into_iter()
+        .flatten()
+        .filter(|(_, content)| content.get("--base-url").is_some())
+        .collect()
 }
 
 /// A file of models that asks for the same, if flags cannot: if names are not those at the endpoints, or settings differ.

@@ -155,12 +155,14 @@ mod tests {
         };
         let repeats = choice_order.repeats(Truths::Known);
         let arranged = arrange(&question(id), choice_order, repeats, 7).unwrap();
-        let shown = arranged.iter().map(|arranged| {
-            let choices = &arranged.question.choices;
-            assert_eq!(choices.texts()[choices.truth().unwrap()], "b");
-            (choices.texts().concat(), arranged.repeat)
-        });
-        shown.collect()
+        arranged
+            .iter()
+            .map(|arranged| {
+                let choices = &arranged.question.choices;
+                assert_eq!(choices.texts()[choices.truth().unwrap()], "b");
+                (choices.texts().concat(), arranged.repeat)
+            })
+            .collect()
     }
 
     #[test]

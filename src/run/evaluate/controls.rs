@@ -41,12 +41,15 @@ impl AddedControls {
         } else {
             Control::Tiles
         };
-        let controls = Control::ALL.into_iter().filter(|control| {
-            let is_wanted = config.observer_controls || *control == standing;
-            is_wanted && (has_other_scene || *control != Control::OtherRoom)
-        });
-        let names = controls.map(|control| ModelName::Observer(Some(control)));
-        let names: Vec<ModelName> = names.filter(|name| !ask.shows_images_to(name)).collect();
+        let names: Vec<ModelName> = Control::ALL
+            .into_iter()
+            .filter(|control| {
+                let is_wanted = config.observer_controls || *control == standing;
+                is_wanted && (has_other_scene || *control != Control::OtherRoom)
+            })
+            .map(|control| ModelName::Observer(Some(control)))
+            .filter(|name| !ask.shows_images_to(name))
+            .collect();
         if !has_other_scene {
             tracing::warn!(
                 "all frames are of one scene, so observer:other-room is not possible; observer:tiles is asked instead: the observer \

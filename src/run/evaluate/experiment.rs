@@ -68,10 +68,13 @@ impl Experiment for ChoiceSetup<'_> {
         // In a shard, questions about frames of other shards are asked with images of this one.
         let ids: HashSet<&QuestionId> =
             self.questions.iter().map(|question| &question.id).collect();
-        let others = self.with_other_rooms.iter();
-        let others = others.filter(|question| !ids.contains(&question.id));
-        let questions = self.questions.iter().chain(others);
-        questions
+        let others = self
+            .with_other_rooms
+            .iter()
+            .filter(|question| !ids.contains(&question.id));
+        self.questions
+            .iter()
+            .chain(others)
             .map(|question| RunQuestion {
                 image: self.digests.get(&question.frame).copied(),
                 images: self.dataset.several(&question.frame).to_vec(),
@@ -85,8 +88,10 @@ impl Experiment for ChoiceSetup<'_> {
     }
 
     fn power(&self) -> Option<PowerForecast> {
-        let models = self.models.iter();
-        let models = models.filter(|model| model.view == View::Image && !is_reference(&model.name));
+        let models = self
+            .models
+            .iter()
+            .filter(|model| model.view == View::Image && !is_reference(&model.name));
         let asked = asked_sets(&self.conditions, models.count());
         power(&self.dataset, &self.questions, asked)
     }
@@ -109,8 +114,9 @@ impl Experiment for ChoiceSetup<'_> {
             (self.config.image_place == ImagePlace::BeforeWords)
                 .then_some(("--image-first", true.into())),
         ];
-        let fields = fields.into_iter().flatten();
         fields
+            .into_iter()
+            .flatten()
             .map(|(field, value)| (field.to_owned(), value))
             .chain(identity::images(&self.recipe))
             .collect()

@@ -15,8 +15,10 @@ pub(super) struct OtherRooms(BTreeMap<FrameId, FrameId>);
 impl OtherRooms {
     /// The other frames; `None` if all frames are of one scene. A frame whose scene is not known (empty) is a scene by itself.
     pub(super) fn new(questions: &[Question], scene: impl Fn(&FrameId) -> String) -> Option<Self> {
-        let frames = first_asked(questions).into_iter();
-        let frames: Vec<&FrameId> = frames.map(|question| &question.frame).collect();
+        let frames: Vec<&FrameId> = first_asked(questions)
+            .into_iter()
+            .map(|question| &question.frame)
+            .collect();
         let scene_of = |frame: &&FrameId| {
             let scene = scene(frame);
             if scene.is_empty() {

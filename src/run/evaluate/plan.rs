@@ -104,18 +104,21 @@ pub(super) fn trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceIte
             others.extend(prompts(setup, question, Some(shown))?);
         }
     }
-    let plan = by_source.into_iter().enumerate().map(|(source, asked)| {
-        let shown = &setup.sources[source];
-        let shown = setup.conditions.iter().filter(|of| shown.can_show(of));
-        let all = std::iter::once(None).chain(shown.map(Some));
-        let groups =
-            all.filter_map(|condition| group(setup, source, condition, &asked).transpose());
-        Ok(SourcePlan {
-            source,
-            groups: groups.collect::<Result<_>>()?,
+    by_source
+        .into_iter()
+        .enumerate()
+        .map(|(source, asked)| {
+            let shown = &setup.sources[source];
+            let shown = setup.conditions.iter().filter(|of| shown.can_show(of));
+            let all = std::iter::once(None).chain(shown.map(Some));
+            let groups =
+                all.filter_map(|condition| group(setup, source, condition, &asked).transpose());
+            Ok(SourcePlan {
+                source,
+                groups: groups.collect::<Result<_>>()?,
+            })
         })
-    });
-    plan.collect()
+        .collect()
 }
 
 /// A question in each order of its choices, with the frame that is shown if it is not its own.
@@ -126,31 +129,32 @@ fn prompts(
 ) -> Result<Vec<QuestionPrompts>> {
     let (order, repeats) = (setup.config.order, setup.config.repeats);
     let arranged = arrange(question, order, repeats, setup.recipe.seed)?.into_iter();
-    let prompts = arranged.map(|arranged| {
-        let prompt = |view| {
-            let words = setup.config.prompts.render(view, &arranged.question)?;
-            let prompt = match (view, setup.config.image_place) {
-                (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
-                _ => Prompt::from_text(words.into()),
+    arranged
+        .map(|arranged| {
+            let prompt = |view| {
+                let words = setup.config.prompts.render(view, &arranged.question)?;
+                let prompt = match (view, setup.config.image_place) {
+                    (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
+                    _ => Prompt::from_text(words.into()),
+                };
+                let several = setup.dataset.several(&question.frame);
+                Ok(match view {
+                    View::Image if !several.is_empty() => prompt.with_places(ImagePlaces::Marked),
+                    View::Image | View::Blind => prompt,
+                })
             };
-            let several = setup.dataset.several(&question.frame);
-            Ok(match view {
-                View::Image if !several.is_empty() => prompt.with_places(ImagePlaces::Marked),
-                View::Image | View::Blind => prompt,
+            Ok(QuestionPrompts {
+                image: prompt(View::Image)?,
+                blind: prompt(View::Blind)?,
+                item: ChoiceItem {
+                    question: Arc::new(arranged.question),
+                    repeat: arranged.repeat,
+                    turn: arranged.turn,
+                    shown_frame: shown_frame.cloned(),
+                },
             })
-        };
-        Ok(QuestionPrompts {
-            image: prompt(View::Image)?,
-            blind: prompt(View::Blind)?,
-            item: ChoiceItem {
-                question: Arc::new(arranged.question),
-                repeat: arranged.repeat,
-                turn: arranged.turn,
-                shown_frame: shown_frame.cloned(),
-            },
         })
-    });
-    prompts.collect()
+        .collect()
 }
 
 /// The trials in a condition; `None` if no model is asked in it.

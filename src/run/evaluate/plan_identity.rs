@@ -45,8 +45,10 @@ pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Id
         Some(("--variant", json!(job.light.variants.to_string()))),
         Some(("--seed", json!(job.light.kinds.sensor.seed))),
     ];
-    let fields = fields.into_iter().flatten();
-    let fields = fields.map(|(field, value)| (field.to_owned(), value));
+    let fields = fields
+        .into_iter()
+        .flatten()
+        .map(|(field, value)| (field.to_owned(), value));
     Ok(fields.chain(light(config)).collect())
 }
 
@@ -55,15 +57,16 @@ fn light(config: &Evaluation) -> impl Iterator<Item = (String, Value)> {
     let job = &config.job;
     let recipe = Recipe::lossless(&job.light.kinds, &[]);
     let version = identity::images(&recipe).filter(|(field, _)| field == "synthesis");
-    let columns = identity::columns([], &recipe, job).into_iter();
-    let columns = columns.flat_map(|(column, values)| {
-        values.into_iter().flat_map(move |(name, content)| {
-            let place = format!("{column} {name}");
-            let settings = content.as_object().cloned().unwrap_or_default();
-            settings
-                .into_iter()
-                .map(move |(flag, value)| (format!("{flag} of the {place}"), value))
-        })
-    });
+    let columns = identity::columns([], &recipe, job)
+        .into_iter()
+        .flat_map(|(column, values)| {
+            values.into_iter().flat_map(move |(name, content)| {
+                let place = format!("{column} {name}");
+                let settings = content.as_object().cloned().unwrap_or_default();
+                settings
+                    .into_iter()
+                    .map(move |(flag, value)| (format!("{flag} of the {place}"), value))
+            })
+        });
     version.chain(columns).collect::<Vec<_>>().into_iter()
 }

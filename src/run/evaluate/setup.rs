@@ -264,10 +264,10 @@ fn file_places(
 
 /// The digest of the file of each source, or of all its files.
 fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
-    let digests = sources
+    sources
         .iter()
-        .filter_map(|source| Some((source.name.clone(), source.digest()?)));
-    digests.collect()
+        .filter_map(|source| Some((source.name.clone(), source.digest()?)))
+        .collect()
 }
 
 /// The models, opened; nothing is sent.

@@ -149,8 +149,11 @@ fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 
 /// Bytes of the files.
 fn bytes(files: &[PathBuf]) -> u64 {
-    let lengths = files.iter().filter_map(|file| file.metadata().ok());
-    lengths.map(|facts| facts.len()).sum()
+    files
+        .iter()
+        .filter_map(|file| file.metadata().ok())
+        .map(|facts| facts.len())
+        .sum()
 }
 
 fn reader(path: &Path) -> Result<McapReader<File>> {

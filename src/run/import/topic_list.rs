@@ -22,11 +22,10 @@ pub(super) fn listing(overview: &Overview) -> Result<Outcome> {
 /// One line for each topic that has images, and the number of others.
 fn lines(overview: &Overview) -> String {
     let width = |text: fn(&str, &TopicOverview) -> usize| {
-        let topics = overview
+        overview
             .topics
             .iter()
-            .filter(|(_, topic)| !topic.form.is_empty());
-        topics
+            .filter(|(_, topic)| !topic.form.is_empty())
             .map(|(name, topic)| text(name, topic))
             .max()
             .unwrap_or(0)

@@ -79,25 +79,27 @@ impl Experiment for OpenSetup<'_> {
             .iter()
             .map(|source| (&*source.name.0, source))
             .collect();
-        let questions = self.questions.iter().map(|question| {
-            let walk = walks.get(&*question.episode);
-            RunQuestion {
-                id: question.id.clone(),
-                place: self.file_places[&question.id],
-                scene: question.episode.clone(),
-                frame: FrameId(question.episode.clone()),
-                family: Family::from(&*question.category),
-                text: question.text.clone(),
-                choices: Vec::new(),
-                answer: Some(question.answer.clone()),
-                extra_answers: question.extra.clone(),
-                group: None,
-                evidence: Value::Null,
-                image: walk.and_then(|walk| walk.digest()),
-                images: Vec::new(),
-            }
-        });
-        questions.collect()
+        self.questions
+            .iter()
+            .map(|question| {
+                let walk = walks.get(&*question.episode);
+                RunQuestion {
+                    id: question.id.clone(),
+                    place: self.file_places[&question.id],
+                    scene: question.episode.clone(),
+                    frame: FrameId(question.episode.clone()),
+                    family: Family::from(&*question.category),
+                    text: question.text.clone(),
+                    choices: Vec::new(),
+                    answer: Some(question.answer.clone()),
+                    extra_answers: question.extra.clone(),
+                    group: None,
+                    evidence: Value::Null,
+                    image: walk.and_then(|walk| walk.digest()),
+                    images: Vec::new(),
+                }
+            })
+            .collect()
     }
 
     fn identity(&self) -> Identity {
@@ -158,24 +160,27 @@ impl Experiment for OpenSetup<'_> {
         if self.judge.is_none() {
             return Vec::new();
         }
-        let groups = remaining.iter().flat_map(|part| &part.groups);
-        let trials = groups.flat_map(|group| &group.trials);
+        let trials = remaining
+            .iter()
+            .flat_map(|part| &part.groups)
+            .flat_map(|group| &group.trials);
         // Each answer that has not arrived may differ from all others, so each needs a mark.
-        let marks = trials.filter_map(|trial| match &trial.item {
-            OpenItem::Answer(question) => {
-                let mark = OpenItem::Mark {
-                    question: Arc::clone(question),
-                    answer: ANSWER.into(),
-                };
-                Some(ExpectedRequest {
-                    model: 0,
-                    text_tokens: text_tokens(&prompt(question, ANSWER)),
-                    reply_tokens: mark.reply_tokens(),
-                })
-            }
-            OpenItem::Mark { .. } => None,
-        });
-        marks.collect()
+        trials
+            .filter_map(|trial| match &trial.item {
+                OpenItem::Answer(question) => {
+                    let mark = OpenItem::Mark {
+                        question: Arc::clone(question),
+                        answer: ANSWER.into(),
+                    };
+                    Some(ExpectedRequest {
+                        model: 0,
+                        text_tokens: text_tokens(&prompt(question, ANSWER)),
+                        reply_tokens: mark.reply_tokens(),
+                    })
+                }
+                OpenItem::Mark { .. } => None,
+            })
+            .collect()
     }
 
     fn report(

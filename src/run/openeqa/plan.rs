@@ -27,8 +27,8 @@ pub(super) fn answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenItem>>
         .enumerate()
         .map(|(source, walk)| {
             let questions = by_walk.remove(&*walk.name.0).unwrap_or_default();
-            let conditions = std::iter::once(None).chain(setup.conditions.iter().map(Some));
-            let groups = conditions
+            let groups = std::iter::once(None)
+                .chain(setup.conditions.iter().map(Some))
                 .filter_map(|condition| group(setup, source, condition, &questions).transpose());
             Ok(SourcePlan {
                 source,

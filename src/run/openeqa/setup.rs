@@ -147,18 +147,19 @@ fn judge(config: &Judge) -> Result<ModelUnderTest> {
 /// The distinct walks of the questions, in order of first use.
 fn names(questions: &[OpenQuestion]) -> Vec<String> {
     let mut seen = BTreeSet::new();
-    let first = questions
+    questions
         .iter()
-        .filter(|question| seen.insert(&question.episode));
-    first.map(|question| question.episode.clone()).collect()
+        .filter(|question| seen.insert(&question.episode))
+        .map(|question| question.episode.clone())
+        .collect()
 }
 
 /// Warns of the walks that have fewer frames than are shown: each image of a request is sent and paid for.
 fn warn_of_repeated(sources: &[Source]) {
-    let short = sources
+    let short: Vec<&Source> = sources
         .iter()
-        .filter(|source| source.order.len() > source.frames.len());
-    let short: Vec<&Source> = short.collect();
+        .filter(|source| source.order.len() > source.frames.len())
+        .collect();
     let most = short.iter().map(|source| source.frames.len()).max();
     if let (Some(first), Some(most)) = (short.first(), most) {
         tracing::warn!(
@@ -192,8 +193,9 @@ fn warn_of_unseen(sources: &[Source], questions: &[OpenQuestion]) -> Result<()> 
             format!("no walk can be shown: {problem}; DIR/EPISODE_HISTORY/*-rgb.png expected");
         return Err(Error::usage("--frames", problem));
     }
-    let unanswered = questions.iter();
-    let unanswered = unanswered.filter(|question| missing.contains_key(&*question.episode));
+    let unanswered = questions
+        .iter()
+        .filter(|question| missing.contains_key(&*question.episode));
     let walks: Vec<&str> = missing.keys().copied().collect();
     tracing::warn!(
         "{} of {} walks cannot be shown ({}); unanswered questions: {}; the first problem: {problem}",

@@ -46,14 +46,16 @@ fn looks(
     let (names, tally): (Vec<&FrameId>, _) = (dataset.frames().collect(), InputTally::default());
     let bar = progress.bar("looks", names.len());
     let looks = pool(threads.threads)?.install(|| {
-        let frames = names.par_iter().map(|name| {
-            let files = dataset.files(name)?;
-            tally.add(name, &files.note());
-            let look = FrameLook::new(&files.decode()?, palette);
-            bar.inc();
-            Ok(look)
-        });
-        frames.collect::<Result<Vec<FrameLook>>>()
+        names
+            .par_iter()
+            .map(|name| {
+                let files = dataset.files(name)?;
+                tally.add(name, &files.note());
+                let look = FrameLook::new(&files.decode()?, palette);
+                bar.inc();
+                Ok(look)
+            })
+            .collect::<Result<Vec<FrameLook>>>()
     });
     drop(bar);
     tally.warn();

@@ -128,10 +128,10 @@ fn folder(args: &QuestionsArgs) -> Result<&Path> {
     match &*args.data {
         [folder] => Ok(folder),
         folders => {
-            let sources = folders
+            let sources: String = folders
                 .iter()
-                .map(|folder| format!(" --src {}", shell_word(&folder.display().to_string())));
-            let sources: String = sources.collect();
+                .map(|folder| format!(" --src {}", shell_word(&folder.display().to_string())))
+                .collect();
             let problem = format_args!(
                 "one folder expected, which a run takes with its questions; darkqa-eval import folder{sources} --out JOINED makes one of {}",
                 folders.len()
@@ -309,12 +309,14 @@ fn measured(
     let bar = progress.bar("frames", names.len());
     let context = context(making, labels);
     let results: Vec<Option<FrameStatistics>> = workers.install(|| {
-        let frames = names.par_iter().map(|name| {
-            let found = measure_frame(making, dataset, labels, (&cache, &tally), context, name);
-            bar.inc();
-            found.map_err(|e| tracing::error!("{e}")).ok()
-        });
-        frames.collect()
+        names
+            .par_iter()
+            .map(|name| {
+                let found = measure_frame(making, dataset, labels, (&cache, &tally), context, name);
+                bar.inc();
+                found.map_err(|e| tracing::error!("{e}")).ok()
+            })
+            .collect()
     });
     drop(bar);
     tally.warn();

@@ -151,8 +151,11 @@ fn refuse_swapped_folders(
     place: &Path,
     lights: &[Result<PairLight>],
 ) -> Result<()> {
-    let known = lights.iter().flatten();
-    let known: Vec<&PairLight> = known.filter(|light| light.estimated.is_some()).collect();
+    let known: Vec<&PairLight> = lights
+        .iter()
+        .flatten()
+        .filter(|light| light.estimated.is_some())
+        .collect();
     let swapped: Vec<&&PairLight> = known
         .iter()
         .filter(|light| light.is_swapped(args))

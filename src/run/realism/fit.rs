@@ -21,17 +21,18 @@ pub(super) fn fit(
     pairs: &[CheckedPair<'_>],
     workers: &PairWorkers<'_>,
 ) -> Result<Vec<ReadingFit>> {
-    let readings = sensor.readings.iter();
-    let readings = readings.map(|(name, synthesis)| FitReading::new(name, synthesis));
-    let readings: Vec<FitReading> = readings.collect::<Result<_>>()?;
+    let readings: Vec<FitReading> = sensor
+        .readings
+        .iter()
+        .map(|(name, synthesis)| FitReading::new(name, synthesis))
+        .collect::<Result<_>>()?;
     let fits = workers.map("pairs fitted", pairs, |_, checked| {
         // A file that can no longer be read fails in the comparison, where it is logged and counted.
         let (normal, low) = load(args, checked.pair, None).ok()?;
         Some(fit_pair(sensor.seed, &readings, checked, &normal, &low))
     });
     let by_reading = readings.iter().enumerate().map(|(index, reading)| {
-        let of_pairs = pairs.iter().zip(&fits);
-        let of_pairs = of_pairs.filter_map(|(checked, fits)| {
+        let of_pairs = pairs.iter().zip(&fits).filter_map(|(checked, fits)| {
             Some(PairFit {
                 pair: checked.pair.name.clone(),
                 fit: *fits.as_ref()?.get(index)?,
@@ -93,19 +94,21 @@ fn fit_pair(
     let drop = f64::from(checked.drop);
     let smooth = SmoothBlocks::new(&normal.codes(), drop);
     let real = smooth.spread(low);
-    let fits = readings.iter().map(|reading| {
-        let mut raw = None;
-        let curves = reading.ladder.each_ref().map(|synthesis| {
-            let state = fixed_state(synthesis, drop);
-            // The colours of the camera, and so the image without noise, are the same at all gains.
-            let headroom = synthesis.headroom_ev(drop);
-            let raw = raw.get_or_insert_with(|| CleanRaw::new(normal, state.clone(), headroom));
-            let negative = raw.negative(&key, &state, synthesis.amplify, synthesis.tone);
-            smooth.spread(&negative.develop_by(drop))
-        });
-        GainFit::fit(&real, &curves)
-    });
-    fits.collect()
+    readings
+        .iter()
+        .map(|reading| {
+            let mut raw = None;
+            let curves = reading.ladder.each_ref().map(|synthesis| {
+                let state = fixed_state(synthesis, drop);
+                // The colours of the camera, and so the image without noise, are the same at all gains.
+                let headroom = synthesis.headroom_ev(drop);
+                let raw = raw.get_or_insert_with(|| CleanRaw::new(normal, state.clone(), headroom));
+                let negative = raw.negative(&key, &state, synthesis.amplify, synthesis.tone);
+                smooth.spread(&negative.develop_by(drop))
+            });
+            GainFit::fit(&real, &curves)
+        })
+        .collect()
 }
 
 /// The camera of a light reading with its gain drawn from a fitted range, and with the ratio of the fit.

@@ -21,12 +21,15 @@ impl PairWorkers<'_> {
     ) -> Vec<T> {
         let bar = self.progress.bar(what, items.len());
         self.pool.install(|| {
-            let results = items.par_iter().enumerate().map(|(index, item)| {
-                let result = work(index, item);
-                bar.inc();
-                result
-            });
-            results.collect()
+            items
+                .par_iter()
+                .enumerate()
+                .map(|(index, item)| {
+                    let result = work(index, item);
+                    bar.inc();
+                    result
+                })
+                .collect()
         })
     }
 }

@@ -43,8 +43,11 @@ impl Puzzle {
         if choices.len() < 2 {
             return Err(none());
         }
-        let before = lines[..first].iter().rev().map(|line| line.trim());
-        let mut before = before.filter(|line| !line.is_empty());
+        let mut before = lines[..first]
+            .iter()
+            .rev()
+            .map(|line| line.trim())
+            .filter(|line| !line.is_empty());
         let question = before
             .clone()
             .find(|line| line.ends_with('?'))

@@ -40,12 +40,15 @@ impl Likenesses {
     pub(super) fn new(dataset: &Dataset, progress: &Progress) -> Result<Self> {
         let names: Vec<&FrameId> = dataset.frames().collect();
         let bar = progress.bar("looking at frames", names.len());
-        let seen = names.into_par_iter().map(|name| {
-            let image = dataset.picture(name)?.decode()?;
-            bar.inc();
-            Ok((name.clone(), likeness(&image)))
-        });
-        seen.collect::<Result<_>>().map(Self)
+        names
+            .into_par_iter()
+            .map(|name| {
+                let image = dataset.picture(name)?.decode()?;
+                bar.inc();
+                Ok((name.clone(), likeness(&image)))
+            })
+            .collect::<Result<_>>()
+            .map(Self)
     }
 
     /// Number of frames.

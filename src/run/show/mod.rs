@@ -124,11 +124,12 @@ impl Target {
 
 /// The frames that were shown with the item: its own first, then those that a control of the observer was shown.
 fn sources(item: &ShownItem) -> Vec<FrameId> {
-    let others = item
+    let others: BTreeSet<&FrameId> = item
         .answers
         .iter()
-        .filter(|answer| answer.condition.is_some());
-    let others: BTreeSet<&FrameId> = others.map(|answer| &answer.shown).collect();
+        .filter(|answer| answer.condition.is_some())
+        .map(|answer| &answer.shown)
+        .collect();
     let others = others.into_iter().filter(|shown| **shown != item.source);
     std::iter::once(&item.source)
         .chain(others)
@@ -161,8 +162,10 @@ fn written(
 /// The conditions of the item, limited to those of `--condition`.
 fn conditions(answers: &[ShownAnswer], args: &ShowArgs) -> Result<Vec<Condition>> {
     let wanted = &args.condition;
-    let asked = answers.iter().filter_map(|answer| answer.condition.clone());
-    let asked: BTreeSet<Condition> = asked.collect();
+    let asked: BTreeSet<Condition> = answers
+        .iter()
+        .filter_map(|answer| answer.condition.clone())
+        .collect();
     if asked.is_empty() {
         let problem =
             "the item was only asked without images, so there is nothing to show".to_owned();
@@ -185,10 +188,11 @@ fn conditions(answers: &[ShownAnswer], args: &ShowArgs) -> Result<Vec<Condition>
 
 /// The digests of the images that were sent in a condition.
 fn sent(answers: &[&ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
-    let matching = answers
+    answers
         .iter()
-        .filter(|answer| answer.condition.as_ref() == Some(condition));
-    matching.filter_map(|answer| answer.sent).collect()
+        .filter(|answer| answer.condition.as_ref() == Some(condition))
+        .filter_map(|answer| answer.sent)
+        .collect()
 }
 
 /// The reply of each model in a condition, or without an image. Replies are escaped, so that they cannot send control

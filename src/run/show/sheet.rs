@@ -37,8 +37,9 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
         Some(picture(image).map(|image| StoryCell { image, marks }))
     };
     let drawn = rows.iter().map(|(name, conditions)| {
-        let cells = conditions.iter();
-        let cells = cells.map(|condition| condition.as_ref().and_then(cell).transpose());
+        let cells = conditions
+            .iter()
+            .map(|condition| condition.as_ref().and_then(cell).transpose());
         let name = name.clone();
         cells
             .collect::<Result<_>>()
@@ -78,8 +79,10 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
 
 /// The image of a cell; several stand beside each other.
 fn picture(images: &[Arc<Payload>]) -> Result<Rgb> {
-    let images = images.iter().map(|image| image.decode());
-    let mut images: Vec<Rgb> = images.collect::<Result<_>>()?;
+    let mut images: Vec<Rgb> = images
+        .iter()
+        .map(|image| image.decode())
+        .collect::<Result<_>>()?;
     match images.pop() {
         Some(only) if images.is_empty() => Ok(only),
         last => montage(&images.into_iter().chain(last).collect::<Vec<Rgb>>()),
@@ -138,8 +141,9 @@ impl SheetItem {
             .filter_map(|record| record.condition.as_ref());
         // The picture has one axis, that of the curves.
         let axis = curves.variant.kind.map(Kind::axis);
-        let levels = conditions.map(Condition::level);
-        let levels = levels.filter(|level| *level == AxisLevel::L0 || level.axis() == axis);
+        let levels = conditions
+            .map(Condition::level)
+            .filter(|level| *level == AxisLevel::L0 || level.axis() == axis);
         Ok(Self {
             levels: levels.collect(),
             question: vec![question, choices.join("   ").replace("  (true)", " (true)")],
@@ -202,12 +206,13 @@ impl SheetItem {
     /// Whether the images are others than were sent.
     fn is_changed(&self, condition: &Condition, images: &[Arc<Payload>]) -> bool {
         let now = Payload::joint_digest(images);
-        let records = self.records.iter();
-        let mut records = records.filter(|record| record.condition.as_ref() == Some(condition));
-        records.any(|record| {
-            let sent = record.detail.sent();
-            sent.is_some() && sent != now
-        })
+        self.records
+            .iter()
+            .filter(|record| record.condition.as_ref() == Some(condition))
+            .any(|record| {
+                let sent = record.detail.sent();
+                sent.is_some() && sent != now
+            })
     }
 
     /// The mark of each model in a condition; of several replies of one model the first counts.

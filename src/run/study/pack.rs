@@ -131,8 +131,10 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
 }
 
 fn conditions(trials: &Trials<ChoiceDetail>, wanted: &[Condition]) -> Result<Vec<Condition>> {
-    let asked = trials.asked().into_iter().flatten();
-    let asked: BTreeSet<Condition> = asked
+    let asked: BTreeSet<Condition> = trials
+        .asked()
+        .into_iter()
+        .flatten()
         .filter_map(|(_, condition)| condition.cloned())
         .collect();
     if let Some(missing) = wanted.iter().find(|condition| !asked.contains(condition)) {
@@ -166,9 +168,11 @@ fn chosen(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
 
 /// The digest of what was sent, by frame and condition.
 fn sent(trials: &Trials<ChoiceDetail>) -> BTreeMap<(FrameId, Condition), Digest> {
-    let sent = trials.iter().filter_map(|trial| {
-        let place = (trial.shown().clone(), trial.condition()?.clone());
-        Some((place, trial.sent()?))
-    });
-    sent.collect()
+    trials
+        .iter()
+        .filter_map(|trial| {
+            let place = (trial.shown().clone(), trial.condition()?.clone());
+            Some((place, trial.sent()?))
+        })
+        .collect()
 }

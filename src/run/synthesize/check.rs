@@ -19,8 +19,7 @@ const SCHEMAS: [&str; 3] = ["darkqa.image/1", "darkqa.image/2", "darkqa.sheet/1"
 /// If the folder cannot be read, or no JSON file of an image is in it.
 pub(super) fn check(folder: &Path) -> Result<Outcome> {
     let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
-    let files = entries.map(|entry| Ok(entry?.path()));
-    let files: std::io::Result<Vec<PathBuf>> = files.collect();
+    let files: std::io::Result<Vec<PathBuf>> = entries.map(|entry| Ok(entry?.path())).collect();
     let mut files = files.map_err(|e| Error::file(folder, "read", e))?;
     files.retain(|file| file.extension().is_some_and(|end| end == "json"));
     files.sort();

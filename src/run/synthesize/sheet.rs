@@ -162,22 +162,26 @@ fn levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         let Some((_, first)) = of_rows.first() else {
             continue;
         };
-        let levels = first.iter().map(|how| AxisLevel::from(Some(*how)));
-        let levels = levels.collect();
-        let rows = of_rows.into_iter().map(|(row, all)| {
-            let images = all.into_iter().map(|how| {
-                let dark_ev = frame.applied(how)?.drop_ev();
-                let image = Rgb::clone(frame.degraded(Some(how))?);
-                Ok(LevelImage { image, dark_ev })
-            });
-            let name = match row.kind {
-                Some(Kind::Exposure) => "EV".to_owned(),
-                _ => row.kind_and_reading(),
-            };
-            let images = images.collect::<Result<_>>()?;
-            Ok(LevelRow { name, images })
-        });
-        let rows = rows.collect::<Result<_>>()?;
+        let levels = first
+            .iter()
+            .map(|how| AxisLevel::from(Some(*how)))
+            .collect();
+        let rows = of_rows
+            .into_iter()
+            .map(|(row, all)| {
+                let images = all.into_iter().map(|how| {
+                    let dark_ev = frame.applied(how)?.drop_ev();
+                    let image = Rgb::clone(frame.degraded(Some(how))?);
+                    Ok(LevelImage { image, dark_ev })
+                });
+                let name = match row.kind {
+                    Some(Kind::Exposure) => "EV".to_owned(),
+                    _ => row.kind_and_reading(),
+                };
+                let images = images.collect::<Result<_>>()?;
+                Ok(LevelRow { name, images })
+            })
+            .collect::<Result<_>>()?;
         blocks.push(LevelBlock { levels, rows });
     }
     let foot = foot(light, frame.frame(), &degradations);
@@ -186,8 +190,10 @@ fn levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
 
 /// The figure of the noise terms of a frame, at the darkest level asked for. The level matters if each has its own negative.
 fn terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
-    let levels = light.levels.iter();
-    let mut levels = levels.filter(|level| level.axis() == Some(Axis::LIGHT));
+    let mut levels = light
+        .levels
+        .iter()
+        .filter(|level| level.axis() == Some(Axis::LIGHT));
     let level = levels.next_back().and_then(|level| level.severity());
     let level = level.unwrap_or(Severity::L5);
     let sensor = &light.kinds.sensor;

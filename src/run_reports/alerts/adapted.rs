@@ -15,8 +15,12 @@ pub(super) fn adaptation_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
             let Some(model) = field.strip_prefix(ADAPTED_FOR) else {
                 continue;
             };
-            let changes = changes.as_array().into_iter().flatten();
-            let changes: Vec<&str> = changes.filter_map(Value::as_str).collect();
+            let changes: Vec<&str> = changes
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(Value::as_str)
+                .collect();
             let place = match runs {
                 [_] => String::new(),
                 _ => format!(" in {}", run.name),

@@ -10,25 +10,30 @@ use crate::types::{ChoiceDetail, TrialRef, Trials};
 
 /// One alert for each model that was asked with `--request probabilities` and has no reply with any.
 pub(super) fn confidence_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
-    let columns = runs
+    let asked: BTreeSet<&String> = runs
         .iter()
-        .filter_map(|run| run.manifest.columns.get("model"));
-    let models = columns.flat_map(BTreeMap::iter);
-    let asked = models.filter(|(_, content)| content["--probabilities"] == Value::Bool(true));
-    let asked: BTreeSet<&String> = asked.map(|(name, _)| name).collect();
-    let stated = trials.iter().filter(|trial| trial.options().is_some());
-    let stated: BTreeSet<&str> = stated.map(TrialRef::model).collect();
-    let replied = trials.iter().filter(|trial| !trial.failed());
-    let replied: BTreeSet<&str> = replied.map(TrialRef::model).collect();
-    let without = asked
+        .filter_map(|run| run.manifest.columns.get("model"))
+        .flat_map(BTreeMap::iter)
+        .filter(|(_, content)| content["--probabilities"] == Value::Bool(true))
+        .map(|(name, _)| name)
+        .collect();
+    let stated: BTreeSet<&str> = trials
+        .iter()
+        .filter(|trial| trial.options().is_some())
+        .map(TrialRef::model)
+        .collect();
+    let replied: BTreeSet<&str> = trials
+        .iter()
+        .filter(|trial| !trial.failed())
+        .map(TrialRef::model)
+        .collect();
+    asked
         .into_iter()
-        .filter(|name| replied.contains(&***name) && !stated.contains(&***name));
-    let alerts = without.map(|name| {
+        .filter(|name| replied.contains(&***name) && !stated.contains(&***name)).map(|name| {
         let text = format!(
             "The confidence of {name} is not available: its server states no probabilities of tokens, or its replies do not begin \
              with a choice."
         );
         Alert::new(AlertKind::Parameters, text)
-    });
-    alerts.collect()
+    }).collect()
 }

@@ -10,15 +10,14 @@ use crate::types::{ChoiceDetail, Trials};
 /// One alert for each model that was asked with `--request constrain` and has replies of another form. A reply that keeps it is stored as its
 /// letter alone.
 pub(super) fn constraint_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
-    let columns = runs
+    let constrained: BTreeMap<&String, &str> = runs
         .iter()
-        .filter_map(|run| run.manifest.columns.get("model"));
-    let models = columns.flat_map(BTreeMap::iter);
-    let constrained: BTreeMap<&String, &str> = models
+        .filter_map(|run| run.manifest.columns.get("model"))
+        .flat_map(BTreeMap::iter)
         .filter_map(|(name, content)| Some((name, content["--constrain"].as_str()?)))
         .filter(|(_, constraint)| *constraint != "none")
         .collect();
-    let alerts = constrained.iter().filter_map(|(model, constraint)| {
+    constrained.iter().filter_map(|(model, constraint)| {
         let replied = trials
             .iter()
             .filter(|trial| trial.model() == **model && !trial.failed());
@@ -33,6 +32,5 @@ pub(super) fn constraint_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail
             );
             Alert::new(AlertKind::Constrain, text)
         })
-    });
-    alerts.collect()
+    }).collect()
 }

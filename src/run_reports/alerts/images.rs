@@ -34,10 +34,9 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
             replies.entry(trial.model()).or_default().push(reply);
         }
     }
-    let found = replies
+    replies
         .into_iter()
-        .filter_map(|(model, replies)| Some(Independence::find(&replies)?.words(model)));
-    found
+        .filter_map(|(model, replies)| Some(Independence::find(&replies)?.words(model)))
         .map(|text| Alert::new(AlertKind::ImageIgnored, text))
         .collect()
 }
@@ -50,8 +49,11 @@ fn built_in(combined: &Combined) -> BTreeSet<&str> {
             .iter()
             .any(|run| run.manifest.is_built_in(without_run(model)))
     };
-    let asked = combined.trials.asked().into_iter().flatten();
-    asked
+    combined
+        .trials
+        .asked()
+        .into_iter()
+        .flatten()
         .map(|(model, _)| model)
         .filter(|model| is_built_in(model))
         .collect()

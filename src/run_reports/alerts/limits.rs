@@ -15,32 +15,29 @@ pub(super) fn limit_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         let limits = counts.entry(trial.model()).or_default();
         *limits.entry(trial.max_tokens()).or_default() += 1;
     }
-    let grown = counts
+    counts
         .iter()
-        .filter(|(_, limits)| limits.keys().any(Option::is_some));
-    let alerts = grown.map(|(model, limits)| {
+        .filter(|(_, limits)| limits.keys().any(Option::is_some)).map(|(model, limits)| {
         let first = first_limit(&joined.runs, without_run(model));
-        let words = limits.iter().map(|(limit, count)| {
+        let words: Vec<String> = limits.iter().map(|(limit, count)| {
             let limit = limit.map_or_else(|| first.clone(), |limit| limit.to_string());
             format!("{} with {limit}", plural(*count, "reply", "replies"))
-        });
-        let words: Vec<String> = words.collect();
+        }).collect();
         let text = format!(
             "{model} was asked with several token limits (--max-tokens): {}. A truncated reply is asked again when the limit grows.",
             words.join(", ")
         );
         Alert::new(AlertKind::Parameters, text)
-    });
-    alerts.collect()
+    }).collect()
 }
 
 /// The token limit with which the runs of a model began, in words.
 fn first_limit(runs: &[JoinedRun], model: &str) -> String {
-    let limits = runs.iter().filter_map(|run| {
-        let models = run.manifest.columns.get("model")?;
-        models.get(model)?.get("--max-tokens")?.as_u64()
-    });
-    limits
+    runs.iter()
+        .filter_map(|run| {
+            let models = run.manifest.columns.get("model")?;
+            models.get(model)?.get("--max-tokens")?.as_u64()
+        })
         .min()
         .map_or_else(|| "the first limit".to_owned(), |limit| limit.to_string())
 }

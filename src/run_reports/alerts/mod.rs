@@ -110,18 +110,20 @@ fn cluster_alerts(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -
     } else {
         None
     };
-    let texts = few.into_iter().chain(unnamed_scenes(combined, &frames));
-    let alerts = texts.map(|text| Alert::new(AlertKind::Clusters, text));
-    alerts.collect()
+    few.into_iter()
+        .chain(unnamed_scenes(combined, &frames))
+        .map(|text| Alert::new(AlertKind::Clusters, text))
+        .collect()
 }
 
 /// Scenes that the names of the frames suggest and no question names, or frames without a scene beside others that have one.
 fn unnamed_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
-    let in_scenes = combined
+    let in_scenes: BTreeSet<&FrameId> = combined
         .questions
         .iter()
-        .filter(|one| !one.scene.is_empty());
-    let in_scenes: BTreeSet<&FrameId> = in_scenes.map(|one| &one.frame).collect();
+        .filter(|one| !one.scene.is_empty())
+        .map(|one| &one.frame)
+        .collect();
     if in_scenes.is_empty() {
         let suggested = SuggestedScenes::new(frames.iter().copied())?;
         return Some(format!(
@@ -165,32 +167,33 @@ pub(super) fn run_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 
 /// One alert for each run that cost more than its limit.
 fn cost_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
-    let over = runs.iter().filter_map(|run| {
-        let sentence = OverBudget::read(&run.manifest)?.sentence();
-        let text = match runs {
-            [_] => sentence,
-            _ => format!("{}: {sentence}", run.name),
-        };
-        Some(Alert::new(AlertKind::Cost, text))
-    });
-    over.collect()
+    runs.iter()
+        .filter_map(|run| {
+            let sentence = OverBudget::read(&run.manifest)?.sentence();
+            let text = match runs {
+                [_] => sentence,
+                _ => format!("{}: {sentence}", run.name),
+            };
+            Some(Alert::new(AlertKind::Cost, text))
+        })
+        .collect()
 }
 
 /// Alerts about joining the runs: models that stand apart, and runs that add nothing to the others.
 pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
-    let repeated = joined
+    let mut alerts: Vec<Alert> = joined
         .runs
         .iter()
-        .filter(|run| run.replies > 0 && run.added == 0);
-    let repeated = repeated.map(|run| {
-        let text = format!(
-            "All {} of {} are in the other runs, too, and count once.",
-            plural(run.replies, "reply", "replies"),
-            run.name
-        );
-        Alert::new(AlertKind::Runs, text)
-    });
-    let mut alerts: Vec<Alert> = repeated.collect();
+        .filter(|run| run.replies > 0 && run.added == 0)
+        .map(|run| {
+            let text = format!(
+                "All {} of {} are in the other runs, too, and count once.",
+                plural(run.replies, "reply", "replies"),
+                run.name
+            );
+            Alert::new(AlertKind::Runs, text)
+        })
+        .collect();
     alerts.extend(models::left_out_alerts(&joined.runs));
     alerts.extend(models::model_alerts(joined));
     alerts
@@ -198,15 +201,17 @@ pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 
 /// Folders that were named more than once: their names, and how many times.
 pub(super) fn named_again(folders: &[(String, usize)]) -> Vec<Alert> {
-    let alerts = folders.iter().map(|(name, times)| {
-        let times = match times {
-            2 => "twice".to_owned(),
-            more => format!("{more} times"),
-        };
-        let text = format!("{name} is named {times} and counted once.");
-        Alert::new(AlertKind::Runs, text)
-    });
-    alerts.collect()
+    folders
+        .iter()
+        .map(|(name, times)| {
+            let times = match times {
+                2 => "twice".to_owned(),
+                more => format!("{more} times"),
+            };
+            let text = format!("{name} is named {times} and counted once.");
+            Alert::new(AlertKind::Runs, text)
+        })
+        .collect()
 }
 
 /// Alerts about changes to the images of the runs when they were read.
@@ -217,33 +222,34 @@ fn input_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
             lines.entry(line).or_default().push(&run.name);
         }
     }
-    let alerts = lines.into_iter().map(|(line, names)| {
-        let text = match runs {
-            [_] => format!("{line}."),
-            _ => format!("{}: {line}.", names.join(", ")),
-        };
-        Alert::new(AlertKind::Read, text)
-    });
-    alerts.collect()
+    lines
+        .into_iter()
+        .map(|(line, names)| {
+            let text = match runs {
+                [_] => format!("{line}."),
+                _ => format!("{}: {line}.", names.join(", ")),
+            };
+            Alert::new(AlertKind::Read, text)
+        })
+        .collect()
 }
 
 fn progress_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
-    let unfinished = runs
-        .iter()
-        .filter(|run| run.manifest.status != Status::Complete);
-    let alerts = unfinished.map(|run| {
-        let (status, counts) = (run.manifest.status, run.manifest.counts);
-        // A run that is merged of some of its parts has answers to all of their trials.
-        let rest = if counts.answered < counts.trials {
-            " The same command asks the rest."
-        } else {
-            ""
-        };
-        let text = format!(
-            "{}: {status}: {} of {} trials answered, {} failed.{rest}",
-            run.name, counts.answered, counts.trials, counts.failed
-        );
-        Alert::new(AlertKind::NotComplete, text)
-    });
-    alerts.collect()
+    runs.iter()
+        .filter(|run| run.manifest.status != Status::Complete)
+        .map(|run| {
+            let (status, counts) = (run.manifest.status, run.manifest.counts);
+            // A run that is merged of some of its parts has answers to all of their trials.
+            let rest = if counts.answered < counts.trials {
+                " The same command asks the rest."
+            } else {
+                ""
+            };
+            let text = format!(
+                "{}: {status}: {} of {} trials answered, {} failed.{rest}",
+                run.name, counts.answered, counts.trials, counts.failed
+            );
+            Alert::new(AlertKind::NotComplete, text)
+        })
+        .collect()
 }

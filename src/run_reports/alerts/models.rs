@@ -28,17 +28,19 @@ pub(super) fn model_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         let same = (reason(apart, &runs), suffixes.collect());
         by_reason.entry(same).or_default().push(apart);
     }
-    let alerts = by_reason.into_iter().map(|((reason, _), models)| {
-        let text = format!("{}: {reason}.", stand_apart(&models));
-        Alert::new(AlertKind::Models, text)
-    });
-    alerts.collect()
+    by_reason
+        .into_iter()
+        .map(|((reason, _), models)| {
+            let text = format!("{}: {reason}.", stand_apart(&models));
+            Alert::new(AlertKind::Models, text)
+        })
+        .collect()
 }
 
 /// The models of each run whose replies are not shown.
 pub(super) fn left_out_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let left = runs.iter().filter(|run| !run.left_out.is_empty());
-    let alerts = left.map(|run| {
+    left.map(|run| {
         let names: Vec<&String> = run.left_out.iter().collect();
         let are = if names.len() == 1 { "is" } else { "are" };
         let text = format!(
@@ -48,8 +50,7 @@ pub(super) fn left_out_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
             run.name
         );
         Alert::new(AlertKind::Models, text)
-    });
-    alerts.collect()
+    }).collect()
 }
 
 /// The sentence about models that stand apart, with the names of the first.
@@ -102,9 +103,9 @@ fn settings(differences: &[Setting]) -> Vec<Setting> {
         let known = FIELDS.iter().find(|(field, _)| *field == flag);
         known.map_or(flag, |(_, words)| *words).to_owned()
     };
-    let told = told.map(|setting| Setting {
+    told.map(|setting| Setting {
         flag: in_words(&setting.flag),
         ..setting.clone()
-    });
-    told.collect()
+    })
+    .collect()
 }

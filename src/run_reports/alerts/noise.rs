@@ -38,15 +38,14 @@ pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             }
         }
     }
-    let alerts = of_draws.into_iter().map(|(why, names)| {
+    of_draws.into_iter().map(|(why, names)| {
         let names: Vec<&str> = names.into_iter().collect();
         let text = format!(
             "With noise ({}) the signal-to-noise ratio is the same at every level: {why}. --profile physical loses photons with the light.",
             names.join(", ")
         );
         Alert::new(AlertKind::Noise, text)
-    });
-    alerts.collect()
+    }).collect()
 }
 
 /// In which way the levels of a light reading have the same noise, if its light ratio r does not depend on the level.
@@ -60,13 +59,15 @@ fn same_noise(reading: &Value) -> &'static str {
 
 /// The levels at which an image has so few codes that their rounding decides.
 pub(super) fn rounding_alert<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
-    let shown = conditions(joined.trials.iter()).into_iter();
-    let shown = shown.filter_map(Condition::degradation);
-    let darkest = shown.filter(|degradation| {
-        matches!(degradation.kind(), Kind::Exposure | Kind::Sensor)
-            && degradation.severity().in_hundredths() > FEW_CODES
-    });
-    let levels: BTreeSet<Severity> = darkest.map(Degradation::severity).collect();
+    let levels: BTreeSet<Severity> = conditions(joined.trials.iter())
+        .into_iter()
+        .filter_map(Condition::degradation)
+        .filter(|degradation| {
+            matches!(degradation.kind(), Kind::Exposure | Kind::Sensor)
+                && degradation.severity().in_hundredths() > FEW_CODES
+        })
+        .map(Degradation::severity)
+        .collect();
     if levels.is_empty() {
         return None;
     }

@@ -16,17 +16,14 @@ pub(super) fn provider_alerts<D: Detail>(trials: &Trials<D>) -> Vec<Alert> {
             *of_model.entry(provider).or_default() += 1;
         }
     }
-    let several = counts.iter().filter(|(_, providers)| providers.len() > 1);
-    let alerts = several.map(|(model, providers)| {
-        let named = providers
+    counts.iter().filter(|(_, providers)| providers.len() > 1).map(|(model, providers)| {
+        let named: Vec<String> = providers
             .iter()
-            .map(|(name, count)| format!("{name} ({})", plural(*count, "reply", "replies")));
-        let named: Vec<String> = named.collect();
+            .map(|(name, count)| format!("{name} ({})", plural(*count, "reply", "replies"))).collect();
         let text = format!(
             "{model} was served by {}: providers and quantisations are mixed. --extra-body with provider names one.",
             named.join(", ")
         );
         Alert::new(AlertKind::Served, text)
-    });
-    alerts.collect()
+    }).collect()
 }

@@ -17,10 +17,11 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut asked = Vec::<BTreeMap<&QuestionId, Option<&RunQuestion>>>::new();
     for run in &joined.runs {
         // A control is shown frames of its own choice, in a shard others than the models.
-        let trials = joined
+        let ids: HashSet<&QuestionId> = joined
             .trials_of(run)
-            .filter(|trial| !is_control(trial.model()));
-        let ids: HashSet<&QuestionId> = trials.map(TrialRef::question).collect();
+            .filter(|trial| !is_control(trial.model()))
+            .map(TrialRef::question)
+            .collect();
         let mut ids: BTreeMap<&QuestionId, Option<&RunQuestion>> =
             ids.into_iter().map(|id| (id, None)).collect();
         for question in &run.questions {
@@ -31,13 +32,15 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         asked.push(ids);
     }
     let mut alerts = Vec::new();
-    let shared = asked[0]
+    let shared: Vec<&&QuestionId> = asked[0]
         .keys()
-        .filter(|id| asked.iter().all(|ids| ids.contains_key(*id)));
-    let shared: Vec<&&QuestionId> = shared.collect();
+        .filter(|id| asked.iter().all(|ids| ids.contains_key(*id)))
+        .collect();
     if asked.iter().any(|ids| ids.len() != shared.len()) {
-        let counts = joined.runs.iter().zip(&asked);
-        let counts: Vec<String> = counts
+        let counts: Vec<String> = joined
+            .runs
+            .iter()
+            .zip(&asked)
             .map(|(run, ids)| format!("{} of {}", ids.len(), run.name))
             .collect();
         let text = format!(
@@ -61,8 +64,11 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         }
     }
     let differ = |differs: &dyn Fn(&RunQuestion, &RunQuestion) -> bool| {
-        let pairs = pairs.iter().filter(|(_, one, other)| differs(one, other));
-        let ids: BTreeSet<&QuestionId> = pairs.map(|(id, ..)| *id).collect();
+        let ids: BTreeSet<&QuestionId> = pairs
+            .iter()
+            .filter(|(_, one, other)| differs(one, other))
+            .map(|(id, ..)| *id)
+            .collect();
         ids.len()
     };
     let words = differ(&|one, other| one.text != other.text);
@@ -95,14 +101,18 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 /// Runs that asked the same questions a different number of times.
 pub(super) fn repeat_alert(combined: &Combined) -> Option<Alert> {
     let people = |run: &&JoinedRun| !is_of_people(&run.manifest);
-    let times = combined.runs.iter().filter(people).map(|run| {
-        let times = combined
-            .trials_of(run)
-            .map(|trial| trial.repeat() + 1)
-            .max();
-        (&run.name, times.unwrap_or(1))
-    });
-    let times: Vec<(&String, u32)> = times.collect();
+    let times: Vec<(&String, u32)> = combined
+        .runs
+        .iter()
+        .filter(people)
+        .map(|run| {
+            let times = combined
+                .trials_of(run)
+                .map(|trial| trial.repeat() + 1)
+                .max();
+            (&run.name, times.unwrap_or(1))
+        })
+        .collect();
     let differs = times
         .iter()
         .any(|(_, times_here)| *times_here != times[0].1);

@@ -7,25 +7,30 @@ use crate::types::TrialRef;
 
 /// How the lenient reading of each run would change by the rules of this version.
 pub(super) fn reading_alerts(combined: &Combined) -> Vec<Alert> {
-    let alerts = combined.runs.iter().filter_map(|run| {
-        let change = LenientChange::new(&run.manifest);
-        if change.is_current() {
-            return None;
-        }
-        let places = combined.trials_of(run).map(TrialRef::text);
-        let records = places.map(|place| combined.texts[place.log()].record(place));
-        let text = match change.through(records) {
-            Ok(change) if change.has_changed() => {
-                format!(
-                    "{}: {}. --rescore stores what it reads now.",
-                    run.name,
-                    change.words()
-                )
+    combined
+        .runs
+        .iter()
+        .filter_map(|run| {
+            let change = LenientChange::new(&run.manifest);
+            if change.is_current() {
+                return None;
             }
-            Ok(_) => return None,
-            Err(error) => format!("{}: its replies cannot be read again: {error}", run.name),
-        };
-        Some(Alert::new(AlertKind::Reading, text))
-    });
-    alerts.collect()
+            let records = combined
+                .trials_of(run)
+                .map(TrialRef::text)
+                .map(|place| combined.texts[place.log()].record(place));
+            let text = match change.through(records) {
+                Ok(change) if change.has_changed() => {
+                    format!(
+                        "{}: {}. --rescore stores what it reads now.",
+                        run.name,
+                        change.words()
+                    )
+                }
+                Ok(_) => return None,
+                Err(error) => format!("{}: its replies cannot be read again: {error}", run.name),
+            };
+            Some(Alert::new(AlertKind::Reading, text))
+        })
+        .collect()
 }

@@ -47,8 +47,10 @@ pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
 /// The condition of a model with the largest share of replies that could not be read, if it is above the limit.
 fn worst<'h>(health: &'h [Health], model: &str) -> Option<&'h Health> {
     let share = |health: &Health| health.unreadable() as f64 / health.replies as f64;
-    let own = health.iter().filter(|health| health.subject.model == model);
-    let above = own.filter(|health| health.replies > 0 && share(health) > MAX_UNREAD);
+    let above = health
+        .iter()
+        .filter(|health| health.subject.model == model)
+        .filter(|health| health.replies > 0 && share(health) > MAX_UNREAD);
     above.max_by(|a, b| share(a).total_cmp(&share(b)))
 }
 
@@ -75,8 +77,8 @@ pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
     for word in combined.trials.iter().filter_map(TrialRef::broken_off) {
         *counts.entry(word).or_default() += 1;
     }
-    let words = counts.iter();
-    let words: Vec<String> = words
+    let words: Vec<String> = counts
+        .iter()
         .map(|(word, count)| format!("{word} ({})", counted(*count, "trial")))
         .collect();
     let text = format!(
@@ -92,22 +94,23 @@ pub(super) fn people_alerts(combined: &Combined) -> Vec<Alert> {
         .runs
         .iter()
         .filter(|run| is_of_people(&run.manifest));
-    let alerts = people.filter_map(|run| {
-        let unread = combined
-            .trials_of(run)
-            .filter_map(|trial| trial.strict()?.why);
-        // In runs of earlier versions, who could not tell gave an empty answer.
-        let is_said =
-            |why: &UnreadReason| matches!(why, UnreadReason::Empty | UnreadReason::CannotTell);
-        let count = unread.filter(|why| !is_said(why)).count();
-        let text = format!(
-            "{} of {} of people are not choices of their questions, and count as wrong.",
-            count,
-            counted(run.trials.len(), "answer")
-        );
-        (count > 0).then(|| Alert::new(AlertKind::NoChoice, text))
-    });
-    alerts.collect()
+    people
+        .filter_map(|run| {
+            let unread = combined
+                .trials_of(run)
+                .filter_map(|trial| trial.strict()?.why);
+            // In runs of earlier versions, who could not tell gave an empty answer.
+            let is_said =
+                |why: &UnreadReason| matches!(why, UnreadReason::Empty | UnreadReason::CannotTell);
+            let count = unread.filter(|why| !is_said(why)).count();
+            let text = format!(
+                "{} of {} of people are not choices of their questions, and count as wrong.",
+                count,
+                counted(run.trials.len(), "answer")
+            );
+            (count > 0).then(|| Alert::new(AlertKind::NoChoice, text))
+        })
+        .collect()
 }
 
 #[cfg(test)]

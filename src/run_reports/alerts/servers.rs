@@ -37,11 +37,12 @@ pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             alerts.push(Alert::new(AlertKind::Served, text));
         }
     }
-    let models = joined
+    let models: BTreeSet<&String> = joined
         .runs
         .iter()
-        .filter_map(|run| run.manifest.columns.get("model"));
-    let models: BTreeSet<&String> = models.flat_map(BTreeMap::keys).collect();
+        .filter_map(|run| run.manifest.columns.get("model"))
+        .flat_map(BTreeMap::keys)
+        .collect();
     for model in models {
         let addresses = joined.runs.iter().map(|run| {
             let address = address(&run.manifest, model)?;

@@ -133,8 +133,9 @@ impl GroupKey {
         more: &[(&str, &str)],
         what: &str,
     ) -> Result<Self> {
-        let more = more.iter();
-        let more = more.map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+        let more = more
+            .iter()
+            .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
         self.settings.extend(more);
         let light = light(manifest);
         let light = Digest::canonical("darkqa.site-light/1", &light)?.to_string();
@@ -165,9 +166,11 @@ impl GroupKey {
 
     /// Images or true answers in which the two differ, in words; `None` without a difference.
     fn disagreeing(&self, other: &Self) -> Option<String> {
-        let shared = self.images.iter();
-        let shared = shared.filter_map(|(place, own)| Some((own, other.images.get(place)?)));
-        let shared = shared.filter(|(own, theirs)| !own.is_empty() && !theirs.is_empty());
+        let shared = self
+            .images
+            .iter()
+            .filter_map(|(place, own)| Some((own, other.images.get(place)?)))
+            .filter(|(own, theirs)| !own.is_empty() && !theirs.is_empty());
         let (mut all, mut differing) = (0, 0);
         for (own, theirs) in shared {
             all += 1;
@@ -193,8 +196,9 @@ impl GroupKey {
     pub(super) fn difference(&self, first: &Self, number: usize) -> GroupDifference {
         let names = [format!("table {number}"), "this one".to_owned()];
         let settings = [Some(first.settings.clone()), Some(self.settings.clone())];
-        let lines = differing(&settings).into_iter();
-        let lines = lines.map(|setting| setting.words(&names));
+        let lines = differing(&settings)
+            .into_iter()
+            .map(|setting| setting.words(&names));
         GroupDifference {
             from: number,
             lines: lines.chain(self.disagreeing(first)).collect(),
@@ -256,8 +260,11 @@ fn light(manifest: &RunManifest) -> Settings {
 }
 
 fn listed(levels: &BTreeSet<AxisLevel>) -> String {
-    let levels = levels.iter().map(ToString::to_string);
-    levels.collect::<Vec<_>>().join(", ")
+    levels
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 #[cfg(test)]
@@ -265,8 +272,9 @@ mod tests {
     use super::*;
 
     fn key(settings: &[(&str, &str)], image: &[u8], truth: &str) -> GroupKey {
-        let settings = settings.iter();
-        let settings = settings.map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+        let settings = settings
+            .iter()
+            .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
         let choices = BTreeSet::from(["red".to_owned(), "blue".to_owned()]);
         GroupKey {
             title: String::new(),
@@ -299,9 +307,10 @@ mod tests {
         );
         assert!(lines(4).is_empty());
         let numbered = keys.into_iter().enumerate().collect();
-        let groups = grouped(numbered, |(_, key)| key).into_iter();
-        let groups = groups.map(|group| group.into_iter().map(|(number, _)| number).collect());
-        let groups: Vec<Vec<usize>> = groups.collect();
+        let groups: Vec<Vec<usize>> = grouped(numbered, |(_, key)| key)
+            .into_iter()
+            .map(|group| group.into_iter().map(|(number, _)| number).collect())
+            .collect();
         assert_eq!(groups, [vec![0, 4], vec![1], vec![2], vec![3]]);
     }
 }

@@ -39,11 +39,13 @@ pub(super) fn ranked(members: Vec<ChoiceMember>) -> GroupRows {
         .flat_map(|best| best.models.iter().zip(rank_ranges(best)))
         .map(|(model, rank)| (model.model.clone(), rank))
         .collect();
-    let rows = rows.into_iter().map(|(name, mut row)| {
-        row.rank = ranks.get(&name).copied();
-        row
-    });
-    let mut rows: Vec<ChoiceRow> = rows.collect();
+    let mut rows: Vec<ChoiceRow> = rows
+        .into_iter()
+        .map(|(name, mut row)| {
+            row.rank = ranks.get(&name).copied();
+            row
+        })
+        .collect();
     rows.sort_by_key(ChoiceRow::order);
     let words = words(best.as_ref(), models, &unit);
     GroupRows::Choices(rows, Ranking { words })
@@ -55,15 +57,17 @@ fn names(members: &[ChoiceMember]) -> BTreeMap<(String, String), String> {
     for row in members.iter().flat_map(|member| &member.rows) {
         *times.entry(&row.model).or_default() += 1;
     }
-    let rows = members.iter().flat_map(|member| &member.rows);
-    let named = rows.map(|row| {
-        let name = match times[&*row.model] {
-            1 => row.model.clone(),
-            _ => format!("{} ({})", row.model, row.run.page),
-        };
-        ((row.run.page.clone(), row.model.clone()), name)
-    });
-    named.collect()
+    members
+        .iter()
+        .flat_map(|member| &member.rows)
+        .map(|row| {
+            let name = match times[&*row.model] {
+                1 => row.model.clone(),
+                _ => format!("{} ({})", row.model, row.run.page),
+            };
+            ((row.run.page.clone(), row.model.clone()), name)
+        })
+        .collect()
 }
 
 /// The comparison of all models, and the unit that is treated as independent.

@@ -55,8 +55,10 @@ impl<D: Tabled> RowBatches<D> {
         }
         let now = &rest[..at_once(rest)];
         let lines = self.log.lines(now)?;
-        let records = lines.par_iter().map(|line| self.log.record::<D>(line));
-        let records: Result<Vec<Record<D>>> = records.collect();
+        let records: Result<Vec<Record<D>>> = lines
+            .par_iter()
+            .map(|line| self.log.record::<D>(line))
+            .collect();
         self.read += now.len();
         let rows = records?.into_iter();
         Ok(Some(
@@ -68,9 +70,13 @@ impl<D: Tabled> RowBatches<D> {
 /// How many of these records are read at once.
 fn at_once(places: &[LinePlace]) -> usize {
     let mut bytes = 0;
-    let fits = places.iter().take(RECORDS_AT_ONCE).take_while(|place| {
-        bytes += place.length;
-        bytes <= BYTES_AT_ONCE
-    });
-    fits.count().max(1)
+    places
+        .iter()
+        .take(RECORDS_AT_ONCE)
+        .take_while(|place| {
+            bytes += place.length;
+            bytes <= BYTES_AT_ONCE
+        })
+        .count()
+        .max(1)
 }

@@ -96,8 +96,10 @@ impl Coverage {
         let absent = counts
             .iter()
             .map(|count| Shard::all(*count).filter(is_needed).collect::<Vec<Shard>>());
-        let absent = absent.filter(|absent| !absent.is_empty());
-        absent.min_by_key(Vec::len).unwrap_or_default()
+        absent
+            .filter(|absent| !absent.is_empty())
+            .min_by_key(Vec::len)
+            .unwrap_or_default()
     }
 
     /// The missing trials, in words; `None` if none are. `absent` are the shards that have them, as far as they are known.
@@ -162,7 +164,7 @@ mod tests {
 
     /// A part with its shard, the place of its first source, and the trials about each.
     fn coverage(parts: &[(&str, usize, &[usize])]) -> Coverage {
-        let parts = parts.iter().map(|(shard, first, trials)| {
+        let parts: Vec<(Shard, RunManifest)> = parts.iter().map(|(shard, first, trials)| {
             let total: usize = trials.iter().sum();
             let manifest = json!({
                 "schema": "", "status": "complete", "version": "", "created": "", "updated": "", "platform": {}, "identity": {},
@@ -171,8 +173,7 @@ mod tests {
             });
             let manifest: RunManifest = serde_json::from_value(manifest).unwrap();
             (shard.parse().unwrap(), manifest)
-        });
-        let parts: Vec<(Shard, RunManifest)> = parts.collect();
+        }).collect();
         let parts = parts.iter();
         Coverage::from_parts(parts.map(|(shard, manifest)| (*shard, Path::new("run"), manifest)))
             .unwrap()

@@ -38,8 +38,9 @@ impl<D: Detail> RunParts<D> {
         let mut parts = parts?;
         parts.sort_by_key(|part| (part.shard.count(), part.shard));
         joined_manifest::check_same_run(&parts)?;
-        let places = parts.iter();
-        let places = places.map(|part| (part.shard, &*part.folder, &part.manifest));
+        let places = parts
+            .iter()
+            .map(|part| (part.shard, &*part.folder, &part.manifest));
         let coverage = Coverage::from_parts(places)?;
         let plan = missing::plan(&parts, &coverage)?;
         let is_missing = missing::check(&parts, &coverage, plan.as_ref(), missing)?;

@@ -69,8 +69,10 @@ pub(super) fn joined_manifest(parts: &[StoredPart], coverage: &Coverage) -> Resu
         manifest.enhancers.insert(name.clone(), note);
     }
     let mut inputs: Option<InputSummary> = None;
-    let once = manifests.clone().zip(coverage.once());
-    let once = once.filter_map(|(other, is_taken)| other.inputs.as_ref().filter(|_| is_taken));
+    let once = manifests
+        .clone()
+        .zip(coverage.once())
+        .filter_map(|(other, is_taken)| other.inputs.as_ref().filter(|_| is_taken));
     for other in once {
         inputs.get_or_insert_default().join(other);
     }

@@ -45,15 +45,16 @@ impl StoredPart {
             .filter(|other| self.has_columns_in(other))
             .filter_map(|other| other.manifest.part.as_ref())
             .collect();
-        let mut sources = own.trials.iter().zip(own.place.first..);
-        sources.all(|(trials, source)| {
-            let place = |part: &&RunPart| {
-                let place = source.checked_sub(part.place.first)?;
-                part.trials.get(place).copied()
-            };
-            let mut others = alike.iter().filter_map(place);
-            others.any(|other| other >= *trials)
-        })
+        own.trials
+            .iter()
+            .zip(own.place.first..)
+            .all(|(trials, source)| {
+                let place = |part: &&RunPart| {
+                    let place = source.checked_sub(part.place.first)?;
+                    part.trials.get(place).copied()
+                };
+                alike.iter().filter_map(place).any(|other| other >= *trials)
+            })
     }
 
     /// Whether another part has every column value that this one has.

@@ -63,8 +63,10 @@ impl PartQuestions {
     /// # Errors
     /// If a line cannot be read or written.
     pub(crate) fn write<D: Detail>(&self, store: &Store<D>, folders: &[&Path]) -> Result<()> {
-        let files = folders.iter().map(|folder| QuestionFile::open(folder));
-        let files: Vec<Option<QuestionFile>> = files.collect::<Result<_>>()?;
+        let files: Vec<Option<QuestionFile>> = folders
+            .iter()
+            .map(|folder| QuestionFile::open(folder))
+            .collect::<Result<_>>()?;
         store.write_question_lines(|out| {
             for question in &self.0 {
                 if let Some(file) = &files[question.part] {

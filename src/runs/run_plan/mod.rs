@@ -195,8 +195,10 @@ impl RunPlan {
 
     /// Number of requests about the frames at these places, by the models of the plan.
     pub(crate) fn requests(&self, places: impl Iterator<Item = usize>) -> usize {
-        let frames = places.filter_map(|place| self.frames.get(place));
-        frames.map(|frame| frame.cost.requests).sum()
+        places
+            .filter_map(|place| self.frames.get(place))
+            .map(|frame| frame.cost.requests)
+            .sum()
     }
 
     /// The places of the frames of a shard.
@@ -230,8 +232,11 @@ impl RunPlan {
     pub(crate) fn command<'a>(&self, asked: impl Iterator<Item = &'a str>) -> Option<String> {
         let planned: BTreeSet<&str> = self.models.iter().map(|name| &**name).collect();
         let words = self.command.as_ref()?;
-        let words = words.iter().map(|word| shell_word(word));
-        let command = words.collect::<Vec<_>>().join(" ");
+        let command = words
+            .iter()
+            .map(|word| shell_word(word))
+            .collect::<Vec<_>>()
+            .join(" ");
         (planned == asked.collect()).then(|| format!("darkqa-eval {command}"))
     }
 
@@ -256,9 +261,10 @@ fn lines<T: DeserializeOwned + Send>(
         return Err(Error::Run { path, problem });
     }
     let lines: Vec<&[u8]> = bytes.split(|byte| *byte == b'\n').collect();
-    let lines = lines.par_iter().enumerate();
-    let lines = lines.filter(|(_, line)| !line.is_empty());
     lines
+        .par_iter()
+        .enumerate()
+        .filter(|(_, line)| !line.is_empty())
         .map(|(index, line)| {
             serde_json::from_slice(line).map_err(|e| Error::json_line(path, index + 1, &e))
         })

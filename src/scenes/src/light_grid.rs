@@ -80,29 +80,31 @@ impl<'a> LightGrid<'a> {
     /// One smoothing pass: the mean of neighbours in the same plane, `step` apart (à-trous filter, Dammertz et al., HPG 2010).
     fn smooth(&self, incoming: &[Vec3], step: i32) -> Vec<Vec3> {
         let [width, height] = self.grid;
-        let smoothed = (0..width * height).into_par_iter().map(|i| {
-            let Some(own) = &self.places[i] else {
-                return Vec3::ZERO;
-            };
-            let [x, y] = [(i % width) as i32, (i / width) as i32];
-            let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
-            for dy in -2..=2_i32 {
-                for dx in -2..=2_i32 {
-                    let [u, v] = [x + dx * step, y + dy * step];
-                    if !(0..width as i32).contains(&u) || !(0..height as i32).contains(&v) {
-                        continue;
-                    }
-                    let j = v as usize * width + u as usize;
-                    if let Some(other) = &self.places[j] {
-                        let weight = similarity(own, other);
-                        sum += incoming[j] * weight;
-                        weights += weight;
+        (0..width * height)
+            .into_par_iter()
+            .map(|i| {
+                let Some(own) = &self.places[i] else {
+                    return Vec3::ZERO;
+                };
+                let [x, y] = [(i % width) as i32, (i / width) as i32];
+                let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
+                for dy in -2..=2_i32 {
+                    for dx in -2..=2_i32 {
+                        let [u, v] = [x + dx * step, y + dy * step];
+                        if !(0..width as i32).contains(&u) || !(0..height as i32).contains(&v) {
+                            continue;
+                        }
+                        let j = v as usize * width + u as usize;
+                        if let Some(other) = &self.places[j] {
+                            let weight = similarity(own, other);
+                            sum += incoming[j] * weight;
+                            weights += weight;
+                        }
                     }
                 }
-            }
-            sum / weights.max(1e-6)
-        });
-        smoothed.collect()
+                sum / weights.max(1e-6)
+            })
+            .collect()
     }
 
     /// The light that reaches a point of the image.

@@ -93,8 +93,11 @@ impl FloorPlan {
     pub(super) fn walls(&mut self) {
         for (i, wall) in WALLS.into_iter().enumerate() {
             let width = self.width(wall);
-            let holes = self.shell.doorways.iter().filter(|(of, ..)| *of == wall);
-            let mut holes: Vec<([f32; 2], f32)> = holes
+            let mut holes: Vec<([f32; 2], f32)> = self
+                .shell
+                .doorways
+                .iter()
+                .filter(|(of, ..)| *of == wall)
                 .map(|(_, along, top)| (along.map(|x| x - width / 2.0), *top))
                 .collect();
             holes.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));

@@ -86,15 +86,17 @@ pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, shown: RoomLigh
     let places = (0..width * height).into_par_iter();
     let pixels = match shown {
         RoomLight::Display => {
-            let codes = places.map(|i| pixel(i, tone_mapped).to_array().map(srgb_code));
-            let codes: Vec<[u8; 3]> = codes.collect();
+            let codes: Vec<[u8; 3]> = places
+                .map(|i| pixel(i, tone_mapped).to_array().map(srgb_code))
+                .collect();
             let codes = Rgb::new(height, width, codes.concat());
             let codes = codes.unwrap_or_else(|_| Rgb::black(height, width));
             Pixels::Codes8(Arc::new(codes))
         }
         RoomLight::Linear => {
-            let light = places.map(|i| pixel(i, |light| light.max(Vec3::ZERO)).to_array());
-            let light: Vec<[f32; 3]> = light.collect();
+            let light: Vec<[f32; 3]> = places
+                .map(|i| pixel(i, |light| light.max(Vec3::ZERO)).to_array())
+                .collect();
             let light = Light::new(height, width, light.concat());
             let light = light.unwrap_or_else(|_| Light::black(height, width));
             Pixels::Light(Arc::new(light))

@@ -186,38 +186,43 @@ mod tests {
         let runs = 400;
         let changed = CHANGED + difference / 2.0;
         let better = f64::midpoint(changed, difference);
-        let found = (0..runs).filter(|_| {
-            let mut squares = 0.0;
-            let clusters = sample.questions.iter().map(|items| {
-                let change = |draw: f64| match draw {
-                    draw if draw < better => 1,
-                    draw if draw < changed => -1,
-                    _ => 0,
-                };
-                let common = random.random_range(0.0..1.0);
-                let nets = (0..*items).map(|_| {
-                    let net: i64 = (0..sample.models)
-                        .map(|_| {
-                            let is_common = random.random_bool(CORRELATION.sqrt());
-                            change(if is_common {
-                                common
-                            } else {
-                                random.random_range(0.0..1.0)
-                            })
-                        })
-                        .sum();
-                    squares += (net * net) as f64;
-                    net
-                });
-                ClusterNet {
-                    net: nets.sum(),
-                    items: *items as u32,
-                }
-            });
-            let clusters: Vec<ClusterNet> = clusters.collect();
-            PairedTest::new(&clusters, sample.models as f64, squares).p < sample.level
-        });
-        found.count() as f64 / f64::from(runs)
+        (0..runs)
+            .filter(|_| {
+                let mut squares = 0.0;
+                let clusters: Vec<ClusterNet> = sample
+                    .questions
+                    .iter()
+                    .map(|items| {
+                        let change = |draw: f64| match draw {
+                            draw if draw < better => 1,
+                            draw if draw < changed => -1,
+                            _ => 0,
+                        };
+                        let common = random.random_range(0.0..1.0);
+                        let nets = (0..*items).map(|_| {
+                            let net: i64 = (0..sample.models)
+                                .map(|_| {
+                                    let is_common = random.random_bool(CORRELATION.sqrt());
+                                    change(if is_common {
+                                        common
+                                    } else {
+                                        random.random_range(0.0..1.0)
+                                    })
+                                })
+                                .sum();
+                            squares += (net * net) as f64;
+                            net
+                        });
+                        ClusterNet {
+                            net: nets.sum(),
+                            items: *items as u32,
+                        }
+                    })
+                    .collect();
+                PairedTest::new(&clusters, sample.models as f64, squares).p < sample.level
+            })
+            .count() as f64
+            / f64::from(runs)
     }
 
     #[test]

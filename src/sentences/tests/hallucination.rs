@@ -111,15 +111,17 @@ fn a_collapse_that_is_no_more_than_at_l0_is_not_said() {
 fn one_answer_to_everything_is_named_or_counted() {
     let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[4]);
     let say = |families: &[(&Family, &[(&str, Collapse)])]| {
-        let answers = families.iter().flat_map(|(family, models)| {
-            models.iter().map(move |(model, collapse)| TopAnswer {
-                model,
-                family,
-                level,
-                collapse,
+        let answers: Vec<TopAnswer<'_>> = families
+            .iter()
+            .flat_map(|(family, models)| {
+                models.iter().map(move |(model, collapse)| TopAnswer {
+                    model,
+                    family,
+                    level,
+                    collapse,
+                })
             })
-        });
-        let answers: Vec<TopAnswer<'_>> = answers.collect();
+            .collect();
         let said = hallucination::collapse(&answers, ClusterUnit::Scene);
         said.as_ref().map(checked)
     };

@@ -78,8 +78,10 @@ fn said(records: &[Record]) -> Vec<Sentence> {
 
 /// The sentences of a kind, each with its detail.
 fn of_kind(said: &[Sentence], kind: &str) -> Vec<String> {
-    let of_kind = said.iter().filter(|sentence| sentence.kind == kind);
-    of_kind.map(checked).collect()
+    said.iter()
+        .filter(|sentence| sentence.kind == kind)
+        .map(checked)
+        .collect()
 }
 
 #[test]
@@ -239,10 +241,10 @@ fn too_few_clusters_are_no_verdict_set_by_set() {
 
 /// Sentences that do not say who is apart.
 fn about_others(said: &[Sentence]) -> Vec<String> {
-    let others = said
-        .iter()
-        .filter(|sentence| !["apart", "left out"].contains(&sentence.kind));
-    others.map(checked).collect()
+    said.iter()
+        .filter(|sentence| !["apart", "left out"].contains(&sentence.kind))
+        .map(checked)
+        .collect()
 }
 
 #[test]
@@ -471,10 +473,12 @@ const SEEING: [(&str, usize); 7] = [
 
 /// The signed sentences about darkness, noise, enhancers and words alone.
 fn signed(said: &[Sentence]) -> Vec<String> {
-    let signed = said.iter().filter(|sentence| {
-        matches!(sentence.tone, Tone::Better | Tone::Worse) && sentence.kind != "images"
-    });
-    signed.map(checked).collect()
+    said.iter()
+        .filter(|sentence| {
+            matches!(sentence.tone, Tone::Better | Tone::Worse) && sentence.kind != "images"
+        })
+        .map(checked)
+        .collect()
 }
 
 #[test]

@@ -89,9 +89,10 @@ fn findings(kind: PooledKind, all: &[(f64, Significance)]) -> Vec<PooledFinding>
 /// The numbers in a text, without those of level names.
 fn numbers(text: &str) -> Vec<f64> {
     let text = text.replace('−', "-");
-    let words = text.split([' ', '[', ']', '(', ')', ';', '–', ':', '%']);
-    let words = words.map(|word| word.trim_end_matches(['.', ',']).replace(',', ""));
-    words.filter_map(|word| word.parse().ok()).collect()
+    text.split([' ', '[', ']', '(', ')', ';', '–', ':', '%'])
+        .map(|word| word.trim_end_matches(['.', ',']).replace(',', ""))
+        .filter_map(|word| word.parse().ok())
+        .collect()
 }
 
 /// The sentence as one line; each number in it must be one of its values.

@@ -386,31 +386,32 @@ fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
         .iter()
         .map(|name| Some(name.parse().unwrap()))
         .collect();
-    let alarms = (0..runs).filter(|_| {
-        design.answer(&mut random, &mut records);
-        let asked = records
-            .iter()
-            .filter(|record| kept.contains(&record.condition));
-        let trials = asked.cloned().collect();
-        let units = Clusters::new(asked_pairs(&records), &FrameTies::default());
-        let grid = Grid::new(&trials, &units);
-        let pairs = grid
-            .subjects
-            .iter()
-            .enumerate()
-            .filter_map(|(index, subject)| {
-                let number: usize = subject.model[1..].parse().ok()?;
-                let old = Subject {
-                    model: format!("m{:02}", number + models),
-                    ..subject.clone()
-                };
-                Some((index, grid.find(&old)?))
-            });
-        let rows = baseline_rows(&grid, &healths(&grid), &pairs.collect::<Vec<_>>(), |_| None);
-        rows.iter()
-            .any(|row| row.significance == Significance::Worse)
-    });
-    alarms.count()
+    (0..runs)
+        .filter(|_| {
+            design.answer(&mut random, &mut records);
+            let asked = records
+                .iter()
+                .filter(|record| kept.contains(&record.condition));
+            let trials = asked.cloned().collect();
+            let units = Clusters::new(asked_pairs(&records), &FrameTies::default());
+            let grid = Grid::new(&trials, &units);
+            let pairs = grid
+                .subjects
+                .iter()
+                .enumerate()
+                .filter_map(|(index, subject)| {
+                    let number: usize = subject.model[1..].parse().ok()?;
+                    let old = Subject {
+                        model: format!("m{:02}", number + models),
+                        ..subject.clone()
+                    };
+                    Some((index, grid.find(&old)?))
+                });
+            let rows = baseline_rows(&grid, &healths(&grid), &pairs.collect::<Vec<_>>(), |_| None);
+            rows.iter()
+                .any(|row| row.significance == Significance::Worse)
+        })
+        .count()
 }
 
 fn asked_pairs(records: &[Record]) -> impl Iterator<Item = (&QuestionId, &FrameId)> {

@@ -74,18 +74,24 @@ impl TextTable {
 
     /// The width of a column with its padding.
     fn width_of(&self, column: usize) -> usize {
-        let texts = self.rows.iter().filter_map(|row| match row {
-            TextRow::Cells(cells) => Some(cells.get(column)?.width()),
-            // A heading stands in the first column.
-            TextRow::Heading(heading) => (column == 0).then(|| heading.width() + 2),
-        });
-        let longest = texts.max().unwrap_or(0);
+        let longest = self
+            .rows
+            .iter()
+            .filter_map(|row| match row {
+                TextRow::Cells(cells) => Some(cells.get(column)?.width()),
+                // A heading stands in the first column.
+                TextRow::Heading(heading) => (column == 0).then(|| heading.width() + 2),
+            })
+            .max()
+            .unwrap_or(0);
         longest.max(self.columns[column].head.width()) + PADDING
     }
 
     fn width(&self) -> usize {
-        let widths = (0..self.columns.len()).map(|column| self.width_of(column));
-        widths.sum::<usize>().saturating_sub(1)
+        (0..self.columns.len())
+            .map(|column| self.width_of(column))
+            .sum::<usize>()
+            .saturating_sub(1)
     }
 
     /// Shortens the names of models as far as that makes the table fit, and as far as they stay apart.
@@ -100,8 +106,12 @@ impl TextTable {
             let longest = names.iter().map(|name| name.width()).max().unwrap_or(0);
             let least = longest.saturating_sub(over).max(LEAST_NAME);
             let differ = |length: &usize| {
-                let short = names.iter().map(|name| shortened(name, *length));
-                short.collect::<BTreeSet<String>>().len() == names.len()
+                names
+                    .iter()
+                    .map(|name| shortened(name, *length))
+                    .collect::<BTreeSet<String>>()
+                    .len()
+                    == names.len()
             };
             let length = (least..longest).find(differ).unwrap_or(longest);
             for row in &mut self.rows {
@@ -152,8 +162,9 @@ impl TextTable {
         let texts = self
             .columns
             .iter()
-            .take_while(|column| column.kind == ColumnKind::Text);
-        let texts = texts.count().min(self.columns.len().saturating_sub(1));
+            .take_while(|column| column.kind == ColumnKind::Text)
+            .count()
+            .min(self.columns.len().saturating_sub(1));
         let names = (1..=texts)
             .rev()
             .find(|names| has_room(*names))

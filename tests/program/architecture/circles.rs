@@ -20,8 +20,11 @@ pub(crate) fn wrong<'a>(
     let found = circles(&imports);
     let is_listed = |circle: &&Vec<&str>| listed.iter().any(|(files, _)| files == circle);
     let is_found = |files: &[&str]| found.iter().any(|circle| circle == files);
-    let new = found.iter().filter(|circle| !is_listed(circle));
-    let mut wrong: Vec<String> = new.map(|circle| message(circle, &imports)).collect();
+    let mut wrong: Vec<String> = found
+        .iter()
+        .filter(|circle| !is_listed(circle))
+        .map(|circle| message(circle, &imports))
+        .collect();
     let gone = listed.iter().filter(|(files, _)| !is_found(files));
     wrong.extend(gone.map(|(files, _)| {
         let files = files.join(", ");

@@ -38,16 +38,19 @@ impl Files {
             Source::read(path, text).unwrap_or_else(|problem| panic!("src/{path}: {problem}"))
         };
         let mut sources: Vec<Source> = texts.iter().map(read).collect();
-        let parts = sources.iter().flat_map(|source| &source.parts);
-        let declared = parts.filter(|part| matches!(part.kind, Kind::TestFile));
-        let for_tests: Vec<Vec<String>> = declared
+        let for_tests: Vec<Vec<String>> = sources
+            .iter()
+            .flat_map(|source| &source.parts)
+            .filter(|part| matches!(part.kind, Kind::TestFile))
             .map(|part| [&part.scope[..], &part.names].concat())
             .collect();
         for source in &mut sources {
             source.is_test = for_tests.iter().any(|test| source.module.starts_with(test));
         }
-        let places = sources.iter().enumerate();
-        let places = places.map(|(at, source)| (source.module.clone(), at));
+        let places = sources
+            .iter()
+            .enumerate()
+            .map(|(at, source)| (source.module.clone(), at));
         Self {
             places: places.collect(),
             sources,

@@ -17,8 +17,9 @@ struct Row {
 impl Map {
     /// The table of a `lib.rs`, or what cannot be read.
     pub(crate) fn read(lib: &str) -> Result<Self, String> {
-        let lines = lib.lines().filter_map(|line| line.strip_prefix("//!"));
-        let table = lines
+        let table = lib
+            .lines()
+            .filter_map(|line| line.strip_prefix("//!"))
             .map(str::trim)
             .skip_while(|line| *line != HEADING)
             .skip(1)

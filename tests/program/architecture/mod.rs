@@ -198,7 +198,10 @@ fn no_code_is_missing() {
 fn no_digest_is_made_of_debug_output() {
     let makers: Vec<_> = crates().flat_map(digests::makers).collect();
     assert!(makers.len() > 20, "{makers:?}");
-    let debug = makers.into_iter().filter(|(_, _, has_debug)| *has_debug);
-    let found: Vec<_> = debug.map(|(file, name, _)| (file, name)).collect();
+    let found: Vec<_> = makers
+        .into_iter()
+        .filter(|(_, _, has_debug)| *has_debug)
+        .map(|(file, name, _)| (file, name))
+        .collect();
     assert_eq!(found, DEBUG_IN_MESSAGES);
 }

@@ -6,12 +6,14 @@ use super::source::{Kind, Part, Source};
 
 /// The files that have too many lines.
 pub(crate) fn long_files(files: &Files, most: usize) -> Vec<String> {
-    let long = files.iter().filter(|source| source.lines > most);
-    let lines = long.map(|source| {
-        let rule = format!("{} lines, and a file may have {most}", source.lines);
-        at(source, source.lines, &rule)
-    });
-    lines.collect()
+    files
+        .iter()
+        .filter(|source| source.lines > most)
+        .map(|source| {
+            let rule = format!("{} lines, and a file may have {most}", source.lines);
+            at(source, source.lines, &rule)
+        })
+        .collect()
 }
 
 /// The imports of rooms and crates that the map does not allow; those of tests count, too.

@@ -57,8 +57,11 @@ impl Source {
     pub(crate) fn read(path: &str, text: &str) -> syn::Result<Self> {
         let module = path.strip_suffix(".rs").unwrap_or(path);
         let module = module.strip_suffix("/mod").unwrap_or(module);
-        let module = module.split('/').filter(|name| *name != "lib");
-        let module: Vec<String> = module.map(str::to_owned).collect();
+        let module: Vec<String> = module
+            .split('/')
+            .filter(|name| *name != "lib")
+            .map(str::to_owned)
+            .collect();
         let mut reader = Reader {
             scope: module.clone(),
             parts: Vec::new(),
@@ -270,10 +273,11 @@ fn branches(tree: &UseTree, before: &[String]) -> Vec<(Vec<String>, String, Span
     };
     match tree {
         UseTree::Path(path) => branches(&path.tree, &with(&plain(&path.ident))),
-        UseTree::Group(group) => {
-            let branches = group.items.iter().map(|tree| branches(tree, before));
-            branches.flatten().collect()
-        }
+        UseTree::Group(group) => group
+            .items
+            .iter()
+            .flat_map(|tree| branches(tree, before))
+            .collect(),
         UseTree::Name(name) => {
             let path = whole(&name.ident);
             let brings = path.last().cloned().unwrap_or_default();

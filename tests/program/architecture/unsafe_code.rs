@@ -14,12 +14,13 @@ pub(crate) fn count(text: &str) -> syn::Result<usize> {
 
 /// The numbers in the rows of a page that begin with the path of a file in `src/`.
 pub(crate) fn listed(page: &str) -> BTreeMap<String, usize> {
-    let rows = page.lines().filter_map(|line| {
-        let mut cells = line.strip_prefix("| `src/")?.split('|');
-        let path = cells.next()?.trim().strip_suffix('`')?;
-        Some((path.to_owned(), cells.next()?.trim().parse().ok()?))
-    });
-    rows.collect()
+    page.lines()
+        .filter_map(|line| {
+            let mut cells = line.strip_prefix("| `src/")?.split('|');
+            let path = cells.next()?.trim().strip_suffix('`')?;
+            Some((path.to_owned(), cells.next()?.trim().parse().ok()?))
+        })
+        .collect()
 }
 
 struct Counter(usize);

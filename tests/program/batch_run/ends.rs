@@ -35,8 +35,10 @@ fn a_key_in_the_output_of_a_batch_is_kept_nowhere() {
     assert_eq!(called.code, Some(1), "{called:?}");
     assert!(!called.stderr.contains(KEY), "{called:?}");
     let records = records(&bench.path("run"));
-    let hidden = records.iter().map(ToString::to_string);
-    let hidden = hidden.filter(|record| record.contains("[secret]"));
+    let hidden = records
+        .iter()
+        .map(ToString::to_string)
+        .filter(|record| record.contains("[secret]"));
     assert_eq!(hidden.count(), QUESTIONS);
     let mut texts = 0;
     for folder in ["run", "run/batch"] {

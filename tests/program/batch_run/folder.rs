@@ -121,10 +121,14 @@ fn no_key_goes_to_an_address_that_only_the_folder_names() {
     let stranger = MockBatches::start([Course::of("in_progress")]);
     let state = bench.path("run/batch/state.jsonl");
     let text = std::fs::read_to_string(&state).unwrap();
-    let mut lines = text
+    let own = text
         .lines()
-        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
-    let own = lines.next().unwrap()["base"].as_str().unwrap().to_owned();
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
+        .next()
+        .unwrap()["base"]
+        .as_str()
+        .unwrap()
+        .to_owned();
     std::fs::write(&state, text.replace(&own, &stranger.base_url())).unwrap();
     for task in ["status", "fetch", "cancel"] {
         let line = format!("batch {task} run");

@@ -258,8 +258,10 @@ fn a_kill_while_files_are_written_loses_nothing() {
         let expected: Vec<usize> = expected.into_iter().filter(|size| *size > 0).collect();
         assert_eq!(sizes, expected);
         let left = fs::read_dir(bench.path("run/batch")).unwrap();
-        let names = left.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-        let unfinished: Vec<String> = names.filter(|name| name.ends_with("part")).collect();
+        let unfinished: Vec<String> = left
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .filter(|name| name.ends_with("part"))
+            .collect();
         assert!(unfinished.is_empty(), "{unfinished:?}");
     }
 }

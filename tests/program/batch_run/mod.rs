@@ -154,8 +154,9 @@ fn open_answers_and_their_marks_go_through_batches_one_after_the_other() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert!(called.stdout.contains("75.0"), "{called:?}");
     mock.with(|server| {
-        let models = server.batches.iter();
-        let models: Vec<&Value> = models
+        let models: Vec<&Value> = server
+            .batches
+            .iter()
             .map(|one| &one.requests[0]["body"]["model"])
             .collect();
         assert_eq!(models, ["m", "j"]);

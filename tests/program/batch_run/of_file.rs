@@ -98,8 +98,9 @@ fn a_field_that_is_refused_in_a_batch_is_left_out_for_that_model() {
     let called = call(&bench, &format!("{RUN} --no-scout"));
     assert_eq!(called.code, Some(0), "{called:?}");
     mock.with(|server| {
-        let sent = server.batches.iter();
-        let sent: Vec<bool> = sent
+        let sent: Vec<bool> = server
+            .batches
+            .iter()
             .map(|one| one.requests[0]["body"].get("temperature").is_some())
             .collect();
         assert_eq!(sent, [true, true, false]);

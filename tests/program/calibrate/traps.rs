@@ -50,8 +50,9 @@ fn bias(change: impl Fn(usize, usize, u16) -> u16) -> Shots {
 
 /// Each row and its left neighbour of the same colour, averaged.
 fn smoothed(frame: &[u16]) -> Vec<u16> {
-    let rows = frame.chunks(SIDE);
-    rows.flat_map(|row| (0..SIDE).map(|x| row[x].midpoint(row[(x + SIDE - 2) % SIDE])))
+    frame
+        .chunks(SIDE)
+        .flat_map(|row| (0..SIDE).map(|x| row[x].midpoint(row[(x + SIDE - 2) % SIDE])))
         .collect()
 }
 

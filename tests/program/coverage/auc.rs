@@ -259,8 +259,10 @@ fn the_coverage_and_size_of_the_auc_over_conditions() {
             }
         }
     }
-    let rates = designs.par_iter().map(|design| auc_rates(*design, 1000));
-    let rates: Vec<AucRates> = rates.collect();
+    let rates: Vec<AucRates> = designs
+        .par_iter()
+        .map(|design| auc_rates(*design, 1000))
+        .collect();
     println!(
         "\n| slope | conditions | scenes | shared | true AUC | mean AUC | interval holds the truth | p < 0.05 |\n|---|---|---|---|---|---|---|---|"
     );

@@ -75,8 +75,10 @@ impl Design {
             }
             Shape::LogNormal(spread) => {
                 let size = |drawn: f64| mean * (spread * drawn - spread * spread / 2.0).exp();
-                let sizes = (0..self.clusters).map(|_| size(StandardNormal.sample(random)));
-                sizes.map(|size| size.round().max(1.0) as u32).collect()
+                (0..self.clusters)
+                    .map(|_| size(StandardNormal.sample(random)))
+                    .map(|size| size.round().max(1.0) as u32)
+                    .collect()
             }
         }
     }
@@ -170,8 +172,10 @@ impl Designs<'_> {
             };
             self.means.iter().map(design)
         };
-        let cells = self.clusters.iter();
-        let cells = cells.flat_map(|cell| CORRELATIONS.map(|correlation| (*cell, correlation)));
+        let cells = self
+            .clusters
+            .iter()
+            .flat_map(|cell| CORRELATIONS.map(|correlation| (*cell, correlation)));
         let designs: Vec<Design> = cells.flat_map(|(cell, icc)| means(cell, icc)).collect();
         let held = designs.par_iter();
         let held: Vec<[Option<f64>; N]> = held
@@ -184,12 +188,13 @@ impl Designs<'_> {
             };
             let held: Vec<Option<f64>> = held.iter().map(|held| held[index]).collect();
             let rows = held.chunks(CORRELATIONS.len() * self.means.len());
-            let rows = rows.zip(self.clusters).map(|(held, (clusters, size))| {
-                let cells = held.chunks(self.means.len()).map(cell_text);
-                let cells: Vec<String> = cells.collect();
-                format!("| {name} | {clusters} × {size} | {} |", cells.join(" | "))
-            });
-            let rows: Vec<String> = rows.collect();
+            let rows: Vec<String> = rows
+                .zip(self.clusters)
+                .map(|(held, (clusters, size))| {
+                    let cells: Vec<String> = held.chunks(self.means.len()).map(cell_text).collect();
+                    format!("| {name} | {clusters} × {size} | {} |", cells.join(" | "))
+                })
+                .collect();
             println!(
                 "\n| interval | cells × runs | mean | least | 5th percentile | cells < 93 | > 97 |\n|---|---|---|---|---|---|---|\n{}\n\n\
                  Each cell: p {:?}\n\n| interval | clusters × size | ICC 0 | 0.1 | 0.2 | 0.4 |\n|---|---|---|---|---|---|\n{}\n",

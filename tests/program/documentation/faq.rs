@@ -8,17 +8,19 @@ use super::page::{Page, root};
 
 /// The texts in “ ” in the headings of a page.
 fn quoted(page: &str) -> Vec<&str> {
-    let headings = page.lines().filter(|line| line.starts_with("## "));
-    let texts = headings.flat_map(|heading| heading.split('“').skip(1));
-    texts.filter_map(|text| text.split('”').next()).collect()
+    page.lines()
+        .filter(|line| line.starts_with("## "))
+        .flat_map(|heading| heading.split('“').skip(1))
+        .filter_map(|text| text.split('”').next())
+        .collect()
 }
 
 #[test]
 fn the_quoted_messages_are_in_the_program() {
     let page = Page::read("src/docs/faq.md");
-    let sources = files(&root().join("src")).into_iter();
-    let sources = sources.filter(|path| path.extension().is_some_and(|end| end == "rs"));
-    let program: Vec<String> = sources
+    let program: Vec<String> = files(&root().join("src"))
+        .into_iter()
+        .filter(|path| path.extension().is_some_and(|end| end == "rs"))
         .map(|path| {
             let text = fs::read_to_string(path).unwrap();
             // A string over several lines of the source is one line of a message.

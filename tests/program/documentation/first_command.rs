@@ -10,9 +10,11 @@ use crate::support::run::{Bench, called, words};
 /// The arguments of the first command of the README.
 fn first_command() -> Vec<String> {
     let readme = Page::read("README.md");
-    let shown = readme.blocks.iter();
-    let mut shown = shown.filter(|block| block.kind == BlockKind::ParseOnly);
-    let block = shown.next().unwrap();
+    let block = readme
+        .blocks
+        .iter()
+        .find(|block| block.kind == BlockKind::ParseOnly)
+        .unwrap();
     let (_, words) = shell::commands(&block.lines).remove(0);
     arguments(&words).unwrap().to_vec()
 }
@@ -47,8 +49,8 @@ fn is_frame(line: &str) -> bool {
 
 /// The lines of a block that are not printed, with their places.
 fn missing_lines(page: &Page, block: &Block, printed: &[String]) -> Vec<String> {
-    let lines = (block.line + 1..).zip(&block.lines);
-    lines
+    (block.line + 1..)
+        .zip(&block.lines)
         .filter(|(_, line)| !is_frame(line) && !printed.iter().any(|one| shows(line, one)))
         .map(|(number, line)| format!("{}: {line}", page.at(number)))
         .collect()

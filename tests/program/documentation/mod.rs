@@ -178,18 +178,16 @@ fn script(page: &Page) -> String {
 fn missing_lines(page: &Page, printed: &str) -> Vec<String> {
     let one_space = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
     let printed: Vec<String> = printed.lines().map(one_space).collect();
-    let shown = page
-        .blocks
+    page.blocks
         .iter()
-        .filter(|block| block.kind == BlockKind::Output);
-    let numbered = shown.flat_map(|block| (block.line + 1..).zip(&block.lines));
-    let missing = numbered.filter(|(_, line)| {
-        let begin = line.split(|c: char| c.is_ascii_digit()).next();
-        let begin = one_space(begin.unwrap_or_default());
-        begin.chars().any(char::is_alphabetic)
-            && !printed.iter().any(|line| line.starts_with(&begin))
-    });
-    missing
+        .filter(|block| block.kind == BlockKind::Output)
+        .flat_map(|block| (block.line + 1..).zip(&block.lines))
+        .filter(|(_, line)| {
+            let begin = line.split(|c: char| c.is_ascii_digit()).next();
+            let begin = one_space(begin.unwrap_or_default());
+            begin.chars().any(char::is_alphabetic)
+                && !printed.iter().any(|line| line.starts_with(&begin))
+        })
         .map(|(number, line)| format!("{}: {line}", page.at(number)))
         .collect()
 }
@@ -236,10 +234,12 @@ fn every_page_is_in_the_summary() {
 
 /// The long flags of a command and of the commands in it, without hidden ones.
 fn flags(command: &clap::Command) -> BTreeSet<String> {
-    let own = command.get_arguments().filter(|arg| !arg.is_hide_set());
-    let own = own.filter_map(clap::Arg::get_long);
-    let own = own.map(|flag| format!("--{flag}"));
-    own.chain(command.get_subcommands().flat_map(flags))
+    command
+        .get_arguments()
+        .filter(|arg| !arg.is_hide_set())
+        .filter_map(clap::Arg::get_long)
+        .map(|flag| format!("--{flag}"))
+        .chain(command.get_subcommands().flat_map(flags))
         .collect()
 }
 
@@ -269,10 +269,10 @@ fn pages_name_every_flag_and_no_other() {
     }
     assert!(unknown.is_empty(), "no such flag: {unknown:#?}");
     let builtin = ["--help", "--version"];
-    let silent = all
+    let silent: Vec<&String> = all
         .iter()
-        .filter(|flag| !named.contains(*flag) && !builtin.contains(&&***flag));
-    let silent: Vec<&String> = silent.collect();
+        .filter(|flag| !named.contains(*flag) && !builtin.contains(&&***flag))
+        .collect();
     assert!(silent.is_empty(), "on no page: {silent:?}");
 }
 

@@ -45,19 +45,26 @@ pub(crate) fn root() -> &'static Path {
 /// The README and all pages, in the order of the summary.
 pub(crate) fn pages() -> Vec<Page> {
     let summary = Page::read(SUMMARY);
-    let listed = summary.links().into_iter().map(|(_, link)| link);
-    let listed = listed.map(|link| format!("src/docs/{link}"));
-    let names = std::iter::once("README.md".to_owned()).chain(listed);
-    names.map(|name| Page::read(&name)).collect()
+    let listed = summary
+        .links()
+        .into_iter()
+        .map(|(_, link)| link)
+        .map(|link| format!("src/docs/{link}"));
+    std::iter::once("README.md".to_owned())
+        .chain(listed)
+        .map(|name| Page::read(&name))
+        .collect()
 }
 
 /// The Markdown files in the folder of the pages, the summary aside.
 pub(crate) fn files() -> Vec<String> {
     let entries = fs::read_dir(root().join("src/docs")).unwrap();
-    let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let pages = names.filter_map(|name| Some(name.strip_suffix(".md")?.to_owned()));
-    let pages = pages.filter(|page| page != "SUMMARY");
-    pages.map(|page| format!("src/docs/{page}.md")).collect()
+    entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter_map(|name| Some(name.strip_suffix(".md")?.to_owned()))
+        .filter(|page| page != "SUMMARY")
+        .map(|page| format!("src/docs/{page}.md"))
+        .collect()
 }
 
 impl Page {
@@ -79,8 +86,7 @@ impl Page {
     /// The lines outside of fences, with their numbers.
     fn prose(&self) -> impl Iterator<Item = (usize, &str)> {
         let mut is_code = false;
-        let lines = (1..).zip(self.text.lines());
-        lines.filter(move |(_, line)| {
+        (1..).zip(self.text.lines()).filter(move |(_, line)| {
             let is_fence = line.starts_with("```");
             is_code ^= is_fence;
             !is_code && !is_fence
@@ -99,8 +105,8 @@ impl Page {
 
     /// Whether a link to `#anchor` leads to a heading of the page.
     pub(crate) fn has_anchor(&self, anchor: &str) -> bool {
-        let headings = self.prose().filter(|(_, line)| line.starts_with('#'));
-        headings
+        self.prose()
+            .filter(|(_, line)| line.starts_with('#'))
             .map(|(_, line)| line.trim_start_matches('#').trim())
             .any(|heading| slug(heading) == anchor)
     }
@@ -128,13 +134,16 @@ impl Page {
 
 /// The anchor that GitHub and mdBook make of a heading.
 fn slug(heading: &str) -> String {
-    let kept = heading.chars().filter_map(|c| match c {
-        ' ' => Some('-'),
-        '-' | '_' => Some(c),
-        c if c.is_alphanumeric() => Some(c),
-        _ => None,
-    });
-    kept.collect::<String>().to_lowercase()
+    heading
+        .chars()
+        .filter_map(|c| match c {
+            ' ' => Some('-'),
+            '-' | '_' => Some(c),
+            c if c.is_alphanumeric() => Some(c),
+            _ => None,
+        })
+        .collect::<String>()
+        .to_lowercase()
 }
 
 fn blocks(text: &str) -> Vec<Block> {

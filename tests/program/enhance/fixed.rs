@@ -15,10 +15,11 @@ fn differing(one: &Rgb, other: &Rgb, [rows, columns]: [usize; 2]) -> usize {
         .samples()
         .chunks(width)
         .zip(other.samples().chunks(width));
-    let pairs = lines
+    lines
         .take(rows)
-        .flat_map(|(a, b)| a[..3 * columns].iter().zip(&b[..3 * columns]));
-    pairs.filter(|(a, b)| a != b).count()
+        .flat_map(|(a, b)| a[..3 * columns].iter().zip(&b[..3 * columns]))
+        .filter(|(a, b)| a != b)
+        .count()
 }
 
 #[test]

@@ -38,8 +38,12 @@ fn map_pixels(image: &Rgb, with: impl Fn([f64; 3]) -> [f64; 3]) -> Rgb {
 
 /// Asserts that no sample is more than one code off.
 fn assert_near(found: &Rgb, expected: &Rgb) {
-    let pairs = found.samples().iter().zip(expected.samples());
-    let most = pairs.map(|(a, b)| a.abs_diff(*b)).max();
+    let most = found
+        .samples()
+        .iter()
+        .zip(expected.samples())
+        .map(|(a, b)| a.abs_diff(*b))
+        .max();
     assert!(most <= Some(1), "{most:?} codes");
 }
 
@@ -141,8 +145,12 @@ fn noise_is_the_same_with_any_tiles_and_threads() {
         .with_tiling(Tiling::Side(NonZeroUsize::new(16).unwrap()));
     assert_eq!(tiled.enhance(&image).unwrap(), first);
     let differing = |other: &Rgb| {
-        let pairs = other.samples().iter().zip(first.samples());
-        pairs.filter(|(a, b)| a != b).count()
+        other
+            .samples()
+            .iter()
+            .zip(first.samples())
+            .filter(|(a, b)| a != b)
+            .count()
     };
     for other in [enhanced(&graph, &noise(0.1, 1), &image), image.clone()] {
         assert!(differing(&other) > image.samples().len() / 2);

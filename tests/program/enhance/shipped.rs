@@ -63,8 +63,10 @@ fn lift() -> Enhancer {
 
 /// The mean square of the difference of two images, as a ratio to the brightest in dB.
 fn psnr(a: &Rgb, b: &Rgb) -> f64 {
-    let squares = a.samples().iter().zip(b.samples());
-    let sum: f64 = squares
+    let sum: f64 = a
+        .samples()
+        .iter()
+        .zip(b.samples())
         .map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2))
         .sum();
     10.0 * (255.0_f64.powi(2) * a.samples().len() as f64 / sum.max(1e-9)).log10()

@@ -31,10 +31,11 @@ fn the_built_in_rooms_run_without_anything() {
     assert_eq!(records.len(), blind.len() * 11);
     assert!(blind.len() >= 12, "{}", blind.len());
     let right = |condition: &str| {
-        let of = records
+        records
             .iter()
-            .filter(|record| record["condition"] == condition);
-        of.filter(|record| record["outcome"] == "right").count()
+            .filter(|record| record["condition"] == condition)
+            .filter(|record| record["outcome"] == "right")
+            .count()
     };
     assert!(right("L0") * 10 >= blind.len() * 9, "{table}");
     let conditions: BTreeSet<&str> = records
@@ -126,10 +127,10 @@ fn several_images_enhanced_at_once_are_the_same_images() {
              --threads {threads} --out {run}"
         )));
         let records = records(&bench.path(run));
-        let images = records
+        records
             .iter()
-            .map(|r| (r["key"].to_string(), r["image"]["digest"].to_string()));
-        images.collect()
+            .map(|r| (r["key"].to_string(), r["image"]["digest"].to_string()))
+            .collect()
     };
     let one = images("one", "1");
     assert!(one.len() > 24, "{}", one.len());

@@ -241,8 +241,11 @@ fn the_image_may_stand_first() {
     let requests: Vec<Value> = mock.requests().iter().map(Request::json).collect();
     let kinds = |body: &Value| -> Vec<String> {
         let parts = body["messages"][0]["content"].as_array();
-        let parts = parts.into_iter().flatten();
-        parts.map(|part| text(part, "type").to_owned()).collect()
+        parts
+            .into_iter()
+            .flatten()
+            .map(|part| text(part, "type").to_owned())
+            .collect()
     };
     let shown: Vec<Vec<String>> = requests
         .iter()

@@ -31,10 +31,10 @@ fn photos(light: u32) -> Bench {
         );
     }
     bench.file("photos/questions.jsonl", questions.join("\n"));
-    let clean = (0..3).map(|index| {
-        json!({"question": format!("q{index}"), "condition": "L0", "reply": "yes"}).to_string()
-    });
-    let answers: Vec<String> = clean
+    let answers: Vec<String> = (0..3)
+        .map(|index| {
+            json!({"question": format!("q{index}"), "condition": "L0", "reply": "yes"}).to_string()
+        })
         .chain([json!({"default": "no"}).to_string()])
         .collect();
     bench.file("answers.jsonl", answers.join("\n"));
@@ -45,8 +45,10 @@ const ASK: &str = "--model script:answers.jsonl --data photos --llie lift --out 
 
 /// The words that follow the name of a row in the table on standard output.
 fn row<'t>(table: &'t str, name: &str) -> Vec<&'t str> {
-    let mut lines = table.lines().map(str::trim_start);
-    let line = lines.find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    let line = table
+        .lines()
+        .map(str::trim_start)
+        .find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
     line.unwrap_or_else(|| panic!("no row {name:?}: {table}"))
         .split_whitespace()
         .collect()

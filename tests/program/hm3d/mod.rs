@@ -63,8 +63,9 @@ fn walks_become_frames_and_questions() {
         (BED, "00040", 4.0),
     ];
     let more = [(SECOND, "00000", 0.0), (SECOND, "00020", 2.0)];
-    let expected = expected.iter().chain(&more);
     let expected: Vec<String> = expected
+        .iter()
+        .chain(&more)
         .map(|(scene, frame, time)| format!("{scene:?} {frame:?} {time:?}"))
         .collect();
     assert_eq!(frames, expected);

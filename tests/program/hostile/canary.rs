@@ -86,8 +86,7 @@ pub(crate) fn is_in(sent: &[u8]) -> bool {
     let holds = |part: &[u8]| sent.windows(part.len()).any(|window| window == part);
     let has_picture = || {
         let text = String::from_utf8_lossy(sent);
-        let images = text.split(";base64,").skip(1);
-        let decoded = images.map(|rest| {
+        let decoded = text.split(";base64,").skip(1).map(|rest| {
             let is_code = |c: &char| c.is_ascii_alphanumeric() || "+/=".contains(*c);
             let code: String = rest.chars().take_while(is_code).collect();
             STANDARD.decode(code).unwrap_or_default()

@@ -9,9 +9,10 @@ use crate::support::run::{Bench, words};
 fn subcommands(bench: &Bench, above: &str) -> Vec<String> {
     let help = bench.complete(&[words(above), vec!["--help"]].concat());
     let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1);
-    let lines = lines.take_while(|line| !line.is_empty());
-    let names = lines.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
-    let names = names.filter(|name| !name.is_empty() && (above.is_empty() || *name != "help"));
+    let names = lines
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.strip_prefix("  ")?.split(' ').next())
+        .filter(|name| !name.is_empty() && (above.is_empty() || *name != "help"));
     let mut all = Vec::new();
     for name in names {
         let command = format!("{above} {name}").trim().to_owned();

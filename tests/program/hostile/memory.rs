@@ -200,10 +200,10 @@ fn sparse_files_are_not_read() {
     let line = "--model random --data set.jsonl --levels L3 --images-cache store --out run1";
     assert_eq!(call(&bench, line).code, Some(0));
     let stored = files(&bench.path("store"));
-    let images = stored
+    let images: Vec<_> = stored
         .iter()
-        .filter(|path| path.extension().is_some_and(|end| end == "img"));
-    let images: Vec<_> = images.collect();
+        .filter(|path| path.extension().is_some_and(|end| end == "img"))
+        .collect();
     assert!(!images.is_empty());
     for image in images {
         let end = fs::read(image).unwrap();

@@ -23,10 +23,10 @@ fn answer(folder: &Path, request: &Request) -> Answer {
     let route = format!("{method}-{}", parts.join("-"));
     let endings = ["http", "json", "jsonl"];
     let file = |name: &str| -> Option<PathBuf> {
-        let mut paths = endings
+        endings
             .map(|ending| folder.join(format!("{name}.{ending}")))
-            .into_iter();
-        paths.find(|path| path.is_file())
+            .into_iter()
+            .find(|path| path.is_file())
     };
     let Some(path) = file(&route)
         .or_else(|| file("refusal"))

@@ -56,8 +56,10 @@ impl<'a> Trial<'a> {
             .any(|folder| file.starts_with(folder));
         // What a mock sends stays a file.
         let damage = if !is_ours && random.percent(8) {
-            let mut words = case.line.split(' ');
-            let is_typed = words.any(|word| file.to_str() == word.rsplit(':').next());
+            let is_typed = case
+                .line
+                .split(' ')
+                .any(|word| file.to_str() == word.rsplit(':').next());
             Damage::Replaced(Place::draw(random, is_typed))
         } else {
             let steps = 1 + random.below(4);

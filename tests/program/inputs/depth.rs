@@ -90,8 +90,11 @@ fn every_code_is_darkened_before_it_is_rounded() {
 fn eight_bits_in_sixteen_are_the_same_images() {
     let bench = Bench::new();
     let eight = RgbImage::from_fn(37, 21, |x, y| Rgb([(x * 6) as u8, (y * 12) as u8, 90]));
-    let samples = eight.as_raw().iter();
-    let samples = samples.map(|code| 257 * u16::from(*code)).collect();
+    let samples = eight
+        .as_raw()
+        .iter()
+        .map(|code| 257 * u16::from(*code))
+        .collect();
     let sixteen = Image16::from_raw(37, 21, samples).unwrap();
     fs::create_dir_all(bench.path("8")).unwrap();
     eight.save(bench.path("8/a.png")).unwrap();
@@ -186,11 +189,11 @@ fn linear_light_is_stated_by_the_flag_or_by_the_file() {
         Pixels::Light(light) => light,
         other => panic!("{other:?}"),
     };
-    let expected = image
+    let expected: Vec<f32> = image
         .as_raw()
         .iter()
-        .map(|code| f32::from(*code) / 65_535.0);
-    let expected: Vec<f32> = expected.collect();
+        .map(|code| f32::from(*code) / 65_535.0)
+        .collect();
     for file in [
         linear(png(&image)),
         linear(tiff_of(Order::Big, &image)),

@@ -256,11 +256,10 @@ fn a_run_reads_all_formats_of_a_folder() {
         ),
         ("c.png", png(&image())),
     ];
-    let questions = frames.iter().map(|(name, bytes)| {
+    let questions: Vec<String> = frames.iter().map(|(name, bytes)| {
         bench.file(&format!("set/{name}"), bytes);
         json!({"id": name, "frame": name, "question": "Is it?", "choices": ["yes", "no"], "answer": "no"}).to_string()
-    });
-    let questions: Vec<String> = questions.collect();
+    }).collect();
     bench.file("set/questions.jsonl", questions.join("\n"));
     bench.file("set/IMG_2.HEIC", "x");
     bench.file("set/IMG_1.HEIC", "x");
@@ -275,10 +274,9 @@ fn a_run_reads_all_formats_of_a_folder() {
     assert_eq!(called.stderr.matches(first).count(), 1, "{called:?}");
     let records = records(&bench.path("run"));
     let digests = |condition: &str| {
-        let records = records
-            .iter()
-            .filter(|record| record["condition"] == condition);
         let mut digests: Vec<String> = records
+            .iter()
+            .filter(|record| record["condition"] == condition)
             .map(|record| record["image"]["digest"].to_string())
             .collect();
         digests.dedup();

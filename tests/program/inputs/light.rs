@@ -19,8 +19,9 @@ use serde_json::Value;
 
 /// Light from black over white to 64 times white.
 fn lights() -> Vec<f32> {
-    let steps = (0..48 * 32 * 3).map(|i| 64.0 * (i as f32 / 4607.0).powi(4));
-    steps.collect()
+    (0..48 * 32 * 3)
+        .map(|i| 64.0 * (i as f32 / 4607.0).powi(4))
+        .collect()
 }
 
 fn file(bytes: Vec<u8>) -> ImageFile {

@@ -103,8 +103,9 @@ impl Set {
     pub(super) fn other(&self, place: usize) -> &Asked {
         let scene = |place: usize| self.frames[place].id.0.split('/').next().unwrap();
         let count = self.frames.len();
-        let mut after = (1..count).map(|step| (place + step) % count);
-        let other = after.find(|other| scene(*other) != scene(place));
+        let other = (1..count)
+            .map(|step| (place + step) % count)
+            .find(|other| scene(*other) != scene(place));
         &self.frames[other.unwrap()]
     }
 
@@ -200,16 +201,19 @@ impl Set {
         before: impl Fn(usize, &Asked) -> Rgb + Sync,
         after: impl Fn(usize, &Asked) -> Rgb + Sync,
     ) -> Estimate {
-        let frames = self.frames.par_iter().enumerate();
-        let sums = frames.map(|(place, asked)| {
-            let looks = [before(place, asked), after(place, asked)];
-            let [before, after] = looks.map(|image| asked.known.look(&image));
-            let questions = asked.questions.iter();
-            let differences = questions
-                .map(|question| self.score(&after, question) - self.score(&before, question));
-            [differences.sum(), asked.questions.len() as f64]
-        });
-        let sums: Vec<[f64; 2]> = sums.collect();
+        let sums: Vec<[f64; 2]> = self
+            .frames
+            .par_iter()
+            .enumerate()
+            .map(|(place, asked)| {
+                let looks = [before(place, asked), after(place, asked)];
+                let [before, after] = looks.map(|image| asked.known.look(&image));
+                let questions = asked.questions.iter();
+                let differences = questions
+                    .map(|question| self.score(&after, question) - self.score(&before, question));
+                [differences.sum(), asked.questions.len() as f64]
+            })
+            .collect();
         interval(&sums, sums.iter().map(|[_, n]| *n as usize).sum())
     }
 }

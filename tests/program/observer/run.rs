@@ -15,11 +15,13 @@ fn text<'a>(record: &'a Value, field: &str) -> &'a str {
 
 /// The records by key, without the time they took.
 fn by_key(run: &Path) -> BTreeMap<String, Value> {
-    let all = records(run).into_iter().map(|mut record| {
-        record["latency_ms"] = Value::Null;
-        (text(&record, "key").to_owned(), record)
-    });
-    all.collect()
+    records(run)
+        .into_iter()
+        .map(|mut record| {
+            record["latency_ms"] = Value::Null;
+            (text(&record, "key").to_owned(), record)
+        })
+        .collect()
 }
 
 #[test]
@@ -193,17 +195,19 @@ fn a_control_that_is_not_at_chance_hides_the_observer() {
     let path = bench.path("run/records.jsonl");
     let lines = fs::read_to_string(&path).unwrap();
     // The control as an observer that answers from the labels would leave it.
-    let spoiled = lines.lines().map(|line| {
-        let mut record: Value = serde_json::from_str(line).unwrap();
-        if record["model"] == "observer:other-room" {
-            record["observed"]["from"] = "evidence".into();
-            record["outcome"] = "right".into();
-            let truth = record["truth"].as_u64().unwrap() as u8;
-            record["reply"] = char::from(b'A' + truth).to_string().into();
-        }
-        record.to_string() + "\n"
-    });
-    let spoiled: String = spoiled.collect();
+    let spoiled: String = lines
+        .lines()
+        .map(|line| {
+            let mut record: Value = serde_json::from_str(line).unwrap();
+            if record["model"] == "observer:other-room" {
+                record["observed"]["from"] = "evidence".into();
+                record["outcome"] = "right".into();
+                let truth = record["truth"].as_u64().unwrap() as u8;
+                record["reply"] = char::from(b'A' + truth).to_string().into();
+            }
+            record.to_string() + "\n"
+        })
+        .collect();
     fs::write(&path, spoiled).unwrap();
     let called = bench.call(&["report", "run", "--out", "report"]);
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -230,8 +234,12 @@ fn a_control_that_is_not_at_chance_hides_the_observer() {
     }
     let summary = fs::read(bench.path("report/summary.json")).unwrap();
     let summary: Value = serde_json::from_slice(&summary).unwrap();
-    let models = summary["rows"].as_array().unwrap().iter();
-    let models: BTreeSet<&str> = models.map(|row| row["model"].as_str().unwrap()).collect();
+    let models: BTreeSet<&str> = summary["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["model"].as_str().unwrap())
+        .collect();
     assert_eq!(Vec::from_iter(models), ["chance", "random"]);
     // Against an old run, too.
     let called = bench.call(&["report", "run", "--baseline", "run", "--full"]);

@@ -45,9 +45,13 @@ fn marks_come_to_upstreams_score() {
     assert_eq!(judge.requests().len(), 4);
     let summary = house.read("run/summary.json");
     let row = |level: &str| {
-        let rows = summary["rows"].as_array().unwrap().iter();
-        let mut rows = rows.filter(|row| row["by"] == "all" && row["level"] == level);
-        rows.next().unwrap().clone()
+        summary["rows"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|row| row["by"] == "all" && row["level"] == level)
+            .unwrap()
+            .clone()
     };
     let clean = row("L0");
     assert_eq!(
@@ -93,10 +97,10 @@ fn the_same_answer_to_the_same_words_is_marked_once_and_scored_in_each_walk() {
     assert!(!called.stderr.contains("not judged"), "{called:?}");
     let items = records(&house.0.path("run"));
     let mark_of = |id: &str| {
-        let mut marks = items
+        items
             .iter()
-            .filter(|record| record["question"] == id && record["step"] == "mark");
-        marks.next().map(|mark| mark["upstream"].clone())
+            .find(|record| record["question"] == id && record["step"] == "mark")
+            .map(|mark| mark["upstream"].clone())
     };
     assert!(mark_of("q1").is_some() && mark_of("q4").is_none() && mark_of("q5").is_some());
     let summary = house.read("run/summary.json");
@@ -104,10 +108,7 @@ fn the_same_answer_to_the_same_words_is_marked_once_and_scored_in_each_walk() {
     let all = all.clone().find(|row| row["by"] == "all").unwrap();
     assert_eq!(all["n"], json!(5), "{all}");
     let table = rows(&house.0.path("run/records.parquet"));
-    let of = |id: &str| {
-        let mut rows = table.iter().filter(|row| row["question"] == id);
-        rows.next().unwrap()["mark"].clone()
-    };
+    let of = |id: &str| table.iter().find(|row| row["question"] == id).unwrap()["mark"].clone();
     assert_eq!(of("q1"), of("q4"));
     assert_ne!(of("q4"), of("q5"));
 }

@@ -21,12 +21,12 @@ fn sent(mock: &MockEndpoint) -> Vec<Value> {
 /// The images of a request.
 fn images(request: &Value) -> Vec<RgbImage> {
     let parts = request["messages"][0]["content"].as_array().unwrap();
-    let urls = parts
+    parts
         .iter()
-        .filter_map(|part| part["image_url"]["url"].as_str());
-    urls.map(|url| {
-        let file = STANDARD.decode(url.strip_prefix("data:image/png;base64,").unwrap());
-        image::load_from_memory(&file.unwrap()).unwrap().into_rgb8()
-    })
-    .collect()
+        .filter_map(|part| part["image_url"]["url"].as_str())
+        .map(|url| {
+            let file = STANDARD.decode(url.strip_prefix("data:image/png;base64,").unwrap());
+            image::load_from_memory(&file.unwrap()).unwrap().into_rgb8()
+        })
+        .collect()
 }

@@ -109,8 +109,10 @@ fn luminance(colour: &str) -> f64 {
             ((share + 0.055) / 1.055).powf(2.4)
         }
     });
-    let weighted = linear.zip([0.2126, 0.7152, 0.0722]);
-    weighted.map(|(share, weight)| share * weight).sum()
+    linear
+        .zip([0.2126, 0.7152, 0.0722])
+        .map(|(share, weight)| share * weight)
+        .sum()
 }
 
 fn contrast(a: &str, b: &str) -> f64 {
@@ -140,9 +142,11 @@ fn faint(browser: &mut Browser) -> Vec<String> {
     let ground = found["ground"].as_str().unwrap();
     let all = found["all"].as_array().unwrap();
     assert!(all.len() > 7, "lines are drawn: {found}");
-    let colours = all.iter().map(|entry| entry[1].as_str().unwrap());
-    let faint = colours.filter(|colour| contrast(colour, ground) < LEAST_CONTRAST);
-    faint.map(ToOwned::to_owned).collect()
+    all.iter()
+        .map(|entry| entry[1].as_str().unwrap())
+        .filter(|colour| contrast(colour, ground) < LEAST_CONTRAST)
+        .map(ToOwned::to_owned)
+        .collect()
 }
 
 #[test]

@@ -91,11 +91,13 @@ fn a_pair_of_nearly_the_same_light_is_warned_about() {
     pair(&bench, "a", 1);
     let normal = bench.path("pairs/normal/a.png");
     let image = image::open(&normal).unwrap().to_rgb8();
-    let darker = image.enumerate_pixels().map(|(_, _, pixel)| {
-        let Rgb(codes) = pixel;
-        codes.map(|code| code - code / 20)
-    });
-    let samples: Vec<u8> = darker.flatten().collect();
+    let samples: Vec<u8> = image
+        .enumerate_pixels()
+        .flat_map(|(_, _, pixel)| {
+            let Rgb(codes) = pixel;
+            codes.map(|code| code - code / 20)
+        })
+        .collect();
     RgbImage::from_raw(96, 64, samples)
         .unwrap()
         .save(bench.path("pairs/low/a.png"))

@@ -75,10 +75,9 @@ fn made_pairs(bench: &Bench, folder: &str, pictures: &[(&str, u32)], words: &[&s
         let made = bench.path("made");
         let synthesize = ["synthesize", normal.to_str().unwrap(), "--levels", "L2"];
         bench.complete(&[&synthesize[..], &["--out", "made", "--force"], words].concat());
-        let images = fs::read_dir(&made)
+        let images: Vec<_> = fs::read_dir(&made)
             .unwrap()
-            .map(|file| file.unwrap().path());
-        let images: Vec<_> = images
+            .map(|file| file.unwrap().path())
             .filter(|path| path.extension().is_some_and(|end| end == "png"))
             .collect();
         assert_eq!(images.len(), 1, "{images:?}");

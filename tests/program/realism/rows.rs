@@ -9,10 +9,9 @@ fn number(value: &Value) -> f64 {
 /// The rows of a CSV file, by column.
 pub(super) fn csv(bench: &Bench, file: &str) -> Vec<Vec<String>> {
     let text = fs::read_to_string(bench.path(file)).unwrap();
-    let rows = text
-        .lines()
-        .map(|line| line.split(',').map(str::to_owned).collect());
-    rows.collect()
+    text.lines()
+        .map(|line| line.split(',').map(str::to_owned).collect())
+        .collect()
 }
 
 /// The cells of a column.

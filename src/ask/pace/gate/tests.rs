@@ -205,9 +205,11 @@ async fn no_minute_has_more_tokens_than_the_quota() {
     while asking.join_next().await.is_some() {}
     let used = used.lock().unwrap().clone();
     let within = |first: Instant| -> u64 {
-        let later = used.iter().filter(|(sent, _)| *sent >= first);
-        let minute = later.filter(|(sent, _)| *sent - first < Duration::from_mins(1));
-        minute.map(|(_, tokens)| tokens).sum()
+        used.iter()
+            .filter(|(sent, _)| *sent >= first)
+            .filter(|(sent, _)| *sent - first < Duration::from_mins(1))
+            .map(|(_, tokens)| tokens)
+            .sum()
     };
     let most = used.iter().map(|(sent, _)| within(*sent)).max().unwrap();
     assert!((50_000..=60_000).contains(&most), "{most}");

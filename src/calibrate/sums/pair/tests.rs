@@ -24,8 +24,8 @@ impl Iterator for Numbers {
 
 /// A frame of codes about `level`, spread evenly over 2 · `spread` + 1 codes.
 fn frame(layout: Layout, seed: u64, level: u16, spread: u32) -> Vec<u16> {
-    let numbers = Numbers(seed).take(layout.height * layout.width);
-    numbers
+    Numbers(seed)
+        .take(layout.height * layout.width)
         .map(|number| level + (number % (2 * spread + 1)) as u16 - spread as u16)
         .collect()
 }
@@ -145,8 +145,9 @@ fn smoothing_shows_as_correlation() {
     let plain = correlation(&a, &b);
     assert!(plain.abs() < 0.015, "{plain}");
     let smooth = |frame: &[u16]| -> Vec<u16> {
-        let rows = frame.chunks(layout.width);
-        rows.flat_map(|row| (0..row.len()).map(|x| row[x].midpoint(row[(x + 2) % row.len()])))
+        frame
+            .chunks(layout.width)
+            .flat_map(|row| (0..row.len()).map(|x| row[x].midpoint(row[(x + 2) % row.len()])))
             .collect()
     };
     let smoothed = correlation(&smooth(&a), &smooth(&b));
@@ -181,8 +182,10 @@ fn tiles_have_the_light_and_the_noise_of_their_place() {
     assert!((variance - 30.0).abs() < 2.0, "{variance}");
     // Offsets of rows change no variance.
     let rows = |frame: &[u16], seed: u64| -> Vec<u16> {
-        let rows = frame.chunks(BAYER.width).zip(Numbers(seed));
-        rows.flat_map(|(row, number)| row.iter().map(move |code| code + (number % 90) as u16))
+        frame
+            .chunks(BAYER.width)
+            .zip(Numbers(seed))
+            .flat_map(|(row, number)| row.iter().map(move |code| code + (number % 90) as u16))
             .collect()
     };
     let shifted = [rows(&lit[0], 13), rows(&lit[1], 14)];

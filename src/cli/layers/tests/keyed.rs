@@ -180,8 +180,13 @@ fn earlier_forms_call_the_subcommands() {
                 "model", "inputs", "input", "file", "folder", "kind", "out", "tile",
             ]
             .map(|id| {
-                let values = own.try_get_raw(id).ok().flatten().into_iter().flatten();
-                values.map(OsString::from).collect::<Vec<_>>()
+                own.try_get_raw(id)
+                    .ok()
+                    .flatten()
+                    .into_iter()
+                    .flatten()
+                    .map(OsString::from)
+                    .collect::<Vec<_>>()
             });
             (path, set)
         });

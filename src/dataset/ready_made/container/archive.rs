@@ -113,13 +113,15 @@ impl Archive {
 
     /// The paths of all files, without hidden ones.
     pub(super) fn files(&self) -> Vec<PathBuf> {
-        let names = self.names.keys();
-        let names = names.filter(|name| {
-            !name
-                .split('/')
-                .any(|part| part.starts_with('.') || part == "__MACOSX")
-        });
-        names.map(PathBuf::from).collect()
+        self.names
+            .keys()
+            .filter(|name| {
+                !name
+                    .split('/')
+                    .any(|part| part.starts_with('.') || part == "__MACOSX")
+            })
+            .map(PathBuf::from)
+            .collect()
     }
 
     /// Whether there is a file of this name.

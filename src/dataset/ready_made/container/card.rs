@@ -26,8 +26,10 @@ pub(super) fn configs(card: &str) -> Result<Vec<Config>, String> {
     let head = card
         .strip_prefix("---\n")
         .and_then(|rest| rest.split_once("\n---"));
-    let lines = head.map_or("", |(head, _)| head).lines();
-    let mut lines = lines.skip_while(|line| key(line) != Some("configs"));
+    let mut lines = head
+        .map_or("", |(head, _)| head)
+        .lines()
+        .skip_while(|line| key(line) != Some("configs"));
     let Some(first) = lines.next() else {
         return Ok(Vec::new());
     };

@@ -67,12 +67,14 @@ pub(super) fn chosen(
             let problem = format_args!("{place}: no configurations to choose {name:?} from{note}");
             return Err(Error::usage("--read config", problem));
         }
-        let candidates = by_kind(tree, files)?.into_iter().map(|path| Candidate {
-            split: splits::split_in_name(&path),
-            config: String::new(),
-            path,
-        });
-        candidates.collect()
+        by_kind(tree, files)?
+            .into_iter()
+            .map(|path| Candidate {
+                split: splits::split_in_name(&path),
+                config: String::new(),
+                path,
+            })
+            .collect()
     } else {
         {
             let wanted = args
@@ -153,16 +155,18 @@ fn files_of_config(
         let found = found.into_iter().map(|path| Path::new(folder).join(path));
         return Ok(vec![(String::new(), found.collect())]);
     };
-    let patterns = patterns.iter().map(|(split, pattern)| {
-        let pattern = pattern.trim_start_matches("./");
-        let pattern = if folder.is_empty() {
-            pattern.to_owned()
-        } else {
-            format!("{folder}/{pattern}")
-        };
-        Ok((split.clone(), matching(tree, &pattern, files)?))
-    });
-    patterns.collect()
+    patterns
+        .iter()
+        .map(|(split, pattern)| {
+            let pattern = pattern.trim_start_matches("./");
+            let pattern = if folder.is_empty() {
+                pattern.to_owned()
+            } else {
+                format!("{folder}/{pattern}")
+            };
+            Ok((split.clone(), matching(tree, &pattern, files)?))
+        })
+        .collect()
 }
 
 /// The files that fit a pattern of the card.

@@ -175,8 +175,8 @@ fn files_in_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
     check_shards(&paths)?;
     let files = chosen
         .into_iter()
-        .map(|file| tree.open(&file.path, file.config));
-    let files = files.collect::<Result<_>>()?;
+        .map(|file| tree.open(&file.path, file.config))
+        .collect::<Result<_>>()?;
     let notes = outside.first().map(|first| {
         format!(
             "links that lead out of the folder or nowhere, and were skipped: {}, as {}",

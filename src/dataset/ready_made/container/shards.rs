@@ -49,10 +49,10 @@ mod tests {
     #[test]
     fn a_missing_shard_is_named() {
         let files = |numbers: &[usize]| {
-            let files = numbers
+            numbers
                 .iter()
-                .map(|n| PathBuf::from(format!("d/test-0000{n}-of-00003.jsonl.gz")));
-            files.collect::<Vec<PathBuf>>()
+                .map(|n| PathBuf::from(format!("d/test-0000{n}-of-00003.jsonl.gz")))
+                .collect::<Vec<PathBuf>>()
         };
         assert!(check_shards(&files(&[0, 1, 2])).is_ok());
         let problem = check_shards(&files(&[0, 2])).unwrap_err().to_string();

@@ -32,8 +32,9 @@ const WORDS: [(&str, &str); 10] = [
 /// The split that a path below a folder names: the first of its words, between signs that are no letters; empty if it names none.
 pub(super) fn split_in_name(path: &Path) -> String {
     let text = path.to_string_lossy().to_lowercase();
-    let mut words = text.split(|c: char| !c.is_alphabetic());
-    let split = words.find_map(|word| WORDS.iter().find(|(known, _)| *known == word));
+    let split = text
+        .split(|c: char| !c.is_alphabetic())
+        .find_map(|word| WORDS.iter().find(|(known, _)| *known == word));
     split.map_or_else(String::new, |(_, split)| (*split).to_owned())
 }
 
@@ -80,19 +81,22 @@ fn listed(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
         (Tree::Folder { .. }, "parquet") => parquet::count(&tree.whole(file)).ok(),
         _ => None,
     };
-    let splits = splits.iter().map(|(split, files)| {
-        let name = if split.is_empty() {
-            "without a name"
-        } else {
-            split
-        };
-        let counts: Option<u64> = files.iter().map(rows).sum();
-        match counts {
-            Some(rows) => format!("{name} (rows: {rows})"),
-            None => format!("{name} (files: {})", files.len()),
-        }
-    });
-    splits.collect::<Vec<String>>().join(", ")
+    splits
+        .iter()
+        .map(|(split, files)| {
+            let name = if split.is_empty() {
+                "without a name"
+            } else {
+                split
+            };
+            let counts: Option<u64> = files.iter().map(rows).sum();
+            match counts {
+                Some(rows) => format!("{name} (rows: {rows})"),
+                None => format!("{name} (files: {})", files.len()),
+            }
+        })
+        .collect::<Vec<String>>()
+        .join(", ")
 }
 
 #[cfg(test)]
@@ -115,12 +119,14 @@ mod tests {
     #[test]
     fn one_split_is_chosen_or_named() {
         let files = |splits: &[&str]| {
-            let files = splits.iter().map(|split| Candidate {
-                split: (*split).to_owned(),
-                config: String::new(),
-                path: split.into(),
-            });
-            files.collect::<Vec<Candidate>>()
+            splits
+                .iter()
+                .map(|split| Candidate {
+                    split: (*split).to_owned(),
+                    config: String::new(),
+                    path: split.into(),
+                })
+                .collect::<Vec<Candidate>>()
         };
         let folder = tempfile::tempdir().unwrap();
         let tree = Tree::from_folder(folder.path()).unwrap();

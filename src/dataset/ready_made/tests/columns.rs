@@ -20,10 +20,9 @@ fn skipping() -> SetArgs {
 
 /// Forty rows whose answer is x, with the label of the number of each.
 fn labelled(label: impl Fn(usize) -> Value) -> Vec<Value> {
-    let rows = (0..40).map(|at| {
+    (0..40).map(|at| {
         json!({"id": at, "question": "?", "options": ["x", "y"], "answer": "x", "label": label(at), "image": base64(1)})
-    });
-    rows.collect()
+    }).collect()
 }
 
 #[test]
@@ -67,11 +66,10 @@ fn a_gap_in_the_second_column_hides_no_difference() {
 #[test]
 fn yes_and_no_in_two_columns_are_compared_where_both_say_something() {
     let rows = |other: &str, gap: Value| -> Vec<Value> {
-        let rows = (0..40).map(|at| {
+        (0..40).map(|at| {
             let answer = if at == 5 { gap.clone() } else { json!("yes") };
             json!({"id": at, "question": "Is it red?", "answer": answer, "label": other, "image": base64(1)})
-        });
-        rows.collect()
+        }).collect()
     };
     let (_folder, path) = with(rows("no", json!("")));
     assert!(refusal(&path, &skipping()).contains("\"answer\" and \"label\" differ"));

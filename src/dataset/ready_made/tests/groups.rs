@@ -11,14 +11,13 @@ use crate::dataset::{Dataset, SetArgs};
 
 /// Six rows about three images: numbers from 1, and two columns that make a group together. The last row is an open question.
 fn rows() -> Vec<Map<String, Value>> {
-    let rows = (1..=6).map(|number| {
+    (1..=6).map(|number| {
         let answer = if number == 6 { "seven" } else { "yes" };
         row(json!({
             "nr": number, "image": format!("{}.png", (number - 1) / 2), "question": format!("Is it {number}?"), "answer": answer,
             "set": format!("s{}", number / 4), "figure": if number == 3 { Value::Null } else { json!(number % 2) },
         }))
-    });
-    rows.collect()
+    }).collect()
 }
 
 fn made(rows: &[Map<String, Value>]) -> (tempfile::TempDir, std::path::PathBuf) {

@@ -179,16 +179,17 @@ fn an_image_in_a_zip_file_is_the_only_one_of_its_name() {
 #[test]
 fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
     let rows = |answers: [&str; 2]| -> Vec<_> {
-        let rows = (0..40).map(|at| {
-            let answer = answers.get(at).unwrap_or(&"x");
-            let text = if at < 2 {
-                "Which?".to_owned()
-            } else {
-                format!("{at}?")
-            };
-            row(question(json!({"question": text, "answer": answer})))
-        });
-        rows.collect()
+        (0..40)
+            .map(|at| {
+                let answer = answers.get(at).unwrap_or(&"x");
+                let text = if at < 2 {
+                    "Which?".to_owned()
+                } else {
+                    format!("{at}?")
+                };
+                row(question(json!({"question": text, "answer": answer})))
+            })
+            .collect()
     };
     let (_folder, path) = set("set.jsonl", &rows(["x", "y"]));
     let problem = refusal(&path, &SetArgs::default());
@@ -235,14 +236,16 @@ fn rows_with_ids_contradict_each_other_too() {
         [json!("a.png"), json!("b.png")],
     ] {
         let rows = |last: [(&Value, &str); 3]| -> Vec<_> {
-            let all = (0..60).map(|at: usize| {
-                let last = at.checked_sub(38).and_then(|at| last.get(at));
-                let (image, answer) = last.copied().unwrap_or((&same, "x"));
-                let text = last.map_or_else(|| format!("{at}?"), |_| "Which?".to_owned());
-                let fields = json!({"id": at, "question": text, "answer": answer, "image": image});
-                row(question(fields))
-            });
-            all.collect()
+            (0..60)
+                .map(|at: usize| {
+                    let last = at.checked_sub(38).and_then(|at| last.get(at));
+                    let (image, answer) = last.copied().unwrap_or((&same, "x"));
+                    let text = last.map_or_else(|| format!("{at}?"), |_| "Which?".to_owned());
+                    let fields =
+                        json!({"id": at, "question": text, "answer": answer, "image": image});
+                    row(question(fields))
+                })
+                .collect()
         };
         let opened = |last, args| {
             let (folder, path) = set("set.jsonl", &rows(last));

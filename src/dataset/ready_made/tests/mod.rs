@@ -45,29 +45,33 @@ type Read = (String, String, String, Vec<String>, String, u8);
 
 /// All questions of a set, with the red of their images.
 fn read(dataset: &Dataset) -> Vec<Read> {
-    let questions = dataset.questions().iter().map(|question| {
-        let picture = dataset.picture(&question.frame).unwrap();
-        let texts = question.choices.texts();
-        (
-            question.id.0.clone(),
-            question.family.name().to_owned(),
-            question.text.clone(),
-            texts.to_vec(),
-            texts[question.choices.truth().unwrap()].clone(),
-            picture.decode().unwrap().samples()[0],
-        )
-    });
-    questions.collect()
+    dataset
+        .questions()
+        .iter()
+        .map(|question| {
+            let picture = dataset.picture(&question.frame).unwrap();
+            let texts = question.choices.texts();
+            (
+                question.id.0.clone(),
+                question.family.name().to_owned(),
+                question.text.clone(),
+                texts.to_vec(),
+                texts[question.choices.truth().unwrap()].clone(),
+                picture.decode().unwrap().samples()[0],
+            )
+        })
+        .collect()
 }
 
 /// The digests of the images, by frame.
 fn digests(dataset: &Dataset) -> Vec<(String, String)> {
     let frames = dataset.frames();
-    let digests = frames.map(|frame| match dataset.picture(frame).unwrap() {
-        picture @ Picture::Encoded(_) => (frame.0.clone(), picture.digest().to_string()),
-        Picture::Drawn(..) => panic!("a room"),
-    });
-    digests.collect()
+    frames
+        .map(|frame| match dataset.picture(frame).unwrap() {
+            picture @ Picture::Encoded(_) => (frame.0.clone(), picture.digest().to_string()),
+            Picture::Drawn(..) => panic!("a room"),
+        })
+        .collect()
 }
 
 fn expected(id: &str, family: &str, text: &str, choices: &[&str], truth: &str, red: u8) -> Read {

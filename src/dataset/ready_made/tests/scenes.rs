@@ -11,14 +11,12 @@ use crate::dataset::{DataPlace, Dataset, SetArgs};
 
 /// Six rows about three images, whose scenes are in a column.
 fn rows(column: &str, scenes: [Value; 6]) -> Vec<Map<String, Value>> {
-    let rows = scenes.into_iter().enumerate();
-    let rows = rows.map(|(number, scene)| {
+    scenes.into_iter().enumerate().map(|(number, scene)| {
         row(json!({
             "id": format!("q{number}"), "image": format!("{}.png", number / 2), "question": format!("Is it {number}?"),
             "choices": ["yes", "no"], "answer": "yes", column: scene,
         }))
-    });
-    rows.collect()
+    }).collect()
 }
 
 fn made(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir, PathBuf) {
@@ -31,8 +29,10 @@ fn made(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir, PathBuf)
 
 /// The scene of each frame that is asked about.
 fn scenes(dataset: &Dataset) -> Vec<String> {
-    let frames = dataset.questions().iter().step_by(2);
-    frames
+    dataset
+        .questions()
+        .iter()
+        .step_by(2)
         .map(|question| dataset.scene(&question.frame))
         .collect()
 }

@@ -21,19 +21,21 @@ fn shown(rows: &[Map<String, Value>]) -> Vec<Shown> {
     let mut all = ["set.parquet", "set.json", "set.jsonl"].map(|name| {
         let (_folder, path) = set(name, rows);
         let dataset = open(&path, &send()).unwrap();
-        let questions = dataset.questions().iter().map(|question| {
-            let frames = dataset.shown(&question.frame).iter();
-            let frames = frames.map(|frame| {
-                let picture = dataset.picture(frame).unwrap().decode().unwrap();
-                (frame.0.clone(), picture.samples()[0])
-            });
-            (
-                question.id.0.clone(),
-                question.text.clone(),
-                frames.collect(),
-            )
-        });
-        let mut questions: Vec<_> = questions.collect();
+        let mut questions: Vec<_> = dataset
+            .questions()
+            .iter()
+            .map(|question| {
+                let frames = dataset.shown(&question.frame).iter().map(|frame| {
+                    let picture = dataset.picture(frame).unwrap().decode().unwrap();
+                    (frame.0.clone(), picture.samples()[0])
+                });
+                (
+                    question.id.0.clone(),
+                    question.text.clone(),
+                    frames.collect(),
+                )
+            })
+            .collect();
         questions.sort();
         questions
     });

@@ -80,8 +80,8 @@ mod tests {
         red: [usize; 2],
         value: impl Fn(usize, usize, usize) -> u16,
     ) -> Vec<u16> {
-        let sites = (0..height).flat_map(|y| (0..width).map(move |x| (y, x)));
-        sites
+        (0..height)
+            .flat_map(|y| (0..width).map(move |x| (y, x)))
             .map(|(y, x)| value(y, x, channel(y, x, red)))
             .collect()
     }

@@ -110,11 +110,13 @@ impl Findings {
 
 /// The findings as lines of text.
 pub(super) fn lines(findings: &[Finding]) -> String {
-    let lines = findings.iter().map(|finding| {
-        let text = finding.text.replace('\n', "\n         ");
-        format!("{}  {text}\n", finding.mark.word())
-    });
-    lines.collect()
+    findings
+        .iter()
+        .map(|finding| {
+            let text = finding.text.replace('\n', "\n         ");
+            format!("{}  {text}\n", finding.mark.word())
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -113,8 +113,10 @@ pub(super) fn images(
 fn first_shown<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a FrameId> {
     let mut seen = HashSet::new();
     let shown = first_asked(questions).into_iter();
-    let shown = shown.flat_map(|question| dataset.shown(&question.frame));
-    shown.filter(|frame| seen.insert(*frame)).collect()
+    shown
+        .flat_map(|question| dataset.shown(&question.frame))
+        .filter(|frame| seen.insert(*frame))
+        .collect()
 }
 
 fn look<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Looked<'a> {
@@ -141,12 +143,14 @@ fn look<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Looked<'a> {
 /// Measures the brightness of a sample of the images.
 fn light(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut Findings) {
     let number = shown.len().min(SAMPLED);
-    let sample = (0..number).into_par_iter().filter_map(|index| {
-        let frame = shown[index * shown.len() / number];
-        let picture = dataset.picture(frame).ok()?;
-        Some(brightness(&picture.decode().ok()?))
-    });
-    let mut sample: Vec<f64> = sample.collect();
+    let mut sample: Vec<f64> = (0..number)
+        .into_par_iter()
+        .filter_map(|index| {
+            let frame = shown[index * shown.len() / number];
+            let picture = dataset.picture(frame).ok()?;
+            Some(brightness(&picture.decode().ok()?))
+        })
+        .collect();
     sample.sort_by(f64::total_cmp);
     let Some(median) = sample.get(sample.len() / 2) else {
         return;

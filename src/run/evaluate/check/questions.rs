@@ -119,8 +119,9 @@ fn given_away(questions: &[Question], findings: &mut Findings) {
 /// The words of a text in lower case, between single spaces.
 fn words(text: &str) -> String {
     let lower = text.to_lowercase();
-    let words = lower
+    lower
         .split(|c: char| !c.is_alphanumeric())
-        .filter(|word| !word.is_empty());
-    words.collect::<Vec<&str>>().join(" ")
+        .filter(|word| !word.is_empty())
+        .collect::<Vec<&str>>()
+        .join(" ")
 }

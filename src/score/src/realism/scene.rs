@@ -77,8 +77,8 @@ impl BlockMeans {
         let shorter = image.height().min(image.width());
         let side = (shorter / BLOCKS / SIDE_STEP * SIDE_STEP).max(SIDE_STEP);
         let size = [image.height() / side, image.width() / side];
-        let blocks = (0..size[0]).flat_map(|down| (0..size[1]).map(move |across| [down, across]));
-        let halves: Vec<[f64; 2]> = blocks
+        let halves: Vec<[f64; 2]> = (0..size[0])
+            .flat_map(|down| (0..size[1]).map(move |across| [down, across]))
             .map(|block| halves(image, block.map(|index| index * side), side))
             .collect();
         let mut differences: Vec<f64> = halves.iter().map(|[a, b]| (a - b).abs()).collect();

@@ -61,10 +61,11 @@ impl Bounds {
         if ceiling - floor < MIN_DISTANCE {
             return Err(NoEvidence::Close(ceiling - floor));
         }
-        let drawn = drawn_shares(&blind, draws)
+        let drawn: Vec<[f64; 2]> = drawn_shares(&blind, draws)
             .into_iter()
-            .zip(drawn_shares(&again, draws));
-        let drawn: Vec<[f64; 2]> = drawn.map(|(floor, ceiling)| [floor, ceiling]).collect();
+            .zip(drawn_shares(&again, draws))
+            .map(|(floor, ceiling)| [floor, ceiling])
+            .collect();
         let distances = drawn.iter().map(|[floor, ceiling]| ceiling - floor);
         let [low, _] = draws.interval(distances.filter(|distance| !distance.is_nan()).collect());
         if low <= 0.0 {
@@ -144,34 +145,36 @@ pub struct EvidenceCurve {
 /// is lost half-way between ceiling and floor: the crossing of other reports, with the floor in the place of chance.
 pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
     let mode = ReadingMode::Strict;
-    let all = CurvePoints::all(grid).into_iter().filter_map(|points| {
-        let (_, light) = points.subjects.first()?;
-        let (darkest, _) = points.subjects.last()?;
-        let bounds = Bounds::new(grid, &grid.subjects[*light], None, mode, draws);
-        let threshold = match bounds {
-            Err(reason) => Err(NoHalf::NoEvidence(reason)),
-            Ok(bounds) => {
-                let subjects = points.subjects.iter();
-                let counts = LevelCounts {
-                    levels: subjects.clone().map(|(level, _)| *level).collect(),
-                    counts: subjects
-                        .map(|(_, subject)| grid.counts(*subject, None, mode))
-                        .collect(),
-                    guesses: floor(&bounds),
-                };
-                let summary = counts.summary(draws)?;
-                summary.threshold.map_err(NoHalf::Curve)
-            }
-        };
-        Some(EvidenceCurve {
-            darkest: *darkest,
-            threshold,
-            model: points.model,
-            variant: points.variant,
-            enhancer: points.enhancer,
+    CurvePoints::all(grid)
+        .into_iter()
+        .filter_map(|points| {
+            let (_, light) = points.subjects.first()?;
+            let (darkest, _) = points.subjects.last()?;
+            let bounds = Bounds::new(grid, &grid.subjects[*light], None, mode, draws);
+            let threshold = match bounds {
+                Err(reason) => Err(NoHalf::NoEvidence(reason)),
+                Ok(bounds) => {
+                    let subjects = points.subjects.iter();
+                    let counts = LevelCounts {
+                        levels: subjects.clone().map(|(level, _)| *level).collect(),
+                        counts: subjects
+                            .map(|(_, subject)| grid.counts(*subject, None, mode))
+                            .collect(),
+                        guesses: floor(&bounds),
+                    };
+                    let summary = counts.summary(draws)?;
+                    summary.threshold.map_err(NoHalf::Curve)
+                }
+            };
+            Some(EvidenceCurve {
+                darkest: *darkest,
+                threshold,
+                model: points.model,
+                variant: points.variant,
+                enhancer: points.enhancer,
+            })
         })
-    });
-    all.collect()
+        .collect()
 }
 
 /// The number of agreeing items without an image by cluster, scaled to the number of replies in the light.

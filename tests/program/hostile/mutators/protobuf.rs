@@ -98,11 +98,14 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
 
 /// The number of fields of a message and of the messages in it; at least 1.
 fn count(fields: &[Field]) -> usize {
-    let inner = fields.iter().map(|field| match &field.value {
-        Value::Message(fields) => 1 + count(fields),
-        _ => 1,
-    });
-    inner.sum::<usize>().max(1)
+    fields
+        .iter()
+        .map(|field| match &field.value {
+            Value::Message(fields) => 1 + count(fields),
+            _ => 1,
+        })
+        .sum::<usize>()
+        .max(1)
 }
 
 /// Damages the field that `left` fields stand before.

@@ -70,7 +70,7 @@ fn batches(bench: &Bench) {
         requests.extend(lines.filter(|line: &Value| line.get("custom_id").is_some()));
     }
     assert!(requests.len() > 3);
-    let lines = requests.iter().map(|request| {
+    let output: String = requests.iter().map(|request| {
         let body = json!({
             "model": "m-1", "choices": [{"message": {"content": "C"}, "finish_reason": "stop"}],
             "usage": {"prompt_tokens": 90, "completion_tokens": 1},
@@ -78,8 +78,7 @@ fn batches(bench: &Bench) {
         let response = json!({"status_code": 200, "request_id": "r", "body": body});
         let line = json!({"id": "b", "custom_id": request["custom_id"], "response": response, "error": null});
         format!("{line}\n")
-    });
-    let output: String = lines.collect();
+    }).collect();
     bench.file("output.jsonl", &output);
     bench.file("reply/GET-files-id-content.jsonl", output);
 }

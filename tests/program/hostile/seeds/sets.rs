@@ -55,8 +55,10 @@ pub(super) fn make(bench: &Bench) {
 }
 
 fn lines(values: impl IntoIterator<Item = Value>) -> String {
-    let lines = values.into_iter().map(|value| value.to_string() + "\n");
-    lines.collect()
+    values
+        .into_iter()
+        .map(|value| value.to_string() + "\n")
+        .collect()
 }
 
 /// A file of two rows with an image in each.
