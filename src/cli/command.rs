@@ -48,6 +48,9 @@ const SHORT_FORMS: [(&str, char); 6] = [
     ("quiet", 'q'),
 ];
 
+/// The flags of any command that also have a second name: `llie` is the paper's word, `enhancer` that of the pages.
+const SECOND_NAMES: [(&str, &str); 2] = [("llie", "enhancer"), ("llie-on", "enhancer-on")];
+
 /// The commands that take the flags of an evaluation.
 const ON_EVALUATIONS: [&str; 4] = ["check", "plan", "batch", "openeqa"];
 
@@ -274,7 +277,7 @@ pub(crate) enum StudyCommand {
 
 /// The command line, with keyed flags, short forms, and the class of each flag at the end of its help, such as `[pixels]`.
 pub(super) fn command() -> clap::Command {
-    let root = marked(with_short_forms(grouped(Cli::command())));
+    let root = marked(with_other_forms(grouped(Cli::command())));
     let shared: Vec<Arg> = root.get_arguments().cloned().collect();
     let root = ON_EVALUATIONS.into_iter().fold(root, |root, name| {
         root.mut_subcommand(name, |command| on_evaluation(command, &shared))
@@ -282,19 +285,22 @@ pub(super) fn command() -> clap::Command {
     first_heading_first(root)
 }
 
-/// The command and those in it, with the short form of each flag that has one.
-pub(super) fn with_short_forms(command: clap::Command) -> clap::Command {
+/// The command and those in it, with the short form and the second name of each flag that has one.
+pub(super) fn with_other_forms(command: clap::Command) -> clap::Command {
     command
-        .mut_args(|arg| {
-            match SHORT_FORMS
-                .iter()
-                .find(|(long, _)| arg.get_long() == Some(long))
-            {
-                Some((_, short)) => arg.short(*short),
+        .mut_args(|mut arg| {
+            let long = arg.get_long().unwrap_or_default();
+            let short = SHORT_FORMS.iter().find(|(of, _)| *of == long);
+            let second = SECOND_NAMES.iter().find(|(of, _)| *of == long);
+            if let Some((_, short)) = short {
+                arg = arg.short(*short);
+            }
+            match second {
+                Some((_, second)) => arg.visible_alias(*second),
                 None => arg,
             }
         })
-        .mut_subcommands(with_short_forms)
+        .mut_subcommands(with_other_forms)
 }
 
 /// A command that takes the flags of an evaluation, or whose subcommands do: `-h` leaves out those that mean the same there.

@@ -174,7 +174,10 @@ fn typed_command<'a>(all: &'a Command, words: &[OsString]) -> (&'a Command, usiz
 /// Whether a word is a flag in its long or its short form, without a value.
 fn has_form(arg: &Arg, word: &str) -> bool {
     match word.strip_prefix("--") {
-        Some(long) => arg.get_long() == Some(long),
+        Some(long) => {
+            let mut second = arg.get_visible_aliases().into_iter().flatten();
+            arg.get_long() == Some(long) || second.any(|name| name == long)
+        }
         None => arg.get_short().map(|short| format!("-{short}")).as_deref() == Some(word),
     }
 }

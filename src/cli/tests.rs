@@ -200,7 +200,7 @@ fn short_forms_are_those_of_long_flags() {
 
 /// All flags of all commands as Markdown.
 fn reference() -> String {
-    let mut command = command::with_short_forms(grouped(Cli::command()));
+    let mut command = command::with_other_forms(grouped(Cli::command()));
     command.build();
     let mut text = "# All flags\n\nEvery flag of every command, with its default and what it decides. A flag that means the same in several commands is \
                     described at the first of them. A variable is `DARKQA_` and the name of the flag in capitals; a key of a `--config` file is the name of \
@@ -324,7 +324,9 @@ fn row(arg: &Arg) -> String {
         _ if key_flag.is_some() => key_flag.clone().unwrap_or_default(),
         Some(long) => {
             let short = arg.get_short().map(|short| format!("-{short}, "));
-            let flag = format!("{}--{long} {values}", short.unwrap_or_default());
+            let second = arg.get_visible_aliases().into_iter().flatten();
+            let second: String = second.map(|name| format!(", --{name}")).collect();
+            let flag = format!("{}--{long}{second} {values}", short.unwrap_or_default());
             flag.trim_end().to_owned()
         }
         None => values,

@@ -257,6 +257,18 @@ fn a_server_that_takes_nothing_is_said_while_the_run_waits() {
 }
 
 #[test]
+fn second_names_are_the_same_flags() {
+    let bench = Bench::new();
+    let dry = |flags: &str| {
+        let line = format!("--model random --levels L0,L3 --dry-run {flags}");
+        bench.complete(&words(&line))
+    };
+    let first = dry("--llie lift --llie-on noise");
+    assert_eq!(first, dry("--enhancer lift --enhancer-on noise"));
+    assert_ne!(first, dry("--enhancer lift --enhancer-on both"));
+}
+
+#[test]
 fn what_changes_nothing_is_said() {
     let bench = Bench::with_questions(3);
     let args = words("--data set.jsonl --model random --blind");

@@ -237,7 +237,10 @@ fn flags(command: &clap::Command) -> BTreeSet<String> {
     command
         .get_arguments()
         .filter(|arg| !arg.is_hide_set())
-        .filter_map(clap::Arg::get_long)
+        .flat_map(|arg| {
+            let second = arg.get_visible_aliases().into_iter().flatten();
+            arg.get_long().into_iter().chain(second)
+        })
         .map(|flag| format!("--{flag}"))
         .chain(command.get_subcommands().flat_map(flags))
         .collect()
