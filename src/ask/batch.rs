@@ -28,7 +28,7 @@ pub(crate) struct BatchLine {
     /// The status and the body of a refused request; `None` for a reply and for other failures. It is classified and not kept, so secrets
     /// are not removed from it.
     pub refusal: Option<(u16, String)>,
-    /// The tokens that a failure was charged; `None` for a reply, and if the server did not say.
+    /// The tokens that a failure was charged; `None` for a reply, and if the server does not state it.
     pub charged: Option<Usage>,
 }
 

@@ -200,7 +200,7 @@ pub(super) enum UnreadableReply {
 pub(super) struct Unreadable {
     /// The content of the body, in words.
     pub(super) what: String,
-    /// The tokens that it was charged; `None` if the server did not say.
+    /// The tokens that it was charged; `None` if the server does not state it.
     pub(super) usage: Option<Usage>,
     /// The word for the reason why the model stopped, if that is not known or is no end.
     pub(super) finish: Option<String>,

@@ -204,7 +204,7 @@ impl Connection {
         let headers = response.headers().clone();
         let body = match self.receive(response, time).await {
             Err(failed) if status.is_success() => return Err(failed),
-            // The status alone says that the request was refused.
+            // The status alone states that the request was refused.
             body => body.unwrap_or_default(),
         };
         Ok(HttpReply {

@@ -47,7 +47,7 @@ pub struct Endpoint {
     /// The user's limits per minute, which hold for all replicas together; `None` if the only replica keeps them.
     quota: Option<Gate>,
     services: Services,
-    /// Whether what the replicas say of a model was compared, by its id.
+    /// Whether what the replicas report of a model was compared, by its id.
     compared: Mutex<HashMap<String, Arc<OnceCell<()>>>>,
     closing: watch::Sender<bool>,
     /// Whether a request had a reply, or it was said that there is no connection.
@@ -269,7 +269,7 @@ impl Endpoint {
         }
     }
 
-    /// The time until a request is sent again; `None` if it is not. A failure after which no request is taken says so.
+    /// The time until a request is sent again; `None` if it is not. A failure after which no request is taken states it.
     fn delay(
         &self,
         model: ModelNumber,
@@ -365,13 +365,13 @@ impl Endpoint {
         Ok(Reply { endpoint, ..reply })
     }
 
-    /// Whether what the replicas say of the model with this id was compared.
+    /// Whether what the replicas report of the model with this id was compared.
     fn compared(&self, id: &str) -> Arc<OnceCell<()>> {
         let mut all = self.compared.lock().unwrap_or_else(PoisonError::into_inner);
         Arc::clone(all.entry(id.to_owned()).or_default())
     }
 
-    /// Warns if the replicas say different things of the model. What cannot be asked for is ignored.
+    /// Warns if the replicas describe the model differently. What cannot be asked for is ignored.
     async fn compare(&self, request: &Request<'_>) {
         let mut said = Vec::new();
         for (replica, headers) in self.replicas.iter().zip(request.headers) {

@@ -224,7 +224,7 @@ impl<'a> SentFields<'a> {
     }
 }
 
-/// Words by which servers say that they do not support a field or its value, and not that the value is wrong.
+/// Words by which servers state that they do not support a field or its value, and not that the value is wrong.
 const UNSUPPORTED: [&str; 24] = [
     "unsupported",
     "not supported",
@@ -329,7 +329,7 @@ impl RequestField<'_> {
     }
 }
 
-/// Whether the server says that it does not support a field or a kind of value.
+/// Whether the server states that it does not support a field or a kind of value.
 pub(super) fn is_unsupported(complaint: &Complaint) -> bool {
     let codes = [
         "unsupported_parameter",

@@ -33,7 +33,7 @@ struct Family {
     rule: Rule,
 }
 
-/// The rule by which a family of models counts the tokens of an image; `image_tokens.toml` says what each is.
+/// The rule by which a family of models counts the tokens of an image; `image_tokens.toml` states what each is.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(
     deny_unknown_fields,

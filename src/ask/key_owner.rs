@@ -57,7 +57,7 @@ mod tests {
             );
             assert!(!error.contains("sk-ant"), "{error}");
         }
-        // A table of the user says how more keys look, and which of its hosts may be given another vendor's.
+        // A table of the user states how more keys look, and which of its hosts may be given another vendor's.
         let gateway = "https://llm.example/v1";
         assert_eq!(check(own, "camp-123", gateway), Ok(()));
         assert_eq!(check(own, "sk-proj-123", gateway), Ok(()));

@@ -6,7 +6,7 @@ use super::secret::Scrub;
 /// The refusal of a batch because too many tokens already wait for batches.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct QuotaRefusal {
-    /// The number of tokens that may wait; `None` if the server does not say.
+    /// The number of tokens that may wait; `None` if the server does not state it.
     pub limit: Option<u64>,
     /// The server's words, without secrets.
     pub message: String,

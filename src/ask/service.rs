@@ -72,7 +72,7 @@ struct Service {
     in_flight: usize,
     /// Failures to connect or of the server since the last reply.
     failures: u32,
-    /// The time of the last of them: replies to requests that were sent before it say nothing of the replica now.
+    /// The time of the last of them: replies to requests that were sent before it reveal nothing about the replica now.
     failed_at: Option<Instant>,
     /// How often it was out since the last reply.
     outs: u32,

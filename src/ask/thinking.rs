@@ -132,7 +132,7 @@ mod tests {
             ),
             ("http://127.0.0.1:11434/v1", Some("none"), json!({})),
             ("http://127.0.0.1:8000/v1", None, template.clone()),
-            // The port says nothing of another machine, nor a name of another domain.
+            // The port reveals nothing about another machine, nor a name of another domain.
             ("http://gpu7:11434/v1", None, template.clone()),
             ("https://api.openai.com.example/v1", None, template),
         ] {

@@ -38,7 +38,7 @@ impl TimeLimit {
     pub(super) async fn run<T>(&mut self, future: impl Future<Output = T>) -> Option<T> {
         let mut future = pin!(future);
         loop {
-            // With nothing left, what is there already is read.
+            // With no time left, what has arrived is read.
             let step = self.step.min(self.left);
             let started = Instant::now();
             let output = timeout(step, future.as_mut()).await;

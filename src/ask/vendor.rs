@@ -201,7 +201,7 @@ impl Vendor {
     }
 }
 
-/// Whether a text begins as a form says, in which `*` is for any text between two parts.
+/// Whether a text begins as a form states, in which `*` is for any text between two parts.
 fn has_form(text: &str, form: &str) -> bool {
     let (begin, inside) = form.split_once('*').unwrap_or((form, ""));
     let rest = text.strip_prefix(begin);

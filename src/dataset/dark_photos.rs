@@ -14,7 +14,7 @@ pub(crate) struct DarkPhoto {
     pub(crate) name: PhotoName,
     /// Its file.
     pub(crate) path: PathBuf,
-    /// How much darker than its frame it was exposed, in EV, by shutter and gain; `None` if the data do not say.
+    /// How much darker than its frame it was exposed, in EV, by shutter and gain; `None` if the data do not state it.
     pub(crate) ev: Option<f64>,
 }
 
@@ -37,11 +37,11 @@ pub(super) enum DarkField {
 pub(super) enum DarkEntry {
     /// Its path alone.
     Path(PathBuf),
-    /// Its path with what is known.
+    /// Its path with its known facts.
     Known(KnownPhoto),
 }
 
-/// A photograph with what is known of it.
+/// A photograph with facts about it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct KnownPhoto {

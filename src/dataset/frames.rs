@@ -197,7 +197,7 @@ fn data_set_info(folder: &Path) -> Result<DataSetInfo> {
     Ok(info)
 }
 
-/// The light in which the photographs of a folder were taken: as `dataset.json` says, else lit.
+/// The light in which the photographs of a folder were taken: as `dataset.json` states, else lit.
 pub(super) fn light(folder: &Path) -> Result<SetLight> {
     Ok(data_set_info(folder)?.light.unwrap_or_default())
 }

@@ -47,7 +47,7 @@ impl ImageNames {
         ))
     }
 
-    /// Says how many files of a folder look like images and are not read.
+    /// Prints how many files of a folder look like images and are not read.
     pub(crate) fn warn_of_unread(&self, folder: &Path) {
         if let Some(unread) = self.unread() {
             tracing::warn!("{}: {unread}", folder.display());

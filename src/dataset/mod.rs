@@ -396,7 +396,7 @@ impl Dataset {
         &self.reading
     }
 
-    /// The lines of [`Self::reading`] that the user should see: those about what is left out alone where the set has this program's own
+    /// The lines of [`Self::reading`] that the user should see: those about the omissions alone where the set has this program's own
     /// form.
     pub fn reading_to_say(&self) -> impl Iterator<Item = &String> {
         let is_said = |line: &&String| self.form == Form::Foreign || line.starts_with(LEFT_OUT);

@@ -17,7 +17,7 @@ use crate::types::FrameId;
 pub(crate) struct Photographs {
     /// The images, without questions.
     pub(crate) dataset: Dataset,
-    /// Lines for the user: what is left aside, and how images are named.
+    /// Lines for the user: files left aside, and how images are named.
     pub(crate) notes: Vec<String>,
 }
 

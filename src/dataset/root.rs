@@ -99,7 +99,7 @@ impl Root {
             Ok(within) => with_slashes(within),
             Err(_) => with_slashes(&without_dots(Path::new(spelled))),
         };
-        // After a symbolic link to a folder, `..` leads to another place than the text says. Such a path stays as it is.
+        // After a symbolic link to a folder, `..` leads to another place than the text states. Such a path stays as it is.
         let same = normalized == spelled
             || file.canonicalize().ok() == self.folder.join(&normalized).canonicalize().ok();
         let name = if same { normalized } else { spelled.to_owned() };

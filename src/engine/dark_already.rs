@@ -27,7 +27,7 @@ pub(crate) fn advice(median: f64) -> Option<String> {
     })
 }
 
-/// Says what a set in the dark is asked by default, and why, or what is odd about the levels that are named.
+/// Prints what a set in the dark is asked by default, and why, or what is odd about the levels that are named.
 pub(crate) fn tell(job: &JobSettings, progress: &Progress) {
     if job.set_light == SetLight::Lit {
         return;
@@ -90,7 +90,7 @@ pub(crate) fn warn<E: Experiment>(experiment: &E) {
 }
 
 /// The median of the mean luma of up to [`SAMPLED`] frames, evenly spread; the upper of two. `None` without frames in files. Built-in
-/// rooms are lit. A file that cannot be decoded is left out: the trial that needs its image says so.
+/// rooms are lit. A file that cannot be decoded is left out: the trial that needs its image states it.
 fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
     let mut sample = sampled(frames, sources, |picture| match picture {
         Picture::Encoded(_) => Some(brightness_in_codes(&picture.decode().ok()?)),

@@ -139,7 +139,7 @@ struct ReplySink<'a, I: Item> {
     measured: MeasuredTokens,
     /// Of each model, whether its replies depend on the image.
     dependence: Vec<ImageDependence>,
-    /// Of each model, whether the user knows how far the estimate is from what is charged.
+    /// Of each model, whether the user knows how far the estimate is from the charge.
     said_difference: Vec<Said>,
     /// The first question to each model.
     first_questions: Vec<FirstQuestion>,
@@ -432,7 +432,7 @@ impl<I: Item> ReplySink<'_, I> {
         }
     }
 
-    /// Compares what the images of a prompt were charged with the estimate. Says once of each model if they differ.
+    /// Compares what the images of a prompt were charged with the estimate. Warns once for each model if they differ.
     fn compare_with_estimate(&mut self, ready: &PreparedTrial<I>, reply: &Reply) {
         let model = ready.trial.model;
         let charged = reply.usage.and_then(|usage| usage.prompt_tokens);

@@ -56,7 +56,7 @@ impl Interrupt {
 
 /// Whether the process was started with SIGHUP ignored, as `nohup` does; a listener would undo that.
 ///
-/// Linux tells the ignored signals in /proc. Elsewhere a terminal as standard error says that there was no `nohup`.
+/// Linux tells the ignored signals in /proc. Elsewhere a terminal as standard error states that there was no `nohup`.
 #[cfg(unix)]
 fn is_hang_up_ignored() -> bool {
     /// The bit of SIGHUP, signal 1.

@@ -15,7 +15,7 @@ use crate::types::TrialKey;
 /// Number of replies from which the tokens are taken; chosen.
 const REPLIES: usize = 10;
 
-/// The share by which an estimate may differ from what was charged without a word; chosen.
+/// The share by which an estimate may differ from the charge without a word; chosen.
 const TOLERANCE: f64 = 0.1;
 
 /// Tokens charged for images, by model of a phase.
@@ -79,7 +79,7 @@ impl MeasuredTokens {
         (images.len() == REPLIES).then(|| f64::midpoint(images[middle - 1], images[middle]))
     }
 
-    /// By how much the estimate of a prompt with this text and so many images differs from what is charged; `None` if it differs by 10 %
+    /// By how much the estimate of a prompt with this text and so many images differs from the charge; `None` if it differs by 10 %
     /// or less, or if too few replies are known. `tokens` are those that were expected of all images.
     pub(crate) fn difference(
         &self,

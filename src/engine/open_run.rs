@@ -149,7 +149,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(())
     }
 
-    /// Says how much of the cost is not stated by a server, if that is more than a small part of it.
+    /// Prints how much of the cost is not stated by a server, if that is more than a small part of it.
     fn say_unstated(&self, budget: &Budget) -> Result<()> {
         let killed = InFlightCost::open(self.store.folder())?.killed();
         let least = SMALL_SHARE * budget.spending().limit().unwrap_or(0.0);

@@ -62,7 +62,7 @@ impl RoomNet {
         }))
     }
 
-    /// The model. What it cannot find in the image, it guesses as `prior` does, and the record says so.
+    /// The model. What it cannot find in the image, it guesses as `prior` does, and the record states so.
     pub(crate) fn model(self: &Arc<Self>, prior: Random) -> Local {
         let net = Arc::clone(self);
         let digest = Digest::from_parts([

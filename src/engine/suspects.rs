@@ -29,7 +29,7 @@ impl Suspects {
         self.answered.insert(key);
     }
 
-    /// Notes a failure; those that say nothing about the image are ignored. Returns whether the others about it are now set aside.
+    /// Notes a failure; those that reveal nothing about the image are ignored. Returns whether the others about it are now set aside.
     pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str) -> bool {
         use FailureKind::{Connection, Response, Server, Timeout};
         let may_be_image = matches!(error.failure.kind, Connection | Response | Server | Timeout);

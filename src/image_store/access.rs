@@ -115,7 +115,7 @@ impl ImageStore {
         self.with(|state| state.health) != Health::Gone && self.folder.place(key.digest()).is_file()
     }
 
-    /// The entry of a key; `None` if the store has none. A damaged one is removed. `is_enough` says whether an entry has all that is
+    /// The entry of a key; `None` if the store has none. A damaged one is removed. `is_enough` states whether an entry has all that is
     /// needed, else it counts as missing. Only images are counted as read or missing.
     pub(crate) fn get(
         &self,

@@ -37,7 +37,7 @@ pub(crate) struct EnhancedImages {
 #[derive(Debug)]
 struct EnhancedFile {
     digest: Digest,
-    /// Width and height in pixels of an 8-bit PNG; else what is wrong with the file.
+    /// Width and height in pixels of an 8-bit PNG; else the faults of the file.
     size: std::result::Result<(u32, u32), String>,
 }
 

@@ -63,7 +63,7 @@ impl ImageSteps<'_> {
         self.timings.time(TimedStep::Encode, write);
     }
 
-    /// An image from the store as it is sent, with what the camera did. `note` says how the file of its frame was read.
+    /// An image from the store as it is sent, with what the camera did. `note` states how the file of its frame was read.
     pub(crate) fn stored_payload(
         &self,
         payload: Payload,
@@ -74,7 +74,7 @@ impl ImageSteps<'_> {
         self.checked(payload.exposed_by(exposure))
     }
 
-    /// The image as it is sent, with what the camera did, and the pixels that were encoded. `note` says how the file of its frame was
+    /// The image as it is sent, with what the camera did, and the pixels that were encoded. `note` states how the file of its frame was
     /// read.
     pub(crate) fn payload(
         &self,

@@ -16,7 +16,7 @@ impl InputTally {
         summary.add(frame, note);
     }
 
-    /// Says what was done, in one line for each thing.
+    /// Prints what was done, in one line for each thing.
     pub(crate) fn warn(self) {
         let summary = self.0.into_inner();
         warn_of_inputs(&summary.unwrap_or_else(PoisonError::into_inner));

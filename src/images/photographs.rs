@@ -30,8 +30,8 @@ pub(crate) fn names(sources: &[Source]) -> Vec<PhotoName> {
     names.into_iter().map(|(_, name)| name.clone()).collect()
 }
 
-/// Says how dark the photographs are, on a sample of the frames, and what is odd about them: of how many frames there are none, which
-/// show another scene, and what [`PairDarkness::oddities`] finds. A file that cannot be decoded is left out: its trial says so.
+/// Prints how dark the photographs are, on a sample of the frames, and what is odd about them: of how many frames there are none, which
+/// show another scene, and what [`PairDarkness::oddities`] finds. A file that cannot be decoded is left out: its trial states so.
 pub(crate) fn tell(frames: &dyn Frames, sources: &[Source], progress: &Progress) {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     for name in names(sources) {

@@ -196,9 +196,9 @@ impl ImageCounts {
 enum Verdict {
     /// It is the image; nothing is to be done.
     Keep,
-    /// It must be made. The text says why, if something else was there.
+    /// It must be made. The text states why, if something else was there.
     Make(Option<&'static str>),
-    /// It is the image if its pixels are, and then gets its JSON file; else the text says what is wrong.
+    /// It is the image if its pixels are, and then gets its JSON file; else the text states what is wrong.
     Compare(Rgb, String),
     /// It is another image, which the text describes.
     Refuse(String),
@@ -226,7 +226,7 @@ impl Placed {
         }
     }
 
-    /// The same place, whose JSON file says why the image may be wrong.
+    /// The same place, whose JSON file gives the reason the image may be wrong.
     pub(crate) fn used_anyway(self, used_anyway: Option<String>) -> Self {
         Self {
             used_anyway,

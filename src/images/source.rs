@@ -226,7 +226,7 @@ pub(crate) fn input_summary(sources: &[Source]) -> InputSummary {
     summary
 }
 
-/// Says what was done to images when they were read, in one line for each thing.
+/// Prints what was done to images when they were read, in one line for each thing.
 pub(crate) fn warn_of_inputs(summary: &InputSummary) {
     for line in summary.lines() {
         tracing::warn!("{line}");

@@ -217,7 +217,7 @@ impl<'a> StoredPlace<'a> {
         ThumbnailPlace::new((self.store, &self.image), &self.shown, of, objects)
     }
 
-    /// Adds what is known of an image that took this time to make: with the image, if images like it are kept, else without it.
+    /// Adds facts about an image that took this time to make: with the image, if images like it are kept, else without it.
     pub(crate) fn write(&self, image: &Payload, notes: &MadeNotes, took: Duration) {
         let facts = EntryFacts::new(
             self.shown.clone(),

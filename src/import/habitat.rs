@@ -3,7 +3,7 @@
 //! A scene has `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres) or `.png`, and `semantic/<frame>.npy` or 16-bit `.png`
 //! (numbers of instances). Beside them lies `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json`
 //! (Replica). The optional `trajectory.jsonl` has one line per frame: `{"frame", "t", "pose", "intrinsics"}`. The optional
-//! `scenes.json` beside the scenes says how they were rendered (see [`renders`]).
+//! `scenes.json` beside the scenes states how they were rendered (see [`renders`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

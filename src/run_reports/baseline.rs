@@ -97,7 +97,7 @@ impl Baseline {
             .subjects
             .iter()
             .enumerate()
-            // A control says whether the observer can be trusted, not whether a model got worse.
+            // A control shows whether the observer can be trusted, not whether a model got worse.
             .filter(|(_, subject)| !is_control(&subject.model))
             .filter_map(|(index, subject)| {
                 let old = Subject {

@@ -45,7 +45,7 @@ impl Combined {
             })
     }
 
-    /// The light of the set of these runs: dark if all say so, with the brightness that the first of them measured.
+    /// The light of the set of these runs: dark if all state it, with the brightness that the first of them measured.
     pub(super) fn set(&self) -> PhotographedSet {
         let is_dark =
             |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
@@ -117,7 +117,7 @@ impl Combined {
     }
 }
 
-/// A folder as a command on it names it. An absolute path says where somebody's files lie: of it the page has the name alone.
+/// A folder as a command on it names it. An absolute path states where somebody's files lie: of it the page has the name alone.
 pub(super) fn typed(folder: &Path) -> String {
     let name = folder.file_name().filter(|_| folder.is_absolute());
     let shown = name.map_or_else(|| folder.to_owned(), |name| Path::new("DIR").join(name));

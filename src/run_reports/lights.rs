@@ -278,7 +278,7 @@ impl Seen {
 }
 
 /// The condition, the frame or walk, and the digest of the images of a trial; `None` if the model saw none or the trial failed. A
-/// control of the observer is shown a changed image, which says nothing of the light.
+/// control of the observer is shown a changed image, which reveals nothing about the light.
 fn image<D: Detail>(trial: TrialRef<'_, D>) -> Option<(&Condition, &str, Option<Digest>)> {
     let is_image = !trial.failed() && !is_control(trial.model());
     let condition = trial.condition().filter(|_| is_image)?;

@@ -11,7 +11,7 @@ use crate::runs::training::training_data;
 use crate::types::{ModelColumn, ModelListing};
 use darkqa_score::record::Detail;
 
-/// The order and the groups of the files of models of all runs, one after the other by the runs' names; and what is known of each
+/// The order and the groups of the files of models of all runs, one after the other by the runs' names; and facts about each
 /// model.
 pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
     let mut runs: Vec<(usize, &JoinedRun)> = joined.runs.iter().enumerate().collect();

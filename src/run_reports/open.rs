@@ -271,7 +271,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let mut alerts = run_alerts(&joined);
     alerts.extend(joining_alerts(&joined));
     if joined.runs.len() == 1 {
-        // The text and the page of one run say more about what is missing.
+        // The text and the page of one run say more about the missing part.
         alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
     }
     let enhancers = enhancers::rows(&joined.runs);
@@ -350,7 +350,7 @@ fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<Open
     marks
 }
 
-/// Why trials have no answer, in words with what the error says, by question and subject.
+/// Why trials have no answer, in words with what the error states, by question and subject.
 fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, Subject), String> {
     records
         .iter()

@@ -65,7 +65,7 @@ pub(crate) struct ReportArgs {
     pub show: ReportShowArgs,
 }
 
-/// The flags that say how a report of stored runs is printed.
+/// The flags that determine how a report of stored runs is printed.
 #[derive(Debug, Args)]
 pub(crate) struct ReportShowArgs {
     /// The formats that every report has.

@@ -39,7 +39,7 @@ impl Outcome {
         }
     }
 
-    /// A command that wrote something, and says so.
+    /// A command that wrote something, and prints that.
     pub(crate) fn wrote(path: impl Into<PathBuf>, status: Status, output: String) -> Self {
         let written = vec![path.into()];
         Self {

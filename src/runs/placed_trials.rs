@@ -15,7 +15,7 @@ use darkqa_score::record::Detail;
 /// The bytes of records that are written at once. Chosen: fewer calls of the system than records.
 const CHUNK: usize = 1 << 20;
 
-/// Adds the trials of a run folder, which is the part of this number: each as its last record says, with the name that its model has now.
+/// Adds the trials of a run folder, which is the part of this number: each as its last record states, with the name that its model has now.
 ///
 /// # Errors
 /// If a line is not a record.
@@ -36,7 +36,7 @@ pub(crate) fn read_part<D: Detail>(
     })
 }
 
-/// The trials of a run folder, each as its last record says.
+/// The trials of a run folder, each as its last record states.
 ///
 /// # Errors
 /// If a line is not a record.

@@ -286,7 +286,7 @@ pub(crate) fn open_questions(folder: &Path, instead: &str) -> Error {
 /// Most runs that a message lists.
 const MOST_LISTED: usize = 8;
 
-/// The folders with a manifest in a folder, for a message; the last text says how many more there are.
+/// The folders with a manifest in a folder, for a message; the last text states how many more there are.
 fn runs_below(folder: &Path) -> Vec<String> {
     let mut runs: Vec<String> = fs::read_dir(folder)
         .into_iter()

@@ -19,7 +19,7 @@ pub(super) struct Confidence<'f> {
 
 impl<'f> Confidence<'f> {
     /// The confidence in raw images of the darkest level of a variant, of the models over which findings are pooled. Without those of
-    /// few replies or clusters, whose intervals say little.
+    /// few replies or clusters, whose intervals reveal little.
     pub(super) fn all(findings: &'f Findings<'_>, variant: &KindReading) -> Vec<Self> {
         if findings.grid.clusters < MIN_SCENES {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Findings in words: [`Sentence`]s that say what was shown, and no more than its test.
+//! Findings in words: [`Sentence`]s that state what was shown, and no more than its test.
 //!
 //! Each sentence comes from typed results and from fixed wording. The terminal, the page, `summary.json` and `tables.tex` show the
 //! same strings. Rules:
@@ -6,7 +6,7 @@
 //! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “less often right”, only if p is below 0.05 after the correction over
 //!   all tests that sentences rest on, in the strict and in the lenient parsing, with the same direction.
 //! - If only the strict parsing detects a difference, the sentence is about the answer format.
-//! - If nothing is detected, the sentence says so, with the interval. It never says that there is no difference.
+//! - If nothing is detected, the sentence states so, with the interval. It never states that there is no difference.
 //! - A sentence is about the models of the run and names their number; it does not speak of models in general.
 
 mod answers;

@@ -227,7 +227,7 @@ fn is_observer(finding: &PooledFinding) -> bool {
     matches!(&finding.models[..], [one] if subject::is_observer(one))
 }
 
-/// Why a finding is not among those detected although its own test or its interval says so; empty otherwise.
+/// Why a finding is not among those detected although its own test or its interval detects it; empty otherwise.
 pub(super) fn reserved(finding: &PooledFinding, numbers: &mut Numbers) -> String {
     let strict = &finding.strict;
     let difference = strict.difference;

@@ -361,7 +361,7 @@ fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (T
     }
 }
 
-/// How often a model says that it cannot tell, where it may.
+/// How often a model states that it cannot tell, where it may.
 fn way_out(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
     let light = found.light_of(model).filter(|light| light.has_way_out)?;
     let dark = found

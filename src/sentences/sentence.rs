@@ -235,7 +235,7 @@ impl Numbers {
         counted(count, &self.unit.to_string())
     }
 
-    /// The number of questions and clusters of a finding, with what is left out.
+    /// The number of questions and clusters of a finding, with the omissions.
     pub(super) fn sample(&mut self, finding: &PooledFinding) -> String {
         let items = self.count("n", finding.items);
         let mut parts = vec![format!(

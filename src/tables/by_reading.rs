@@ -294,7 +294,7 @@ fn sentence(finding: &FindingByReading) -> String {
     format!("{}: {}.", clause(finding), parts.join("; "))
 }
 
-/// A sentence for each finding that some reading decides, and what is left out.
+/// A sentence for each finding that some reading decides, and the omissions.
 fn notes(found: &[FindingByReading]) -> Vec<String> {
     let models: BTreeSet<String> = found.iter().map(subject).collect();
     let mut notes: Vec<String> = found

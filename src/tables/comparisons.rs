@@ -186,7 +186,7 @@ fn too_few(comparisons: &[&Comparison]) -> Option<String> {
     })
 }
 
-/// Hides rows in the terminal: those beyond [`MAX_ROWS`] and, for blind models, those that say little.
+/// Hides rows in the terminal: those beyond [`MAX_ROWS`] and, for blind models, those that reveal little.
 fn shorten(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison]) {
     let mut printed: Vec<usize> = (0..comparisons.len()).collect();
     if kind == ComparisonKind::Blind {
@@ -267,7 +267,7 @@ fn subjects(builder: TableBuilder<&Comparison>, kind: ComparisonKind) -> TableBu
                 against(comparison)
             })
         }
-        // The kind says what the first side is compared with.
+        // The kind states what the first side is compared with.
         ComparisonKind::Level
         | ComparisonKind::Variant
         | ComparisonKind::Enhancer

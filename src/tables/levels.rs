@@ -27,7 +27,7 @@ pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
     tables
 }
 
-/// The table of each axis; `what` says on which items, if not on all.
+/// The table of each axis; `what` states on which items, if not on all.
 fn summary_tables(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) -> Vec<Table> {
     let strict = summary.family_cells(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).in_light_of(findings);

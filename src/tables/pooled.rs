@@ -26,7 +26,7 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
         .collect();
     let models = numbers.last().copied();
     let of_models = if numbers.len() > 1 {
-        // The column of models says over how many each row is pooled.
+        // The column of models states over how many each row is pooled.
         "all models".to_owned()
     } else {
         counted(models.unwrap_or(0), "model")
@@ -160,7 +160,7 @@ fn false_answers(finding: &PooledFinding, first: &str, answer: FalseAnswer) -> S
     )
 }
 
-/// Lines below the table: what is left out, and what so few clusters can show.
+/// Lines below the table: the omissions, and what so few clusters can show.
 fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
     let mut notes = Vec::new();
     let most = findings.iter().max_by_key(|finding| finding.dropped);

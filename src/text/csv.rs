@@ -40,7 +40,7 @@ pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
         TableCell::Count(count) => fields[0] = CsvField::Count(*count),
         TableCell::Number(number) => fields[0] = CsvField::Number(*number),
         TableCell::Significance(verdict) => {
-            // `tied` stays for one release; the column `shown` says what it means.
+            // `tied` stays for one release; the column `shown` states what it means.
             let word = if verdict.is_shown() {
                 verdict.word()
             } else {

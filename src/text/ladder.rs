@@ -102,7 +102,7 @@ impl<'a, C> Ladder<'a, C> {
         ladder
     }
 
-    /// The same, which says how dark the photographs in the dark are, and calls L0 as the light of the set wants it.
+    /// The same, which states how dark the photographs in the dark are, and calls L0 as the light of the set wants it.
     pub(crate) fn in_light_of(self, findings: &'a Findings<'_>) -> Self {
         Self {
             pairs: &findings.pairs,

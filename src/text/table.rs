@@ -121,7 +121,7 @@ pub enum TableCell {
     Absent,
     /// There is no number, because no reply can be counted.
     Missing,
-    /// The number is not known; the text says why.
+    /// The number is not known; the text states why.
     Unknown(String),
     /// Text of any length.
     Text(String),

@@ -1,6 +1,6 @@
 //! The width of the terminal: [`columns`].
 
-/// Width where nothing says how wide the terminal is, in columns.
+/// Width where nothing states how wide the terminal is, in columns.
 const DEFAULT: usize = 80;
 /// Least width that tables are fitted to, in columns; chosen.
 const LEAST: usize = 60;

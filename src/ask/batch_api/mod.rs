@@ -223,7 +223,7 @@ impl BatchServer {
         self.succeeded(sent.await.map_err(not_answered)?)
     }
 
-    /// The response itself, if its status says that the call succeeded.
+    /// The response itself, if its status states that the call succeeded.
     fn succeeded(&self, answer: HttpReply) -> ApiResult<HttpReply> {
         if answer.status.is_success() {
             return Ok(answer);

@@ -11,9 +11,9 @@ use crate::ask::secret::Scrub;
 pub(crate) struct RemoteFile {
     /// The server's name of the file.
     pub id: String,
-    /// The name under which it was uploaded; empty if the server does not say.
+    /// The name under which it was uploaded; empty if the server does not state it.
     pub name: String,
-    /// The number of bytes; `None` if the server does not say.
+    /// The number of bytes; `None` if the server does not state it.
     pub bytes: Option<u64>,
     /// Whether a batch may be made of it.
     pub readiness: Readiness,

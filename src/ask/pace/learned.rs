@@ -170,7 +170,7 @@ impl LearnedRate {
                 self.store = 0.0;
                 rate
             }
-            // A wait of one request or two says that the rate is nearly right; after a short run it says nothing about a ceiling.
+            // A wait of one request or two shows that the rate is nearly right; after a short run it reveals nothing about a ceiling.
             Some(rate) if wait * rate < 2.0 => {
                 if run >= 1.0 {
                     (self.known, self.ceiling) = (true, Some(rate));

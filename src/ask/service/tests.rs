@@ -149,7 +149,7 @@ async fn what_the_request_may_have_caused_spends_a_retry() {
     assert!(all.succeeded(ONE, 1, None, before).is_ok());
     tokio::time::advance(Duration::from_secs(1)).await;
     assert!(all.succeeded(ONE, 1, None, Instant::now()).is_ok());
-    // A refusal of the request, and a rate limit, say nothing of the replica.
+    // A refusal of the request, and a rate limit, reveal nothing about the replica.
     for (kind, status, again) in [
         (FailureKind::Request, 400, Again::Never),
         (FailureKind::RateLimit, 429, Again::WhenTaken),

@@ -25,7 +25,7 @@ static REASONS: LazyLock<Reasons> =
 /// The reason in a server's word; none is [`Finish::Unknown`].
 ///
 /// # Errors
-/// If the word says that the generation did not come to its end, or if it is not known. `usage` is what it was charged.
+/// If the word states that the generation did not come to its end, or if it is not known. `usage` is what it was charged.
 pub(super) fn read(word: &str, usage: Option<Usage>) -> Result<Finish, Unreadable> {
     let name = word.trim().to_ascii_lowercase().replace('-', "_");
     let reasons = &*REASONS;

@@ -3,7 +3,7 @@
 use crate::ask::complaint::Complaint;
 use crate::ask::wire_kind::Wire;
 
-/// The words by which servers say that they answer by event streams alone (Alibaba's model studio, ModelScope).
+/// The words by which servers state that they answer by event streams alone (Alibaba's model studio, ModelScope).
 const STREAM_ONLY: [&str; 8] = [
     "only support stream",
     "only supports stream",
@@ -16,7 +16,7 @@ const STREAM_ONLY: [&str; 8] = [
     "stream must be set to true",
 ];
 
-/// The words by which OpenAI says that it takes a model through the Responses API alone.
+/// The words by which OpenAI states that it takes a model through the Responses API alone.
 const RESPONSES_ONLY: [&str; 3] = [
     "only supported in v1/responses",
     "only supported in /v1/responses",

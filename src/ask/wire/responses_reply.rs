@@ -13,7 +13,7 @@ use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
 /// The text is that of all parts of type `output_text` in items of type `message`; items of reasoning are never read. A response
-/// that failed states an error; one that is incomplete says why, which becomes the reason why the model stopped.
+/// that failed states an error; one that is incomplete gives the reason, which becomes the reason why the model stopped.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
     let text = json_body::text(body);
     let response = if stream::is_stream(&text, content_type) {

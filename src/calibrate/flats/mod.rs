@@ -63,7 +63,7 @@ pub(super) struct Base<'a> {
     pub(super) within: f64,
 }
 
-/// Where light ends, and what is left out.
+/// Where light ends, and the omissions.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FlatSettings<'a> {
     /// The code of white.

@@ -1,4 +1,4 @@
-//! Histograms of what is left of bias frames when offsets and row noise are taken off: [`Residuals`].
+//! Histograms of bias frames without offsets and row noise: [`Residuals`].
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ const SAMPLES_AT_ONCE: usize = 1 << 20;
 pub(in super::super) enum Centres<'a> {
     /// The mean of the plane and of the row, both of the frame itself.
     RowsAndPlanes,
-    /// The mean of all frames at each site, and of the row of what is left: this takes off a fixed pattern.
+    /// The mean of all frames at each site, and of the row of the rest: this takes off a fixed pattern.
     MeanFrame {
         /// The sum of all frames at each site.
         sums: &'a [u32],

@@ -63,7 +63,7 @@ impl Reading {
 }
 
 impl Reading {
-    /// The index of the choice that an answer means, where the user names no reading: numbers say nothing about options with letters
+    /// The index of the choice that an answer means, where the user names no reading: numbers reveal nothing about options with letters
     /// in the text of a question.
     pub(super) fn by_rule(self, answer: &str, options: &Offered) -> Option<usize> {
         let is_number = matches!(self, Self::Index0 | Self::Index1);

@@ -31,7 +31,7 @@ pub(super) enum Lettered {
     Unclear(String),
 }
 
-/// Words of a sentence that says how to answer, by which it is told from an option.
+/// Words of a sentence that states how to answer, by which it is told from an option.
 static INSTRUCTION: LazyLock<Option<Regex>> = LazyLock::new(|| {
     Regex::new(concat!(
         r"(?i)\b(?:please|answer (?:with|using|by|in|the|directly|only)|(?:select|choose|pick) (?:the|one|from|your)",

@@ -1,4 +1,4 @@
-//! Which column is which, as the user says it: [`Map`].
+//! Which column is which, as the user states: [`Map`].
 
 use std::fmt;
 use std::str::FromStr;

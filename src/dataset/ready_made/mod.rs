@@ -6,7 +6,7 @@
 //! 3. Each row has its images (`images.rs`), its text and its options (`items.rs`, `options.rs`, `lettered.rs`).
 //! 4. The answers of all rows are read in one way (`answers.rs`, `truths.rs`). Where two ways fit and differ, nothing is guessed.
 //! 5. Rows that cannot be asked stop the reading, unless the user leaves them out (`left_out.rs`).
-//! 6. Questions get ids, families and frames (`frames.rs`), and it is said what was taken for what (`summary.rs`).
+//! 6. Questions get ids, families and frames (`frames.rs`), and the inferred mapping is printed (`summary.rs`).
 //!
 //! No code is for one set alone; what well-known sets need beyond these rules stands in `sets.toml`.
 
@@ -85,7 +85,7 @@ use truths::{Answered, is_own, truths};
 /// The set at a place: a file, a pattern of files, a folder, or several files.
 ///
 /// # Errors
-/// If it cannot be read without guessing. The error shows the columns, what was taken for what, and a flag that repairs it.
+/// If it cannot be read without guessing. The error shows the columns, the inferred mapping, and a flag that repairs it.
 pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<ReadySet> {
     let place = places.first().map_or(Path::new(""), PathBuf::as_path);
     let preset = preset::named(args.preset.as_deref());
@@ -296,7 +296,7 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     })
 }
 
-/// The questions of a set, the sources of their frames, and what was taken for what.
+/// The questions of a set, the sources of their frames, and the inferred mapping.
 struct Finished {
     questions: Vec<Question>,
     sources: BTreeMap<FrameId, ImageSource>,

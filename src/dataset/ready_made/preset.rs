@@ -90,7 +90,7 @@ impl Preset {
         format!("read by the rules of {}: {}", self.title, self.cite)
     }
 
-    /// The flags of the user, with those of the preset where the user says nothing.
+    /// The flags of the user, with those of the preset where the user gives none.
     pub(super) fn beneath(&self, args: &SetArgs) -> SetArgs {
         let mut args = args.clone();
         let map = self.map.as_deref().and_then(|map| map.parse::<Map>().ok());

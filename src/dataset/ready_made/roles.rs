@@ -37,7 +37,7 @@ pub(super) struct Roles {
 #[derive(Debug)]
 pub(super) enum Asked {
     Column(Column),
-    /// In the image, as the user says: the text only points there.
+    /// In the image, as the user states: the text only points there.
     InImage,
 }
 
@@ -67,7 +67,7 @@ pub(super) enum Families {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum InQuestion {
     Searched,
-    /// The user says that there are no options.
+    /// The user states that there are no options.
     None,
 }
 

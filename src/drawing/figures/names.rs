@@ -140,7 +140,7 @@ impl Names {
         }
     }
 
-    /// A sentence that says which models have a short form; empty if none has.
+    /// A sentence that states which models have a short form; empty if none has.
     pub(crate) fn said(&self) -> String {
         let forms: Vec<String> = self
             .shortened

@@ -39,7 +39,7 @@ const NAME: usize = 6;
 /// Images are scaled down by means of pixels. As in the paper's insets, the lower right corner of L3, L4 and L5 shows the
 /// middle of the image (half of each side, a quarter of the area) with 10, 20 and 50 times its light. Pixels of insets are
 /// picked, not averaged, so that the noise keeps its strength. The paper says "pixel intensities amplified". Multiplied codes
-/// would make a bright room white, so we take this to mean the light, and say so below the images.
+/// would make a bright room white, so we take this to mean the light, and state it below the images.
 #[must_use]
 pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     let size = fitted(clean.height(), clean.width());

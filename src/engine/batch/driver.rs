@@ -283,7 +283,7 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Waiting)
     }
 
-    /// Whether a part's file or batch has been missing for long enough to be sure that it does not exist; says so if it has not.
+    /// Whether a part's file or batch has been missing for long enough to be sure that it does not exist; states it if it has not.
     pub(super) fn is_missing(&mut self, part: usize, what: &str) -> bool {
         let now = Instant::now();
         let since = *self.notes.missing_since.entry(part).or_insert(now);

@@ -96,7 +96,7 @@ pub(crate) enum Event {
     },
     /// The batch was refused, because too many tokens wait for batches.
     QuotaReached {
-        /// The number of tokens that may wait; `None` if the server did not say.
+        /// The number of tokens that may wait; `None` if the server does not state it.
         limit: Option<u64>,
     },
     /// The server named another state of the batch than before.

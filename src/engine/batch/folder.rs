@@ -27,7 +27,7 @@ use darkqa_score::record::Detail;
 pub(crate) enum FolderTask {
     /// Take over the replies of those that have ended.
     Fetch,
-    /// Cancel them, wait until they have ended, and take over what is there.
+    /// Cancel them, wait until they have ended, and take over the existing replies.
     Cancel,
 }
 
@@ -72,7 +72,7 @@ impl<'a> FolderBatches<'a> {
         })
     }
 
-    /// One line a part, with what the server says of its batch.
+    /// One line a part, with what the server reports of its batch.
     pub(crate) fn status(&self) -> Result<String> {
         let runtime = start()?;
         let mut counts = BTreeMap::new();

@@ -60,7 +60,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         })
     }
 
-    /// Stores what a line says, if its trial waits for a batch.
+    /// Stores what a line states, if its trial waits for a batch.
     pub(super) fn take(&mut self, line: BatchLine) -> Result<Imported> {
         let key = line.id.parse::<TrialKey>().ok();
         let Some(blank) = key.and_then(|key| self.blanks.get(&key)) else {

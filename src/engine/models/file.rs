@@ -35,7 +35,7 @@ pub(super) struct Located {
 }
 
 impl Located {
-    /// An error about the value; the message says the key.
+    /// An error about the value; the message states the key.
     pub(super) fn error(&self, problem: impl std::fmt::Display) -> Error {
         Error::usage(self.place.clone(), problem)
     }
@@ -115,7 +115,7 @@ fn located(keys: &DeTable<'_>, values: &Table, at: &impl Fn(usize) -> String) ->
     Ok(found)
 }
 
-/// Refuses a value that looks like a key. `in_headers` says that the keys are names of headers.
+/// Refuses a value that looks like a key. `in_headers` states that the keys are names of headers.
 fn refuse_secrets(
     key: &str,
     value: &Spanned<DeValue<'_>>,

@@ -91,7 +91,7 @@ struct Suspect<'a> {
     flags: &'a AskingArgs,
 }
 
-/// A variable that is sent, and the key of the file that says so.
+/// A variable that is sent, and the key of the file that states it.
 struct Sent<'a> {
     key: &'static str,
     variable: &'a str,

@@ -14,7 +14,7 @@ use crate::picture::Payload;
 use crate::types::{Condition, EnhancerName, ExposureFacts, InputNote, PairFacts, Rgb};
 use darkqa_enhance::ImageUse;
 
-/// An image as it is sent, with what is known about it.
+/// An image as it is sent, with facts about it.
 pub(crate) struct MadeImage<'a> {
     pub(crate) payload: Arc<Payload>,
     pub(crate) pixels: PixelsSent,

@@ -177,7 +177,7 @@ impl<R: Read + Seek> McapReader<R> {
     }
 
     /// The body of the message of the last event, unpacked if its recorder compressed each message alone; `None` if it cannot be read:
-    /// then the next event says why.
+    /// then the next event gives the reason.
     pub(crate) fn body(&mut self) -> Option<&[u8]> {
         self.read_body(self.unread)?;
         if self.body.starts_with(&ZSTD_MAGIC)
@@ -286,7 +286,7 @@ impl<R: Read + Seek> McapReader<R> {
         Event::ChunkDamaged { times, problem }
     }
 
-    /// Skips what is left of the current record.
+    /// Skips the rest of the current record.
     fn skip_rest(&mut self) -> Result<(), Fault> {
         let count = mem::take(&mut self.unread);
         match &mut self.source {

@@ -33,6 +33,6 @@ pub struct PageInputs<'a> {
     pub questions: ReadQuestions<'a>,
     /// Thumbnails of the images; empty if the runs do not store them.
     pub thumbnails: &'a [Thumbnail],
-    /// Reads what stands in the place of a reply: its text, that of a refusal, or what the error says.
+    /// Reads what stands in the place of a reply: its text, that of a refusal, or what the error states.
     pub texts: Box<dyn Fn(TextPlace) -> Result<String> + 'a>,
 }

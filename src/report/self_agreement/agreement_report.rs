@@ -19,7 +19,7 @@ pub(crate) struct AgreementReport<'a> {
 }
 
 impl<'a> AgreementReport<'a> {
-    /// The report of these results; `used` says how each enhancer was used.
+    /// The report of these results; `used` states how each enhancer was used.
     pub(crate) fn new(
         found: &'a SelfAgreement<'a>,
         alerts: Vec<Alert>,

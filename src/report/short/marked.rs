@@ -1,6 +1,6 @@
 //! Alerts and findings as lines of the terminal, with their signs in colour: [`alert`], [`summary`], [`signed`] and [`sentence`].
 //!
-//! Colours stand in the text as ANSI sequences; whoever prints it takes them out where the terminal has none. A sign or a word says
+//! Colours stand in the text as ANSI sequences; whoever prints it takes them out where the terminal has none. A sign or a word states
 //! the same as each colour.
 
 use clap::builder::styling::{AnsiColor, Style};

@@ -62,7 +62,7 @@ pub(crate) fn fetch(args: &BatchFolderArgs, progress: &Progress) -> Result<Outco
     carry_out(args, FolderTask::Fetch, progress)
 }
 
-/// Cancels the batches, waits until they have ended, and takes over what is there.
+/// Cancels the batches, waits until they have ended, and takes over the existing replies.
 ///
 /// # Errors
 /// If the folder has no batches that the program submitted, or the server refuses.

@@ -40,7 +40,7 @@ pub(crate) struct BundleArgs {
     pub thumbnails: ThumbnailChoice,
 }
 
-/// Packs a run. What says where it was made, and what is secret, is taken out of all files; the report is made again from what is left.
+/// Packs a run. Paths, addresses and secrets are removed from all files; the report is made again from the rest.
 ///
 /// # Errors
 /// If the folder holds no run, something else than a bundle is at `--out`, or something private would be left in a file.

@@ -31,7 +31,7 @@ pub(crate) enum ThumbnailChoice {
 /// The name and the content of a file.
 type NamedFile = (String, Vec<u8>);
 
-/// A run without what is private.
+/// A run without private parts.
 pub(super) struct RunParts {
     pub(super) manifest: RunManifest,
     /// The files from which the run can be read again, by name.
@@ -97,7 +97,7 @@ impl RunParts {
     }
 }
 
-/// The lines of a run's files without what is private, and the files.
+/// The lines of a run's files without private parts, and the files.
 struct Parts<D> {
     lines: (Vec<Record<D>>, RunFiles),
     files: Vec<NamedFile>,
@@ -139,7 +139,7 @@ fn parts<D: Detail>(
     })
 }
 
-/// Lines without what is private, and the file of them.
+/// Lines without private parts, and the file of them.
 fn redacted<T: Serialize + DeserializeOwned>(
     name: &str,
     lines: impl Iterator<Item = T>,
@@ -157,7 +157,7 @@ fn redacted<T: Serialize + DeserializeOwned>(
     Ok((kept, (name.to_owned(), file)))
 }
 
-/// A line without what is private. The message of a failure is of this program or of a server, and any path in it is one of a machine.
+/// A line without private parts. The message of a failure is of this program or of a server, and any path in it is one of a machine.
 fn without_private(mut value: Value, redactor: &mut Redactor) -> Result<Value> {
     if let Some(Value::String(message)) = value.pointer_mut("/failure/message") {
         *message = redactor.text(message, Paths::Any);

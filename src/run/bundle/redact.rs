@@ -15,7 +15,7 @@ const LEAST_KEY: usize = 8;
 /// The replacement of a key.
 const SECRET: &str = "[secret]";
 
-/// Begins an image within a text: its letters say nothing.
+/// Begins an image within a text: its letters reveal nothing.
 const IMAGE: &str = "data:image/";
 
 /// Endings of the names of variables that hold keys.
@@ -51,7 +51,7 @@ impl Change {
     }
 }
 
-/// Takes out of texts what says where a run was made, and what is secret.
+/// Removes paths, addresses and secrets from texts.
 pub(super) struct Redactor {
     /// Places on this machine or that of the run, the longest first.
     places: Vec<String>,

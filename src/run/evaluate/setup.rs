@@ -155,7 +155,7 @@ impl<'a> ChoiceSetup<'a> {
         Ok((setup, files))
     }
 
-    /// Says what was taken for what in a ready-made set.
+    /// Prints the inferred mapping in a ready-made set.
     pub(super) fn say_reading(&self, progress: &Progress) {
         for line in self.dataset.reading_to_say() {
             progress.note(line);

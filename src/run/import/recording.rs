@@ -399,7 +399,7 @@ impl<'a> Import<'a> {
             self.writer.fail(&topic, &problem);
             return;
         }
-        // If the body is cut off, the next event says so.
+        // If the body is cut off, the next event states it.
         let Some(start) = reader.start_of_body(STAMP) else {
             return;
         };

@@ -123,7 +123,7 @@ fn light(args: &RealismArgs, pair: &Pair, tally: &InputTally) -> Result<PairLigh
 }
 
 impl PairLight {
-    /// Whether the low-light image is as bright as the other one, or brighter, and `--ev` does not say that this is meant.
+    /// Whether the low-light image is as bright as the other one, or brighter, and `--ev` does not state that this is meant.
     fn is_swapped(&self, args: &RealismArgs) -> bool {
         let is_meant = args.ev.is_some_and(|drop| drop <= 0.0);
         !is_meant && self.estimated.is_some_and(|drop| drop <= 0.0)

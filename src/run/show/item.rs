@@ -120,7 +120,7 @@ fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
     }
 }
 
-/// The head of the reply; of a refusal, or of what the error says, if there is none.
+/// The head of the reply; of a refusal, or of what the error states, if there is none.
 fn reply<D>(record: &Record<D>) -> String {
     let text = record.text_or_error().unwrap_or_default();
     text.chars().take(200).collect()

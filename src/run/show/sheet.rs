@@ -21,7 +21,7 @@ use crate::types::manifest::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, KindReading, Record, Rgb, TrialOutcome};
 use darkqa_score::subject::is_control;
 
-/// Draws the picture and writes it. The outcome says which conditions are left out, and which images are not those that were sent.
+/// Draws the picture and writes it. The outcome states which conditions are left out, and which images are not those that were sent.
 ///
 /// # Errors
 /// If the folder holds no run of questions with choices, the run has no dark images, it did not ask the item with images, or an

@@ -1,4 +1,4 @@
-//! The lines above a report: what differs between its runs, and what is wrong with its numbers ([`alerts`]).
+//! The lines above a report: what differs between its runs, and the faults of its numbers ([`alerts`]).
 
 mod adapted;
 mod confidence;

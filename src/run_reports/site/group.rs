@@ -16,7 +16,7 @@ use crate::types::{AxisLevel, Digest, KindReading, OpenDetail, RunQuestion};
 
 /// The field of an identity with the digest of the words around the questions.
 const PROMPTS: &str = "--prompts";
-/// The version of enhancement says nothing of raw images, by which models are compared.
+/// The version of enhancement reveals nothing about raw images, by which models are compared.
 const ENHANCEMENT: &str = "enhancement";
 /// The setting with the light of the set.
 const SET_LIGHT: &str = "--light";

@@ -104,7 +104,7 @@ fn add_groups<M>(
     }
 }
 
-/// Adds the page of a run; returns what its rows are made from, or says why it has none.
+/// Adds the page of a run; returns what its rows are made from, or the reason why it has none.
 fn add_choices(
     run: StoredRun<ChoiceDetail>,
     link: RunLink,

@@ -25,7 +25,7 @@ impl Coverage {
     /// The coverage of these parts, each with its folder.
     ///
     /// # Errors
-    /// If a part does not say what it has, or is of a run with another number of sources.
+    /// If a part does not state what it has, or is of a run with another number of sources.
     pub(super) fn from_parts<'a>(
         parts: impl Iterator<Item = (Shard, &'a Path, &'a RunManifest)>,
     ) -> Result<Self> {
@@ -85,7 +85,7 @@ impl Coverage {
             .filter_map(|(place, trials)| trials.is_none().then_some(place))
     }
 
-    /// The shards that no part is of and that have what is missing. Of several divisions it is the one with the fewest such shards;
+    /// The shards that no part is of and that have the missing part. Of several divisions it is the one with the fewest such shards;
     /// `part` returns the places of the sources of a shard. None if `part` knows none.
     pub(super) fn absent(&self, part: impl Fn(Shard) -> Option<Range<usize>>) -> Vec<Shard> {
         let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();

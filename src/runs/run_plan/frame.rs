@@ -40,7 +40,7 @@ pub(crate) struct PlannedFrame {
     pub(crate) scene: String,
     /// Its file; `None` for rooms, images within a file, and several frames.
     pub(crate) path: Option<PathBuf>,
-    /// Size of the file in bytes when the plan was written. It says nothing about the content, and is not checked.
+    /// Size of the file in bytes when the plan was written. It reveals nothing about the content, and is not checked.
     pub(crate) size: Option<u64>,
     /// Time of the file's last change, in UTC, when the plan was written. It is not checked.
     pub(crate) mtime: Option<String>,

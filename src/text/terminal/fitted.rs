@@ -124,7 +124,7 @@ impl TextTable {
         }
     }
 
-    /// Takes the columns of zeros out; a line that says so, empty without any.
+    /// Takes the columns of zeros out; a line that states it, empty without any.
     fn leave_out_zeros(&mut self) -> String {
         let mut names = Vec::new();
         for column in (0..self.columns.len()).rev() {

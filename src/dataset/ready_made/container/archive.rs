@@ -132,7 +132,7 @@ impl Archive {
     /// The bytes of an image.
     ///
     /// # Errors
-    /// If it cannot be read, or is longer than an image may be, whatever the directory says.
+    /// If it cannot be read, or is longer than an image may be, whatever the directory states.
     pub(in crate::dataset) fn image(&self, name: &str) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         self.copy(name, LONGEST_IMAGE, &mut bytes)?;

@@ -46,10 +46,10 @@ fn named(tree: &Tree) -> (Vec<Config>, Option<String>) {
     }
 }
 
-/// The files that are asked, and what is wrong with the card: those of a configuration of the card, else the metadata, else by their endings; of one split.
+/// The files that are asked, and the faults of the card: those of a configuration of the card, else the metadata, else by their endings; of one split.
 ///
 /// # Errors
-/// If there are none, or it is not clear which are meant; the error names what is there.
+/// If there are none, or it is not clear which are meant; the error lists the files.
 pub(super) fn chosen(
     tree: &Tree,
     files: Vec<PathBuf>,

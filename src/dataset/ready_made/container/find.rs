@@ -46,7 +46,7 @@ pub(in crate::dataset) fn holds_files(folder: &Path) -> bool {
 /// The files at a place.
 ///
 /// # Errors
-/// If there are none, or it is not clear which are meant; the error names what is there.
+/// If there are none, or it is not clear which are meant; the error lists the files.
 pub(in crate::dataset::ready_made) fn find(
     places: &[PathBuf],
     args: &SetArgs,

@@ -73,7 +73,7 @@ fn yes_and_no_in_two_columns_are_compared_where_both_say_something() {
     };
     let (_folder, path) = with(rows("no", json!("")));
     assert!(refusal(&path, &skipping()).contains("\"answer\" and \"label\" differ"));
-    // Numbers mean no and yes where the other column says so.
+    // Numbers mean no and yes where the other column states so.
     let (_folder, path) = with(rows("1", json!("yes")));
     assert_eq!(read(&open(&path, &skipping()).unwrap())[0].4, "yes");
     let (_folder, path) = with(rows("0", json!("yes")));

@@ -31,7 +31,7 @@ pub(super) enum Limit {
     Fixed(usize),
     /// This share is refused at random.
     Random(f64),
-    /// This share fails at random, which says nothing of a rate: status 500, or a reply that is cut.
+    /// This share fails at random, which reveals nothing about a rate: status 500, or a reply that is cut.
     Broken(f64),
 }
 
