@@ -96,7 +96,7 @@ impl CameraInfo {
     }
 
     /// The camera of an image of a topic; `None` if it is unknown, or of images of another size.
-    pub(crate) fn of_image(&self, topic: &str, size: (usize, usize)) -> Option<Intrinsics> {
+    pub(crate) fn intrinsics_for(&self, topic: &str, size: (usize, usize)) -> Option<Intrinsics> {
         if (self.width, self.height) != size {
             return None;
         }
@@ -131,7 +131,7 @@ mod tests {
         ];
         let info = CameraInfo::new([640, 480], &k, &p);
         let focal = |topic: &str, size| {
-            info.of_image(topic, size)
+            info.intrinsics_for(topic, size)
                 .map(|camera| (camera.fx, camera.fy, camera.cx, camera.cy))
         };
         assert_eq!(

@@ -34,7 +34,7 @@ impl Cameras {
         let infos = self.0.get(camera)?;
         let after = infos.partition_point(|(from, _)| *from <= time);
         let (_, info) = &infos[after.saturating_sub(1)];
-        info.of_image(topic, size)
+        info.intrinsics_for(topic, size)
     }
 }
 

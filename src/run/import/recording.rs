@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::camera_facts::{Cameras, Exposures};
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
@@ -83,6 +83,27 @@ impl WrittenArgs {
             "the folder has frames already; --force overwrites them, another --out keeps both";
         Err(Error::data(list.display(), problem))
     }
+
+    /// The content of `dataset.json` for the frames of a drive, which is named after its first file.
+    pub(super) fn info(&self, source: &str, drive: &str) -> Value {
+        json!({
+            "schema": "darkqa.dataset/1",
+            "name": self.name.as_deref().unwrap_or(drive),
+            "source": source,
+            "stretch": self.stretch,
+        })
+    }
+}
+
+/// Warns of the times of `--at` at which a topic or video has no frame.
+pub(super) fn warn_of_missed(sampler: &Sampler, name: &str) {
+    let missed = sampler.missed();
+    if let Some(first) = missed.first() {
+        tracing::warn!(
+            "{name}: no frame at {first} s or later; {} of --at",
+            counted(missed.len(), "time")
+        );
+    }
 }
 
 /// Lists the topics of a recording, or imports frames of them.
@@ -104,7 +125,7 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
     };
     let topics = topics(args, overview.as_ref())?;
     let drive = drive_name(&files[0]);
-    let mut import = Import::new(args, out, drive, &topics, overview.as_ref())?;
+    let mut import = Import::new(args, out, &drive, &topics, overview.as_ref())?;
     let mut problems = Vec::new();
     let bar = progress.bar("MB", bytes(&files) as usize >> 20);
     for file in &files {
@@ -114,7 +135,8 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
     for problem in &problems {
         tracing::warn!("{problem}");
     }
-    import.finish(args, &files, problems.is_empty())
+    let info = args.written.info("mcap", &drive);
+    import.finish(args, out, info, &files[0], problems.is_empty())
 }
 
 /// The MCAP files that paths stand for: a folder for the files in it, in the order of their numbers.
@@ -235,6 +257,8 @@ struct TakenTopic {
     prefix: String,
     /// Messages so far.
     seen: usize,
+    /// Time of the last frame.
+    latest: Option<Nanoseconds>,
 }
 
 /// The import of a recording.
@@ -250,15 +274,13 @@ struct Import<'a> {
     /// Number of frames that were earlier than the one before of their topic, and the first of them in words.
     backwards: usize,
     first_backwards: Option<String>,
-    /// Time of the last frame of each topic.
-    latest: BTreeMap<String, Nanoseconds>,
 }
 
 impl<'a> Import<'a> {
     fn new(
         args: &McapArgs,
         out: &'a Path,
-        drive: String,
+        drive: &str,
         topics: &[String],
         overview: Option<&Overview>,
     ) -> Result<Self> {
@@ -276,6 +298,7 @@ impl<'a> Import<'a> {
                 String::new()
             },
             seen: 0,
+            latest: None,
         };
         Ok(Self {
             topics: topics
@@ -283,14 +306,18 @@ impl<'a> Import<'a> {
                 .map(|topic| (topic.clone(), taken(topic)))
                 .collect(),
             stretches: Stretches::new(args.written.stretch),
-            writer: FrameWriter::new(out, drive, white, pool(args.written.threads.threads)?),
+            writer: FrameWriter::new(
+                out,
+                drive.to_owned(),
+                white,
+                pool(args.written.threads.threads)?,
+            ),
             white,
             cameras: Cameras::default(),
             exposures: Exposures::default(),
             without_stamp: 0,
             backwards: 0,
             first_backwards: None,
-            latest: BTreeMap::new(),
         })
     }
 
@@ -446,8 +473,11 @@ impl<'a> Import<'a> {
 
     /// Counts a frame that is earlier than the one before of its topic.
     fn note_backwards(&mut self, topic: &str, time: Nanoseconds) {
-        let latest = self.latest.entry(topic.to_owned()).or_insert(time);
-        if time < *latest {
+        let taken = self.topics.get_mut(topic);
+        let Some(latest) = taken.and_then(|taken| taken.latest.replace(time)) else {
+            return;
+        };
+        if time < latest {
             let back = seconds(latest.saturating_sub(time));
             self.backwards += 1;
             let since = self.since_start(time);
@@ -455,29 +485,25 @@ impl<'a> Import<'a> {
                 || format!("{topic} at {since:.3} s, {back:.3} s before the frame in front of it");
             self.first_backwards.get_or_insert_with(first);
         }
-        self.latest.insert(topic.to_owned(), time);
     }
 
-    /// Writes the list of frames, and what is printed.
-    fn finish(mut self, args: &McapArgs, files: &[PathBuf], is_whole: bool) -> Result<Outcome> {
-        let place = files[0].display().to_string();
-        let names: Vec<String> = self.topics.keys().cloned().collect();
+    /// Refuses a topic without messages, and warns of times without a frame.
+    fn check_topics(&self, place: &str) -> Result<()> {
         for (topic, taken) in &self.topics {
             if taken.seen == 0 {
                 let problem = format_args!(
                     "no messages of {topic}; without --topic and --out, its topics are listed"
                 );
-                return Err(Error::data(&place, problem));
+                return Err(Error::data(place, problem));
             }
-            if let [first, ..] = taken.sampler.missed()[..] {
-                tracing::warn!(
-                    "{topic}: no frame at {first} s or later; {} of --at",
-                    counted(taken.sampler.missed().len(), "time")
-                );
-            }
+            warn_of_missed(&taken.sampler, topic);
         }
-        self.writer.write_waiting();
-        let [mut with_camera, mut with_exposure] = [0; 2];
+        Ok(())
+    }
+
+    /// Adds intrinsics and exposures to the lines of the frames, and returns how many frames have each.
+    fn add_camera_facts(&mut self) -> [usize; 2] {
+        let [mut with_intrinsics, mut with_exposure] = [0; 2];
         for written in &mut self.writer.written {
             let camera = camera_of(&written.topic);
             let intrinsics =
@@ -487,21 +513,31 @@ impl<'a> Import<'a> {
                 written
                     .line
                     .insert("intrinsics".to_owned(), json!(intrinsics));
-                with_camera += 1;
+                with_intrinsics += 1;
             }
             if let Some(exposure) = self.exposures.found.get(&(camera.to_owned(), written.time)) {
                 written.line.insert("exposure".to_owned(), json!(exposure));
                 with_exposure += 1;
             }
         }
-        let out = args.out.as_deref().unwrap_or(Path::new(""));
-        let info = json!({
-            "schema": "darkqa.dataset/1",
-            "name": args.written.name.clone().unwrap_or_else(|| drive_name(&files[0])),
-            "source": "mcap",
-            "topics": names,
-            "stretch": args.written.stretch,
-        });
+        [with_intrinsics, with_exposure]
+    }
+
+    /// Writes the files about all frames, `info` among them, and returns the report of the import.
+    fn finish(
+        mut self,
+        args: &McapArgs,
+        out: &Path,
+        mut info: Value,
+        first_file: &Path,
+        is_whole: bool,
+    ) -> Result<Outcome> {
+        let place = first_file.display().to_string();
+        self.check_topics(&place)?;
+        self.writer.write_waiting();
+        let [with_intrinsics, with_exposure] = self.add_camera_facts();
+        let names: Vec<String> = self.topics.keys().cloned().collect();
+        info["topics"] = json!(names);
         let scenes = self.writer.finish(&place, &info)?;
         let failed = self.writer.warn_of_failures();
         if let Some(first) = &self.first_backwards {
@@ -521,7 +557,7 @@ impl<'a> Import<'a> {
         );
         let _ = writeln!(
             output,
-            "intrinsics: {with_camera} of {}; exposure: {with_exposure}",
+            "intrinsics: {with_intrinsics} of {}; exposure: {with_exposure}",
             counted(frames, "frame")
         );
         if self.without_stamp > 0 {

@@ -4,10 +4,9 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
-use super::recording::{WrittenArgs, drive_name};
+use super::recording::{WrittenArgs, drive_name, warn_of_missed};
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::pool;
@@ -100,19 +99,12 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         }
     }
     drop(bar);
-    if let Some(first) = sampler.missed().first() {
-        tracing::warn!("{place}: no frame at {first} s or later");
-    }
+    warn_of_missed(&sampler, &place);
     let is_whole = problem.is_none();
     if let Some(problem) = problem {
         tracing::warn!("{problem}; frames up to there are kept");
     }
-    let info = json!({
-        "schema": "darkqa.dataset/1",
-        "name": args.written.name.as_ref().unwrap_or(&drive),
-        "source": "video",
-        "stretch": args.written.stretch,
-    });
+    let info = args.written.info("video", &drive);
     let scenes = writer.finish(&place, &info)?;
     let failed = writer.warn_of_failures();
     let mut output = summary(
