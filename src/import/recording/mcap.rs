@@ -260,7 +260,7 @@ impl<R: Read + Seek> McapReader<R> {
         Ok(None)
     }
 
-    /// What follows from a fault: the end of a damaged chunk, or of the file.
+    /// The event for a fault, after which reading goes on behind the damaged chunk or ends.
     fn recover(&mut self, fault: Fault) -> Event {
         self.unread = 0;
         let is_whole = self.next_record <= self.length;
