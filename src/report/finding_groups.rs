@@ -80,14 +80,14 @@ pub(super) struct FindingGroups<'a>(Vec<FindingGroup<'a>>);
 /// The findings of one group, the most important kind first.
 pub(super) struct FindingGroup<'a> {
     pub(super) title: &'static str,
-    pub(super) findings: Vec<Finding<'a>>,
+    findings: Vec<Finding<'a>>,
     /// Place of the finding that stands for the group; `None` if no kind of the group's findings may.
     first: Option<usize>,
 }
 
 /// The sentences about one thing: an enhancer, or one effect under several noise profiles.
 pub(super) struct Finding<'a> {
-    pub(super) sentences: Vec<&'a Sentence>,
+    sentences: Vec<&'a Sentence>,
 }
 
 /// The effect of a finding in one light.
@@ -199,6 +199,13 @@ impl<'a> FindingGroup<'a> {
             first,
             findings,
         }
+    }
+
+    /// The sentences of all its findings.
+    pub(super) fn sentences(&self) -> impl Iterator<Item = &'a Sentence> {
+        self.findings
+            .iter()
+            .flat_map(|finding| finding.sentences.iter().copied())
     }
 
     /// The detected effects of the enhancers, or the statement that none was detected.

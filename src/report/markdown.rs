@@ -113,7 +113,7 @@ impl<'a> MarkdownReport<'a> {
         }
         for group in self.groups.all() {
             let _ = writeln!(text, "#### {}\n", group.title);
-            for sentence in group.findings.iter().flat_map(|finding| &finding.sentences) {
+            for sentence in group.sentences() {
                 text += &finding(sentence.tone.sign(), "", &sentence.text, &sentence.detail);
             }
             text.push('\n');

@@ -100,12 +100,9 @@ struct PageSentence<'a> {
 
 impl<'a> PageGroup<'a> {
     fn new(group: &FindingGroup<'a>) -> Self {
-        let sentences = group.findings.iter().flat_map(|finding| &finding.sentences);
         Self {
             title: group.title,
-            sentences: sentences
-                .map(|sentence| PageSentence::new(sentence))
-                .collect(),
+            sentences: group.sentences().map(PageSentence::new).collect(),
         }
     }
 }

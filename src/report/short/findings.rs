@@ -46,7 +46,7 @@ pub(in crate::report) fn findings(
     }
     for group in groups.all() {
         text += &marked::heading(group.title);
-        for sentence in group.findings.iter().flat_map(|finding| &finding.sentences) {
+        for sentence in group.sentences() {
             text += &marked::sentence(sentence);
         }
     }

@@ -137,14 +137,13 @@ impl ModelListing {
     pub fn trainings(&self) -> impl Iterator<Item = (&str, String)> {
         self.training
             .iter()
-            .map(|(enhancer, data)| (&**enhancer, format!("trained on {data}")))
+            .map(|(enhancer, data)| (&**enhancer, trained_on(data)))
     }
 
     /// `trained on DATA` of an enhancer; `None` if its training data are unknown.
     #[must_use]
     pub fn training(&self, enhancer: &str) -> Option<String> {
-        let data = self.training.get(enhancer)?;
-        Some(format!("trained on {data}"))
+        self.training.get(enhancer).map(|data| trained_on(data))
     }
 
     /// True if people answered under this name, or under the name before a run or a time in brackets, as `human (one)`.
@@ -230,6 +229,10 @@ impl ModelListing {
             longest.map(|(index, _)| index)
         })
     }
+}
+
+fn trained_on(data: &str) -> String {
+    format!("trained on {data}")
 }
 
 #[cfg(test)]
