@@ -584,7 +584,7 @@ fn class_of_row(row: &'static str) -> Option<(&'static str, &'static str)> {
     let earlier = cells[0].strip_suffix("` until 0.2)");
     let earlier = earlier.and_then(|flag| flag.split(" (`").last());
     let flag = earlier.unwrap_or(cells[0]);
-    Some((flag.split([' ', '`']).next().unwrap(), cells[2]))
+    Some((flag.split([' ', ',', '`']).next().unwrap(), cells[2]))
 }
 
 #[test]
