@@ -9,25 +9,31 @@ use crate::images::trial::Prompt;
 use crate::types::{Condition, Digest, QuestionId, TrialKey};
 
 /// All that decides a reply, as it enters the key of a trial. Question and condition are included, because built-in models answer by
-/// their names.
+/// their names. The fields are sorted, as [`Digest::sorted`] expects.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct KeyFacts<'a> {
+    before: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    behind: Option<&'a str>,
+    /// Choices in the order shown; `None` for an open question.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    choices: Option<&'a [String]>,
+    /// Condition of the images; `None` if only text is sent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    condition: Option<&'a Condition>,
+    /// Digest of all that decides the images; `None` if only text is sent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    image: Option<Digest>,
     model: &'a str,
     /// Digest of the settings that decide the model's replies.
     parameters: &'a str,
-    question: &'a QuestionId,
-    before: &'a str,
-    behind: Option<&'a str>,
     /// Where the images stand; `None` if they stand together.
+    #[serde(skip_serializing_if = "Option::is_none")]
     places: Option<ImagePlaces>,
-    /// Choices in the order shown; `None` for an open question.
-    choices: Option<&'a [String]>,
+    question: &'a QuestionId,
     /// Number of earlier trials with the same question; `None` for the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
     repeat: Option<u32>,
-    /// Condition of the images; `None` if only text is sent.
-    condition: Option<&'a Condition>,
-    /// Digest of all that decides the images; `None` if only text is sent.
-    image: Option<Digest>,
 }
 
 impl<'a> KeyFacts<'a> {
@@ -64,6 +70,6 @@ impl<'a> KeyFacts<'a> {
 
     /// The digest of all these facts, which is the key of the trial.
     pub(crate) fn key(&self) -> Result<TrialKey> {
-        Digest::canonical("darkqa.trial/2", self).map(Into::into)
+        Digest::sorted("darkqa.trial/2", self).map(Into::into)
     }
 }

@@ -36,10 +36,33 @@ impl Digest {
         value: &impl serde::Serialize,
     ) -> Result<(Self, serde_json::Value), Error> {
         let value = canonical(value).map_err(|e| Error::data(domain, e))?;
+        Ok((Self::from_text(domain, &value.to_string()), value))
+    }
+
+    /// The same digest as [`Digest::canonical`], ten times as fast, of a value whose JSON is canonical as it is written: its fields
+    /// are sorted, `None` is skipped, and no number is a float.
+    ///
+    /// # Errors
+    /// If a key of a map is not a text.
+    #[cfg(feature = "program")]
+    pub fn sorted(domain: &'static str, value: &impl serde::Serialize) -> Result<Self, Error> {
+        let text = serde_json::to_string(value).map_err(|e| Error::data(domain, e))?;
+        debug_assert_eq!(
+            canonical(value)
+                .ok()
+                .map(|value| value.to_string())
+                .as_ref(),
+            Some(&text)
+        );
+        Ok(Self::from_text(domain, &text))
+    }
+
+    #[cfg(feature = "program")]
+    fn from_text(domain: &'static str, text: &str) -> Self {
         let mut hasher = blake3::Hasher::new();
         hasher.update(domain.as_bytes()).update(&[0]);
-        hasher.update(value.to_string().as_bytes());
-        Ok((Self(*hasher.finalize().as_bytes()), value))
+        hasher.update(text.as_bytes());
+        Self(*hasher.finalize().as_bytes())
     }
 
     /// The digest of several parts in order. Each part's length is hashed too, so that no two lists have the same input.
