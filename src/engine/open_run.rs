@@ -174,7 +174,6 @@ impl<E: Experiment> OpenRun<'_, E> {
     pub(crate) fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let mut stored = self.store.trials()?;
         let mut plan = Plan::new(self.experiment.plan(phase, || self.store.records())?);
-        self.keys.extend(&plan.keys);
         if let Some(part) = &mut self.manifest.part {
             for (source, trials) in &plan.by_source {
                 part.trials[*source] += trials;
@@ -209,6 +208,9 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
         let sent = self.store.pending_in_batches()?;
         let in_batch = plan.exclude(|key| sent.contains(key));
+        // After the sets of this function and the excluded trials are dropped: of a million trials each is 70 MB.
+        drop((answered, again, paid_for));
+        self.keys.extend(&plan.keys);
         Ok(Remaining {
             plan,
             stored,
@@ -393,17 +395,18 @@ impl<E: Experiment> OpenRun<'_, E> {
     /// planned, because its images have changed, does not count.
     /// The stored trials are given by their keys, and whether they failed.
     fn counts(&self, stored: impl Iterator<Item = (TrialKey, bool)>) -> Counts {
-        let (mut keys, mut answered, mut failed) = (self.keys.clone(), 0, 0);
+        let (mut unplanned, mut answered, mut failed) = (0, 0, 0);
         for (key, has_failed) in stored {
+            let is_planned = self.keys.contains(&key);
             if !has_failed {
-                keys.insert(key);
+                unplanned += usize::from(!is_planned);
                 answered += 1;
-            } else if keys.contains(&key) {
+            } else if is_planned {
                 failed += 1;
             }
         }
         Counts {
-            trials: keys.len(),
+            trials: self.keys.len() + unplanned,
             answered,
             failed,
         }
