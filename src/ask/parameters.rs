@@ -123,6 +123,13 @@ impl Parameters {
         })
     }
 
+    /// The same settings in a run that has this column of the model, with a smaller token limit; `None` if another setting differs, too.
+    pub(crate) fn grown_from_column(&self, column: &Value) -> Option<Self> {
+        let first = u32::try_from(column["--max-tokens"].as_u64()?).ok()?;
+        self.grown_from(NonZeroU32::new(first)?)
+            .filter(|grown| grown.are_of_column(column))
+    }
+
     /// Whether the settings that decide a reply are those of a run's column, whose address is left aside.
     pub(crate) fn are_of_column(&self, column: &Value) -> bool {
         let Value::Object(own) = self.content() else {

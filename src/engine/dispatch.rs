@@ -45,6 +45,8 @@ pub(crate) struct Dispatcher<'a> {
     pub(crate) settings: &'a JobSettings,
     pub(crate) timings: &'a Timings,
     pub(crate) in_flight_cost: InFlightCost,
+    /// The flag of the token limit of these models.
+    pub(crate) token_flag: &'static str,
 }
 
 /// The numbers of all trials and of those answered, in one phase.
@@ -85,7 +87,7 @@ impl Dispatcher<'_> {
             budget,
             stoppers,
             answered: counts.answered,
-            truncation: TruncationCheck::default(),
+            truncation: TruncationCheck::new(self.token_flag),
             measured: MeasuredTokens::new(self.models.len()),
             dependence: vec![ImageDependence::default(); self.models.len()],
             said_difference: vec![Said::NotYet; self.models.len()],

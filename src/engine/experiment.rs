@@ -57,6 +57,11 @@ pub(crate) trait Experiment: Sync {
     /// Models that are asked in a phase.
     fn models(&self, phase: usize) -> &[ModelUnderTest];
 
+    /// The flag of the token limit in a phase.
+    fn token_flag(&self, _phase: usize) -> &'static str {
+        "--max-tokens"
+    }
+
     /// All sources of the run.
     fn sources(&self) -> &[Source];
 

@@ -189,9 +189,9 @@ impl<E: Experiment> OpenRun<'_, E> {
         let asked_again = plan.remaining_of(|key| again.contains(key));
         if asked_again > 0 {
             let replies = plural(asked_again, "truncated reply is", "truncated replies are");
-            self.progress.note(&format!(
-                "{replies} asked again with the larger --max-tokens"
-            ));
+            let flag = self.experiment.token_flag(phase);
+            self.progress
+                .note(&format!("{replies} asked again with the larger {flag}"));
         }
         let paid_for = lost_for_good(&stored, self.experiment.settings());
         let not_again = plan.exclude(|key| paid_for.contains(key));
@@ -203,7 +203,8 @@ impl<E: Experiment> OpenRun<'_, E> {
             };
             tracing::warn!(
                 "{not_again} {trials} not asked again: {were} charged for several attempts without a reply; asked again with more \
-                 --retries paid, best with a larger --max-tokens in another folder"
+                 --retries paid, best with a larger {} in another folder",
+                self.experiment.token_flag(phase)
             );
         }
         let sent = self.store.pending_in_batches()?;
@@ -335,6 +336,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             settings,
             timings: &timings,
             in_flight_cost,
+            token_flag: experiment.token_flag(phase),
         };
         let missing = missing_notes(experiment, self.store.folder());
         let started = Instant::now();

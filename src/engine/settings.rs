@@ -300,6 +300,13 @@ impl JobArgs {
     }
 }
 
+impl JobSettings {
+    /// The columns of the run that is gone on with; none of a new run.
+    pub(crate) fn columns(&self) -> Columns {
+        self.place.for_shard(self.shard).columns()
+    }
+}
+
 /// Parent of the run folders that the user does not name.
 pub(crate) const RESULTS: &str = "results";
 

@@ -3,8 +3,10 @@
 use crate::types::{Finish, Reply};
 
 /// Counts replies that the token limit cut. A share that is large shows that the limit is too low.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct TruncationCheck {
+    /// The flag that sets the limit.
+    flag: &'static str,
     replies: usize,
     cut: usize,
     /// Replies that were cut before any text.
@@ -18,6 +20,17 @@ impl TruncationCheck {
 
     /// Smallest number of replies at which all that were cut are judged; chosen.
     const FEWEST: usize = 20;
+
+    /// No replies so far, of models whose token limit this flag sets.
+    pub(crate) fn new(flag: &'static str) -> Self {
+        Self {
+            flag,
+            replies: 0,
+            cut: 0,
+            empty: 0,
+            has_warned: false,
+        }
+    }
 
     /// Counts a reply, and warns once: if most of the first ones were cut before any text, or later if a quarter of all were cut.
     pub(crate) fn count(&mut self, reply: &Reply) {
@@ -33,17 +46,19 @@ impl TruncationCheck {
             self.has_warned = true;
             tracing::warn!(
                 "{} of the first {} replies were cut at the token limit before any text: a reasoning model needs a larger \
-                 --max-tokens, or a lower --reasoning-effort",
+                 {}, or a lower --reasoning-effort",
                 self.empty,
-                self.replies
+                self.replies,
+                self.flag
             );
         } else if self.is_large() {
             self.has_warned = true;
             tracing::warn!(
-                "{} of {} replies so far were cut at the token limit: the same command with a larger --max-tokens and --resume DIR asks these \
+                "{} of {} replies so far were cut at the token limit: the same command with a larger {} and --resume DIR asks these \
                  alone again",
                 self.cut,
-                self.replies
+                self.replies,
+                self.flag
             );
         }
     }
@@ -59,7 +74,7 @@ mod tests {
     use super::*;
 
     fn after(replies: usize, is_cut: impl Fn(usize) -> bool) -> TruncationCheck {
-        let mut check = TruncationCheck::default();
+        let mut check = TruncationCheck::new("--max-tokens");
         for i in 0..replies {
             let finish = if is_cut(i) {
                 Finish::Length

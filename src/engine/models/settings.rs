@@ -193,10 +193,7 @@ impl AskSettings {
             let Some(column) = stored.get(&model.name) else {
                 continue;
             };
-            let first = column["--max-tokens"].as_u64();
-            let first = first.and_then(|first| NonZeroU32::new(u32::try_from(first).ok()?));
-            let grown = first.and_then(|first| own.grown_from(first));
-            if let Some(grown) = grown.filter(|grown| grown.are_of_column(column)) {
+            if let Some(grown) = own.grown_from_column(column) {
                 model.parameters = grown;
             }
         }

@@ -57,6 +57,13 @@ impl Experiment for OpenSetup<'_> {
         }
     }
 
+    fn token_flag(&self, phase: usize) -> &'static str {
+        match phase {
+            0 => "--max-tokens",
+            _ => "--judge-max-tokens",
+        }
+    }
+
     fn sources(&self) -> &[Source] {
         &self.sources
     }

@@ -11,6 +11,7 @@ use crate::engine::models::ModelName;
 use crate::engine::settings::JobArgs;
 use crate::error::Result;
 use crate::types::Decides;
+use crate::types::manifest::{Columns, JUDGES};
 use darkqa_score::choice::llm_match::Protocol;
 
 /// The flags of the judge, the model that marks the answers.
@@ -49,6 +50,23 @@ pub(super) struct Judge {
     pub(super) server: Option<Arc<Server>>,
     /// The parameters of a request; the name of the model is filled in later.
     pub(super) parameters: Parameters,
+}
+
+impl Judge {
+    /// Goes on with a run with these columns: a token limit that has grown since does not make other marks.
+    pub(super) fn continue_from(&mut self, columns: &Columns) {
+        let ModelName::Remote(id) = &self.model else {
+            return;
+        };
+        let own = Parameters {
+            model: id.clone(),
+            ..self.parameters.clone()
+        };
+        let column = columns.get(JUDGES).and_then(|judges| judges.get(id));
+        if let Some(grown) = column.and_then(|column| own.grown_from_column(column)) {
+            self.parameters = grown;
+        }
+    }
 }
 
 impl JudgeArgs {

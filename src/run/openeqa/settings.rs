@@ -156,13 +156,16 @@ impl OpenEqaArgs {
             .try_for_each(ModelName::require_open_answers)?;
         let SamplingSeed(seed) = self.sampling_seed;
         let protocol = self.judge.protocol;
-        let judge = self.judge.resolve(&self.job, seed)?;
+        let mut judge = self.judge.resolve(&self.job, seed)?;
         let data = self.walk.folder.clone();
         let job = self.job.resolve(&ExperimentSettings {
             sampling_seed: seed,
             data: Some(data),
             ..ExperimentSettings::default()
         })?;
+        if let Some(judge) = &mut judge {
+            judge.continue_from(&job.columns());
+        }
         if let Some(model) = job
             .ask
             .models

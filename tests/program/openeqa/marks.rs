@@ -232,3 +232,50 @@ fn people_get_a_page_without_the_answers_and_their_file_is_marked() {
             .all(|name| !name.to_string_lossy().contains('L'))
     );
 }
+
+/// A judge that thinks before it marks.
+fn thinking_judge() -> MockEndpoint {
+    MockEndpoint::answering(|body| {
+        if body["max_tokens"].as_u64().unwrap() < 100 {
+            Answer::message(&json!({"content": "The answer says"}), "length")
+        } else {
+            Answer::text("5")
+        }
+    })
+}
+
+#[test]
+fn truncated_marks_are_asked_again_with_a_larger_limit() {
+    let house = House::new();
+    let people = json!([
+        {"question_id": "q1", "answer": "brown"},
+        {"question_id": "q2", "answer": "at the door"},
+    ]);
+    house.0.file("people.json", people.to_string());
+    let judge = thinking_judge();
+    let call = |more: &str| {
+        house.call(&words(&format!(
+            "--answers human=people.json --judge j --judge-base-url {} --levels L0 --out run {more}",
+            judge.base_url()
+        )))
+    };
+    let first = call("");
+    assert_eq!((first.code, judge.requests().len()), (Some(1), 2));
+    assert!(first.stdout.contains("0 of 2 answers"), "{first:?}");
+
+    let grown = call("--judge-max-tokens 200");
+    assert_eq!(
+        (grown.code, judge.requests().len()),
+        (Some(0), 4),
+        "{grown:?}"
+    );
+    let note = "2 truncated replies are asked again with the larger --judge-max-tokens";
+    assert!(grown.stderr.contains(note), "{grown:?}");
+    assert!(grown.stdout.contains("2 of 2 answers"), "{grown:?}");
+
+    // Nothing is asked again with this limit, or the first.
+    for limit in ["200", "32"] {
+        let on = call(&format!("--judge-max-tokens {limit}"));
+        assert_eq!((on.code, judge.requests().len()), (Some(0), 4), "{on:?}");
+    }
+}
