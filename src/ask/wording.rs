@@ -113,6 +113,8 @@ mod tests {
             (flat("The decoder prompt (length 5000) is longer than the maximum model length of 4096."), "--image max-side"),
             (flat("Multimodal prompt is too long after expanding multimodal tokens. After expanding len(req.origin_input_ids_unpadded)=5192 => 6153 >= 5489."), "--image max-side"),
             (flat("The input (61709 tokens) is longer than the model's context length (40960 tokens)."), "--image max-side"),
+            (flat("The request exceeds the model context length."), "--image max-side"),
+            (error("internal error happened, status code ResponseType.INPUT_LENGTH_ERROR"), "--image max-side"),
             (json!({"error": {"code": 400, "message": "too long", "type": "exceed_context_size_error", "n_ctx": 256}}).to_string(), "--image max-side"),
             (json!({"error": "Trying to keep the first 111490 tokens when context the overflows. However, the model is loaded with context length of only 32768 tokens"}).to_string(), "--image max-side"),
             (json!({"error": {"message": "Please reduce the length of the messages or completion.", "code": "context_length_exceeded"}}).to_string(), "--image max-side"),

@@ -8,6 +8,7 @@ use super::logprobs;
 use super::stream;
 use super::usage;
 use crate::ask::complaint::{Complaint, Unreadable, UnreadableReply};
+use crate::ask::wording::Wording;
 use crate::types::{Finish, Reply, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
@@ -35,7 +36,8 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
         ))));
     }
     let word = choice.get("finish_reason").and_then(Value::as_str);
-    let finish = finish_reason::read(word.unwrap_or_default(), usage)?;
+    let finish = finish_reason::read(word.unwrap_or_default(), usage)
+        .map_err(|broken| error_in_text(choice).unwrap_or_else(|| broken.into()))?;
     let message = choice
         .get("message")
         .filter(|message| message.is_object())
@@ -89,6 +91,14 @@ fn choice(completion: &Value) -> Result<&Value, &'static str> {
         .find(|choice| choice.get("index").and_then(Value::as_u64) == Some(0))
         .or(choices.first())
         .ok_or("a completion with no choices in it")
+}
+
+/// The error that stands in the text of a reply that broke off, if its wording is known: LMDeploy sends errors in this way.
+fn error_in_text(choice: &Value) -> Option<UnreadableReply> {
+    let text = choice.pointer("/message/content")?.as_str()?;
+    let complaint = Complaint::from_body(text);
+    Wording::find(&complaint, true)?;
+    Some(UnreadableReply::Complaint(Box::new(complaint)))
 }
 
 /// The text of a message, and the text of a refusal among its parts.
@@ -219,6 +229,22 @@ mod tests {
             };
             assert_eq!(complaint.message, "m");
         }
+    }
+
+    #[test]
+    fn an_error_in_the_text_of_a_reply_that_broke_off_is_found() {
+        let body = |text: &str| {
+            format!(
+                r#"{{"choices":[{{"finish_reason":"error","message":{{"content":"{text}"}}}}]}}"#
+            )
+        };
+        let text = "internal error happened, status code ResponseType.INPUT_LENGTH_ERROR";
+        let Err(UnreadableReply::Complaint(complaint)) = json(&body(text)) else {
+            panic!("no complaint");
+        };
+        assert_eq!(complaint.message, text);
+        let other = json(&body("The answer is"));
+        assert!(matches!(other, Err(UnreadableReply::Other(_))));
     }
 
     #[test]
