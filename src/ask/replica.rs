@@ -175,7 +175,7 @@ impl Replica {
             _ => failed.again != Again::Never,
         };
         let remedy = &failed.failure.message;
-        let message = self.message(status, complaint, remedy, &self.request_id(answer));
+        let message = self.message(answer, complaint, remedy);
         failed.failure.message = message;
         failed.failure.status = Some(status);
         let now = SystemTime::now();
@@ -199,14 +199,16 @@ impl Replica {
     }
 
     /// The error text for a refused request.
-    fn message(
-        &self,
-        status: u16,
-        complaint: &Complaint,
-        remedy: &str,
-        request_id: &str,
-    ) -> String {
+    fn message(&self, answer: &HttpReply, complaint: &Complaint, remedy: &str) -> String {
+        let status = answer.status.as_u16();
         let mut message = format!("{} answered {status}", self.base());
+        // Gateways send errors with the status of success.
+        if answer.status.is_success() {
+            message += &match complaint.status() {
+                Some(code) => format!(" with the error {code}"),
+                None => " with an error".to_owned(),
+            };
+        }
         let text = self.connection.scrub.line(&complaint.message);
         if !text.is_empty() {
             message = format!("{message}: {text}");
@@ -214,6 +216,7 @@ impl Replica {
         if !remedy.is_empty() {
             message = format!("{message} ({remedy})");
         }
+        let request_id = self.request_id(answer);
         if !request_id.is_empty() {
             message = format!("{message} [request {request_id}]");
         }
