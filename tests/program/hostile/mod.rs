@@ -3,8 +3,8 @@
 //! working folder.
 //!
 //! The short form runs with the other tests. The long form is
-//! `DARKQA_HOSTILE_RUNS=100000 DARKQA_HOSTILE_SEED=7 cargo test --test program hostile:: -- --ignored --nocapture`; it writes each failure as a
-//! folder into `target/tmp/hostile`, named by its seed and number. `DARKQA_HOSTILE_FIRST` is the number of its first run (default: 0),
+//! `HOSTILE_RUNS=100000 HOSTILE_SEED=7 cargo test --test program hostile:: -- --ignored --nocapture`; it writes each failure as a
+//! folder into `target/tmp/hostile`, named by its seed and number. `HOSTILE_FIRST` is the number of its first run (default: 0),
 //! so that one run is done again by its number.
 
 #![cfg(unix)]
@@ -47,9 +47,9 @@ fn many_damaged_files_are_read_or_refused() {
         let value = std::env::var(name).ok();
         value.map_or(default, |value| value.parse().unwrap())
     };
-    let seed = number("DARKQA_HOSTILE_SEED", 1);
-    let runs = number("DARKQA_HOSTILE_RUNS", 100_000);
-    let first = number("DARKQA_HOSTILE_FIRST", 0);
+    let seed = number("HOSTILE_SEED", 1);
+    let runs = number("HOSTILE_RUNS", 100_000);
+    let first = number("HOSTILE_FIRST", 0);
     println!("seed {seed}, {runs} runs from number {first}");
     let summary = campaign::run(seed, first as usize..(first + runs) as usize);
     println!("{summary}");
