@@ -12,8 +12,9 @@ pub(crate) mod thresholds;
 
 use serde::Serialize;
 
-use crate::types::AxisLevel;
+use crate::text::words::light;
 use crate::types::degradation::Axis;
+use crate::types::{AxisLevel, EnhancerName, KindReading};
 use darkqa_score::estimate::Estimate;
 
 /// Colour of axes and text, and of lines that belong to no model.
@@ -100,6 +101,36 @@ pub(crate) struct PlotLine {
     pub content: PanelContent,
     /// The model that it is about; `None` of a line about several, or about none.
     pub model: Option<String>,
+    /// The items behind its points in the list of the page; `None` if the list does not show them.
+    pub items: Option<LineItems>,
+}
+
+/// The items behind the points of a line: those that a model was asked in one variant, of one family or of all.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct LineItems {
+    model: String,
+    /// Variant and enhancer in words, as the list of items names them.
+    light: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub family: Option<String>,
+}
+
+impl LineItems {
+    /// The items of all families that the only one of these models was asked; `None` of several models.
+    pub(crate) fn for_model(
+        models: &[&str],
+        variant: &KindReading,
+        enhancer: Option<&EnhancerName>,
+    ) -> Option<Self> {
+        let [model] = models else {
+            return None;
+        };
+        Some(Self {
+            model: (*model).to_owned(),
+            light: light(variant, enhancer),
+            family: None,
+        })
+    }
 }
 
 /// One panel of a chart.

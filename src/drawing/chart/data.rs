@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Chart, PanelContent, PlotLine};
+use super::{Chart, LineItems, PanelContent, PlotLine};
 use crate::error::Result;
 use crate::text::script::embedded;
 use crate::text::words::{percent, with_interval};
@@ -42,6 +42,9 @@ struct LineData {
     /// Number of the style: colour, dash and mark.
     style: usize,
     model: Option<String>,
+    /// The items behind its points; a click on a point shows them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    items: Option<LineItems>,
     #[serde(flatten)]
     content: ContentData,
 }
@@ -134,6 +137,7 @@ fn line(line: &PlotLine) -> LineData {
         name: line.name.clone(),
         style: line.style.0,
         model: line.model.clone(),
+        items: line.items.clone(),
         content,
     }
 }

@@ -59,6 +59,7 @@ impl Overview<'_> {
                 style: LineStyle::REFERENCE,
                 content: PanelContent::Flat(share),
                 model: None,
+                items: None,
             });
             let title = format!("{}, n {n}", self.names.shown(family_name(Some(&family))));
             Some(Panel {

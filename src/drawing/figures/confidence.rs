@@ -33,6 +33,7 @@ impl Overview<'_> {
                         style: LineStyle(style),
                         content: PanelContent::Curve(points),
                         model: Some((*model).to_owned()),
+                        items: None,
                     })
                 };
                 let lines: Vec<PlotLine> = LINES.into_iter().enumerate().filter_map(line).collect();

@@ -13,7 +13,7 @@ mod thresholds;
 use std::collections::BTreeSet;
 
 use crate::drawing::chart::drawn::Drawn;
-use crate::drawing::chart::{Chart, DarkMark, LineStyle, Panel, PanelContent, PlotLine};
+use crate::drawing::chart::{Chart, DarkMark, LineItems, LineStyle, Panel, PanelContent, PlotLine};
 use crate::text::words::{counted, family as family_name, light_with, names_enhancer};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
@@ -192,6 +192,7 @@ impl<'a> Overview<'a> {
                     style,
                     content,
                     model: of,
+                    items: None,
                 })
             })
             .collect()
@@ -247,6 +248,7 @@ impl<'a> Overview<'a> {
                 style: self.style(model),
                 content: PanelContent::Curve(self.points(model, variant, None, &mut number)),
                 model: Some((*model).to_owned()),
+                items: LineItems::for_model(&[*model], variant, None),
             })
             .collect()
     }
@@ -254,6 +256,9 @@ impl<'a> Overview<'a> {
     /// Lines of the accuracy of all models, with the flat lines.
     fn accuracies(&self, variant: &KindReading, family: Option<&Family>) -> Vec<PlotLine> {
         let mut lines = self.lines(variant, |subject| self.accuracy_of(subject, family));
+        for items in lines.iter_mut().filter_map(|line| line.items.as_mut()) {
+            items.family = family.map(|family| family.name().to_owned());
+        }
         lines.extend(self.flat_lines(family));
         lines
     }
@@ -282,6 +287,7 @@ impl<'a> Overview<'a> {
                         style: self.style(model),
                         content: PanelContent::Marks(marks),
                         model: Some((*model).to_owned()),
+                        items: None,
                     });
                 }
             }
@@ -418,6 +424,7 @@ impl<'a> Overview<'a> {
                 style: LineStyle(index),
                 content: PanelContent::Curve(mean(&curves)),
                 model: None,
+                items: LineItems::for_model(models, variant, None),
             }
         };
         let mut lines: Vec<PlotLine> = variants.iter().enumerate().map(line).collect();
@@ -442,6 +449,7 @@ impl<'a> Overview<'a> {
                         style: LineStyle(index),
                         content: PanelContent::Curve(points),
                         model: Some((*model).to_owned()),
+                        items: LineItems::for_model(&[*model], &variant, enhancer),
                     })
                 };
                 let lines: Vec<PlotLine> = self

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{ACCURACY, Names, Overview};
-use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
+use crate::drawing::chart::{Chart, LineItems, LineStyle, Panel, PanelContent, PlotLine};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 use darkqa_score::findings::Findings;
@@ -165,6 +165,7 @@ impl Overview<'_> {
                 style: LineStyle::BLACK,
                 content: PanelContent::Curve(points),
                 model: None,
+                items: LineItems::for_model(&[model], variant, None),
             });
         }
         lines
@@ -185,6 +186,7 @@ impl Overview<'_> {
                 style: LineStyle(index),
                 content: PanelContent::Curve(points),
                 model: None,
+                items: LineItems::for_model(models, variant, enhancer),
             })
         };
         let mut lines: Vec<PlotLine> = self

@@ -53,6 +53,7 @@ mod tests {
             style: LineStyle(0),
             content,
             model: model.map(str::to_owned),
+            items: None,
         }
     }
 

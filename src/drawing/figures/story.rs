@@ -1,7 +1,7 @@
 //! The curves of the picture that tells a run's story: [`story_curves`].
 
 use super::{Names, Overview};
-use crate::drawing::chart::{LineStyle, PanelContent, PlotLine};
+use crate::drawing::chart::{LineItems, LineStyle, PanelContent, PlotLine};
 use crate::text::words::light;
 use crate::types::{EnhancerName, KindReading};
 use darkqa_score::findings::Findings;
@@ -41,6 +41,7 @@ pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
                     style: LineStyle(lines.len()),
                     content: PanelContent::Curve(points),
                     model: Some((*model).to_owned()),
+                    items: LineItems::for_model(&[*model], &variant, enhancer),
                 });
             }
         }

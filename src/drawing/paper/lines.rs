@@ -214,6 +214,7 @@ mod tests {
                         .map(|(at, level)| (*level, share(0.9 - 0.07 * (line + 2 * at) as f64)))
                         .collect(),
                 ),
+                items: None,
             })
             .collect();
         lines.push(PlotLine {
@@ -221,6 +222,7 @@ mod tests {
             style: LineStyle::REFERENCE,
             content: PanelContent::Flat(0.25),
             model: None,
+            items: None,
         });
         Chart {
             measure: "accuracy in %",

@@ -96,6 +96,7 @@ fn panel(
             style: LineStyle(style),
             content: PanelContent::Curve(points),
             model: None,
+            items: None,
         })
     });
     let chance = chance.map(|share| PlotLine {
@@ -103,6 +104,7 @@ fn panel(
         style: CHANCE,
         content: PanelContent::Flat(share),
         model: None,
+        items: None,
     });
     Panel {
         title: title.to_owned(),

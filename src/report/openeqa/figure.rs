@@ -86,6 +86,7 @@ fn panel(
             style: LineStyle(index.unwrap_or(seeing)),
             content: PanelContent::Curve(points.collect()),
             model: Some(series.model.to_owned()),
+            items: None,
         }
     });
     let blind = ladder
@@ -98,6 +99,7 @@ fn panel(
                 style: LineStyle(seeing + index),
                 content: PanelContent::Flat(cell.score?.value),
                 model: Some(subject.model.clone()),
+                items: None,
             })
         });
     let n = report.questions.len();

@@ -120,6 +120,7 @@ fn line(
         style: style(found, series.model),
         content: PanelContent::Curve(points),
         model: Some(series.model.to_owned()),
+        items: None,
     }
 }
 
@@ -142,6 +143,7 @@ fn floors(found: &SelfAgreement<'_>) -> Vec<PlotLine> {
                 style: style(found, model),
                 content: PanelContent::Flat(cell.agreement?.value),
                 model: Some(model.to_owned()),
+                items: None,
             })
         })
         .collect()

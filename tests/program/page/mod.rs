@@ -67,6 +67,7 @@ fn the_page_works_in_a_browser() {
     slider(&mut browser);
     keyboard(&mut browser);
     hostile_replies(&mut browser);
+    points(&mut browser);
     deep_link(&mut browser, &url);
     themes(&mut browser);
     narrow(&mut browser, &url);
@@ -200,6 +201,24 @@ fn charts(browser: &mut Browser, bench: &Bench) {
     }
     browser.evaluate("document.querySelector('#models button[title=random]').click()");
     browser.shot("charts.png", true);
+}
+
+/// A point of a chart leads to the items behind it, and the address names them.
+fn points(browser: &mut Browser) {
+    let links = "[...document.querySelectorAll('#figure-accuracy g.to-items')].filter(g => g.dataset.address.includes('light=with%20noise&level=L5'))";
+    browser.choose("#f-level", "L0");
+    browser.choose("#f-state", "wrong");
+    browser.evaluate(&format!(
+        "{links}[0].dispatchEvent(new MouseEvent('click', {{ bubbles: true, cancelable: true }}))"
+    ));
+    browser.wait("document.querySelector('#f-level').value === 'L5'");
+    let chosen = |of: &str| format!("document.querySelector('#f-{of}').value");
+    assert_eq!(browser.evaluate(&chosen("model")), SAID);
+    assert_eq!(browser.evaluate(&chosen("light")), "with noise");
+    assert_eq!(browser.evaluate(&chosen("state")), "all");
+    assert_eq!(count(browser), "40 of 40 items");
+    let hash = browser.evaluate("location.hash");
+    assert!(hash.as_str().unwrap().contains("level=L5"), "{hash}");
 }
 
 fn slider(browser: &mut Browser) {

@@ -33,6 +33,20 @@ const markOf = (line, x, y) => {
   return MARKS[(line.style + Math.floor(line.style / COLOURS)) % MARKS.length](x, y);
 };
 
+// The address of the items behind a point of a line, in the list below; none if the page has no such list.
+const itemsOf = (line, level) => {
+  if (!line.items || !level || !$("explorer")) return undefined;
+  const { model, light, family } = line.items;
+  return "#" + Object.entries({ model, light, level: level.name, family }).filter(([, value]) => value).map(([key, value]) => key + "=" + encodeURIComponent(value)).join("&");
+};
+// A mark that leads to its items by a click. Keys have the filters of the list for that: a drawing with links in it is no image.
+const linked = (address, name, x, y, mark) => {
+  const group = draw_("g", { class: "to-items", "data-address": address },
+    draw_("title", {}, `the items of ${name}`), draw_("circle", { cx: x, cy: y, r: 9, class: "target" }), mark);
+  group.addEventListener("click", () => { location.hash = address; });
+  return group;
+};
+
 // The models that are off, for all figures.
 const modelsOff = new Set();
 const charts = [];
@@ -122,6 +136,10 @@ class Chart {
     body.append(this.grid, fold);
     this.paperNote = make("p", undefined, "paper-only small");
     plot.append(this.legend, body, this.paperNote, " ");
+    // The first chart says it for all.
+    if (!charts.length && this.data.panels.some((panel) => panel.lines.some((line) => itemsOf(line, panel.levels[0])))) {
+      this.legend.after(make("p", "A click on a point shows the images, questions and replies behind it.", "small"));
+    }
     this.figure.querySelector(".drawing").after(plot);
     this.figure.classList.add("drawn");
     new ResizeObserver(() => {
@@ -232,7 +250,12 @@ class Chart {
             group.append(draw_("path", { d: `M${x(point.x[0])} ${y(point.y[0])}H${x(point.x[2])}`, class: "bar" }));
           }
         }
-        for (const [px, py] of points) group.append(markOf(line, px, py));
+        points.forEach(([px, py], place) => {
+          const mark = markOf(line, px, py);
+          const level = line.kind === "curve" && panel.levels.find((own) => own.value === line.points[place].x[1]);
+          const address = itemsOf(line, level);
+          group.append(address ? linked(address, `${line.name} at ${level.name}`, px, py, mark) : mark);
+        });
         ends.push({ at: points[points.length - 1][1], from: points[points.length - 1][0], name: names[index], colour: colourOf(line) });
       }
       svg.append(group);

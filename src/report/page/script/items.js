@@ -399,9 +399,11 @@ const said = () => {
 };
 const follow = () => {
   const link = said();
-  if (!link.item) return false;
-  const item = data.items.findIndex((i) => i.name === link.item);
+  if (!link.item && !link.model) return false;
+  // A point of a chart names no item: the first one that is shown.
+  const item = link.item ? data.items.findIndex((i) => i.name === link.item) : 0;
   if (item < 0) return false;
+  acted();
   state = { family: link.family || "all", model: link.model, light: link.light, level: link.level, against: link.against || "–", show: link.show || "all", words: link.words || "", item, pictured: null };
   refresh();
   if (shown.includes(item)) go(item);
@@ -458,8 +460,8 @@ const start = async () => {
   // The page opens at its top, unless the address names an item; showing the first item writes its name there.
   const linked = data.subjects.length && follow();
   if (data.subjects.length && !linked) refresh();
-  if (linked) { acted(); $("items").scrollIntoView(); }
-  addEventListener("hashchange", () => { if (said().item && location.hash !== link()) { follow(); $("items").scrollIntoView(); } });
+  if (linked) { $("items").scrollIntoView(); }
+  addEventListener("hashchange", () => { if (location.hash !== link() && follow()) { $("items").scrollIntoView(); } });
   document.documentElement.dataset.ready = "true";
 };
 
