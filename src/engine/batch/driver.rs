@@ -301,6 +301,11 @@ impl<D: Detail> Driver<'_, D> {
         is_missing
     }
 
+    /// Ends the search for a part's file or batch: the next one has its whole time again.
+    pub(super) fn was_found(&mut self, part: usize) {
+        self.notes.missing_since.remove(&part);
+    }
+
     /// How long a part's file or batch is looked for. A server on this machine that is looked at all the time has lists that are not late.
     fn search_time(&self, part: usize) -> Duration {
         let poll = self.args.collect.poll;

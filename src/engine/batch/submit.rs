@@ -69,7 +69,10 @@ impl<D: Detail> Driver<'_, D> {
         let found =
             files.find(|file| file.name == name && file.bytes.is_none_or(|other| other == bytes));
         let event = match found {
-            Some(file) => Event::Uploaded { id: file.id },
+            Some(file) => {
+                self.was_found(part);
+                Event::Uploaded { id: file.id }
+            }
             None if !self.is_missing(part, "file") => return Ok(Step::Waiting),
             None => Event::Refused {
                 why: "the file is not at the server".to_owned(),
@@ -137,7 +140,10 @@ impl<D: Detail> Driver<'_, D> {
             Err(failure) => return self.look_failed(part, &failure),
         };
         match self.part_batch(part, batches) {
-            Some(batch) => self.created(part, batch.id),
+            Some(batch) => {
+                self.was_found(part);
+                self.created(part, batch.id)
+            }
             None if self.is_missing(part, "batch") => {
                 self.refuse(part, "the batch is not at the server")
             }

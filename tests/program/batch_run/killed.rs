@@ -46,6 +46,29 @@ fn what_was_made_before_the_connection_broke_is_found() {
 }
 
 #[test]
+fn each_search_has_its_whole_time() {
+    // The file is found late, late, and then the batch: together later than one search lasts.
+    let bench = Bench::with_questions(QUESTIONS);
+    let mock = MockBatches::start([Course::of("completed")]);
+    let none = json!({"object": "list", "data": [], "has_more": false});
+    mock.fault("POST files", Fault::CutAfter);
+    mock.fault("POST batches", Fault::CutAfter);
+    for list in ["GET files", "GET batches"] {
+        for _ in 0..2 {
+            mock.fault(list, Fault::Instead(Answer::json(200, &none)));
+        }
+    }
+    let run = BLIND.replace("--poll 0.02", "--poll 0.19");
+    let called = call_with(&run, &bench, &mock, "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(
+        (mock.count("POST files"), mock.count("POST batches")),
+        (1, 1)
+    );
+}
+
+#[test]
 fn a_batch_that_is_listed_late_is_not_made_again() {
     // The list of batches is seconds behind.
     let bench = Bench::with_questions(QUESTIONS);
