@@ -1,6 +1,6 @@
 //! `--baseline`: new runs against an old one ([`Baseline`]).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::alerts::run_alerts;
 use super::combine::{Combined, check_comparable, clusters};
@@ -11,7 +11,8 @@ use crate::report::choice_report::ChoiceReport;
 use crate::runs::stored::StoredRun;
 use crate::sentences::{against_baseline, no_verdict};
 use crate::tables::baseline;
-use crate::text::alert::Alert;
+use crate::text::alert::{Alert, AlertKind};
+use crate::text::words::name;
 use crate::types::{ChoiceDetail, TrialRef};
 use darkqa_score::baseline::{BaselineRow, baseline_rows};
 use darkqa_score::cluster::ClusterUnit;
@@ -23,6 +24,9 @@ use darkqa_score::subject::{Subject, is_control, is_observer};
 /// The flag that makes a worse model a failure.
 pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";
 
+/// The most conditions that a message names; chosen.
+const MAX_NAMED: usize = 3;
+
 /// New runs against an old one.
 pub(super) struct Baseline {
     rows: Vec<BaselineRow>,
@@ -30,6 +34,10 @@ pub(super) struct Baseline {
     old: String,
     /// Differences between the new runs and the old one.
     alerts: Vec<Alert>,
+    /// Models under test in conditions of the old run that are not compared, with their names there.
+    missing: Vec<Subject>,
+    /// Models under test of the new runs that the old one does not have.
+    added: BTreeSet<String>,
 }
 
 /// The cost of each model in each condition, in US dollars. A subject of which no trial states its cost has none.
@@ -114,13 +122,83 @@ impl Baseline {
             let model = marked.strip_suffix(&mark("")).unwrap_or(marked);
             costs.add(trial, run.charged(model, trial));
         }
-        Ok(Self {
-            rows: baseline_rows(&grid, &healths(&grid), &pairs, |index| {
-                costs.0.get(&grid.subjects[index]).copied()
-            }),
+        let rows = baseline_rows(&grid, &healths(&grid), &pairs, |index| {
+            costs.0.get(&grid.subjects[index]).copied()
+        });
+        let compared: BTreeSet<usize> = pairs
+            .iter()
+            .filter(|(new, _)| rows.iter().any(|row| row.subject == grid.subjects[*new]))
+            .map(|(_, old)| *old)
+            .collect();
+        let suffix = mark("");
+        let is_tested = |subject: &Subject| !subject.is_reference() && !is_control(&subject.model);
+        let missing = grid
+            .subjects
+            .iter()
+            .enumerate()
+            .filter(|(index, _)| !compared.contains(index))
+            .filter_map(|(_, subject)| {
+                let model = subject.model.strip_suffix(&suffix)?.to_owned();
+                Some(Subject {
+                    model,
+                    ..subject.clone()
+                })
+            })
+            .filter(is_tested)
+            .collect();
+        let added = grid
+            .subjects
+            .iter()
+            .filter(|subject| is_tested(subject) && !subject.model.ends_with(&suffix))
+            .filter(|subject| !rows.iter().any(|row| row.subject.model == subject.model))
+            .map(|subject| subject.model.clone())
+            .collect();
+        let baseline = Self {
+            rows,
             old: name,
-            alerts,
+            alerts: Vec::new(),
+            missing,
+            added,
+        };
+        let gap = baseline
+            .gap()
+            .map(|text| Alert::new(AlertKind::Items, format!("{text}.")));
+        Ok(Self {
+            alerts: alerts.into_iter().chain(gap).collect(),
+            ..baseline
         })
+    }
+
+    /// What of the old run is not compared, and why; `None` if all is.
+    fn gap(&self) -> Option<String> {
+        let old = &self.old;
+        let (first, more) = self.missing.split_at(self.missing.len().min(MAX_NAMED));
+        let first: Vec<String> = first.iter().map(name).collect();
+        let conditions = match (&*first, more.len()) {
+            ([], _) => return None,
+            ([one], 0) => format!("{one} of {old} is not compared"),
+            (_, 0) => format!("{} of {old} are not compared", first.join(", ")),
+            (_, more) => format!(
+                "{} and {more} more of {old} are not compared",
+                first.join(", ")
+            ),
+        };
+        let is_renamed = |subject: &Subject| {
+            !self
+                .rows
+                .iter()
+                .any(|row| row.subject.model == subject.model)
+        };
+        let reason = if !self.added.is_empty() && self.missing.iter().all(is_renamed) {
+            let added: Vec<&str> = self.added.iter().map(String::as_str).collect();
+            format!(
+                "the new model is {}, and models are compared by their names, which `name` in a file of --models sets",
+                added.join(", ")
+            )
+        } else {
+            "the new run has no reply about the same images".to_owned()
+        };
+        Some(format!("{conditions}: {reason}"))
     }
 
     /// Puts the comparison first among the sentences of a report, and below its table of levels. The observer is left out where a
@@ -147,7 +225,7 @@ impl Baseline {
     /// Whether any model is shown to be worse. `random`, the observer and its controls are no models.
     ///
     /// # Errors
-    /// If no model can be compared, or no verdict is possible about any.
+    /// If a model in a condition of the old run is not compared, none can be, or no verdict is possible about any.
     pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
         let models: Vec<&BaselineRow> = self
             .rows
@@ -160,10 +238,19 @@ impl Baseline {
             Err(Error::usage(FAIL_IF_WORSE, problem))
         };
         if models.is_empty() {
-            return none(format!(
-                "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
-                 observer do not count)"
-            ));
+            return none(self.gap().unwrap_or_else(|| {
+                format!(
+                    "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
+                     observer do not count)"
+                )
+            }));
+        }
+        let mut verdicts = models.iter().map(|row| row.significance);
+        if verdicts.any(|verdict| verdict == Significance::Worse) {
+            return Ok(true);
+        }
+        if let Some(gap) = self.gap() {
+            return none(gap);
         }
         if !models.iter().any(|row| row.significance.is_possible()) {
             return none(format!(
@@ -171,7 +258,6 @@ impl Baseline {
                 no_verdict(&models, unit)
             ));
         }
-        let mut verdicts = models.iter().map(|row| row.significance);
-        Ok(verdicts.any(|verdict| verdict == Significance::Worse))
+        Ok(false)
     }
 }

@@ -396,6 +396,16 @@ fn a_new_run_is_held_against_a_baseline() {
         .map(|row| &*row[place("condition")])
         .collect();
     assert_eq!(conditions, ["L0", "L3-ev"]);
+    // What was not compared does not pass.
+    let passed_over = scene
+        .bench
+        .call(&words("report old --baseline light --fail-if-worse"));
+    assert_eq!(passed_over.code, Some(2), "{passed_over:?}");
+    let gap = "script:m.jsonl L3-noise of light is not compared: the new run has no reply about the same images";
+    assert!(passed_over.stderr.contains(gap), "{passed_over:?}");
+    let shown = scene.bench.call(&words("report old --baseline light"));
+    let printed: Vec<&str> = shown.stdout.split_whitespace().collect();
+    assert!(printed.join(" ").contains(gap), "{shown:?}");
     let alone = scene.bench.call(&words("report old --fail-if-worse"));
     assert!(alone.stderr.contains("--baseline"), "{alone:?}");
 }

@@ -94,6 +94,20 @@ struct Overview<'a> {
     names: Names,
 }
 
+/// The sentence of a caption about the horizontal lines that are drawn; empty without any. Curves may be broken or dotted, too.
+fn horizontal_lines<'l>(lines: impl IntoIterator<Item = &'l PlotLine>) -> &'static str {
+    let (chance, blind): (Vec<&PlotLine>, Vec<&PlotLine>) = lines
+        .into_iter()
+        .filter(|line| matches!(line.content, PanelContent::Flat(_)))
+        .partition(|line| line.name == CHANCE);
+    match (blind.is_empty(), chance.is_empty()) {
+        (false, false) => " Horizontal: without images, and chance (dotted).",
+        (false, true) => " Horizontal: without images.",
+        (true, false) => " Horizontal: chance.",
+        (true, true) => "",
+    }
+}
+
 impl<'a> Overview<'a> {
     fn new(findings: &'a Findings<'a>, names: &Names) -> Self {
         let subjects = &findings.grid.subjects;
@@ -364,12 +378,15 @@ impl<'a> Overview<'a> {
                 model: None,
             });
         }
-        let caption = if self.findings.pairs.is_empty() {
-            "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance."
-        } else {
-            "Accuracy of each model by level, without enhancement. Broken lines: without images, and chance. Hollow: photographed in the dark, at the median exposure drop, with a bar from quartile to quartile."
-        };
-        self.chart(ACCURACY, panels, 2, caption)
+        let lines = panels.iter().flat_map(|panel| &panel.lines);
+        let mut caption = format!(
+            "Accuracy of each model by level, without enhancement.{}",
+            horizontal_lines(lines)
+        );
+        if !self.findings.pairs.is_empty() {
+            caption += " Hollow: photographed in the dark, at the median exposure drop, with a bar from quartile to quartile.";
+        }
+        self.chart(ACCURACY, panels, 2, &caption)
     }
 
     /// Mean over the models for each variant, with the range of the models: a panel for each axis with several variants.
@@ -490,9 +507,11 @@ impl<'a> Overview<'a> {
                 }
             })
             .collect();
+        let lines = panels.iter().flat_map(|panel| &panel.lines);
         let caption = format!(
-            "Accuracy by family, {}. Broken lines: without images, and chance.",
-            self.light(variant, None)
+            "Accuracy by family, {}.{}",
+            self.light(variant, None),
+            horizontal_lines(lines)
         );
         self.chart(ACCURACY, panels, 3, &caption)
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{ACCURACY, Names, Overview};
+use super::{ACCURACY, Names, Overview, horizontal_lines};
 use crate::drawing::chart::{Chart, LineItems, LineStyle, Panel, PanelContent, PlotLine};
 use crate::types::degradation::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading};
@@ -24,9 +24,6 @@ pub(crate) struct OverviewPanels {
     /// The meaning of the first chart's intervals.
     pub note: String,
 }
-
-/// The lines of [`Overview::beside_a_mean`], and chance, in a caption.
-const BESIDE: &str = "Broken: without images. Dotted: chance.";
 
 /// The panels of a run: each model, the mean over the models by variant, and that mean raw and with each enhancer.
 pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels {
@@ -110,11 +107,12 @@ impl Overview<'_> {
 
     fn each_model(&self, variant: &KindReading) -> (String, Chart) {
         let light = self.light(variant, None);
-        let mut caption = format!(
-            "Accuracy of each model by level, {light}, with 95 % intervals by {}. Broken: without images. Dotted: chance.",
-            self.findings.unit
-        );
         let (lines, alone) = with_dark_levels(self.accuracies(variant, None));
+        let mut caption = format!(
+            "Accuracy of each model by level, {light}, with 95 % intervals by {}.{}",
+            self.findings.unit,
+            horizontal_lines(&lines)
+        );
         if !alone.is_empty() {
             let _ = write!(caption, " Not asked in this light: {}.", alone.join(", "));
         }
@@ -138,8 +136,9 @@ impl Overview<'_> {
         );
         let who = self.who(models);
         let mut caption = format!(
-            "Accuracy by variant of the light, {who}. {} {BESIDE}",
-            self.band(models)
+            "Accuracy by variant of the light, {who}. {}{}",
+            self.band(models),
+            horizontal_lines(&lines)
         );
         if !alone.is_empty() {
             let _ = write!(caption, " Not asked of all of them: {}.", alone.join(", "));
@@ -202,8 +201,9 @@ impl Overview<'_> {
         lines.extend(self.beside_a_mean(variant));
         let (who, light) = (self.who(models), self.light(variant, None));
         let caption = format!(
-            "Accuracy raw and with each enhancer, {light}, {who}. L0 is the untouched frame. {} {BESIDE}",
-            self.band(models)
+            "Accuracy raw and with each enhancer, {light}, {who}. L0 is the untouched frame. {}{}",
+            self.band(models),
+            horizontal_lines(&lines)
         );
         Some((caption, Self::one(format!("{who}, {light}"), lines)))
     }

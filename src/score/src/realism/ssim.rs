@@ -146,7 +146,7 @@ impl Kernel for Band<'_> {
         let windows = 3 * (self.images[0].width() - (TAPS - 1));
         let mut moments = [Row([0.0; COVERED]); MOMENTS];
         // The means over each of the last rows, by its number modulo the taps.
-        let mut rows = [[Row([0.0; TILE]); MOMENTS]; TAPS];
+        let mut rows = vec![[Row([0.0; TILE]); MOMENTS]; TAPS];
         let mut means = [Row([0.0; TILE]); MOMENTS];
         for (tile, begin) in self
             .tiled()
@@ -191,8 +191,8 @@ fn set_moments(moments: &mut [Row<COVERED>; MOMENTS], codes: &Codes) {
 fn set_along_row(means: &mut Row<TILE>, window: &Window, samples: &Row<COVERED>) {
     for i in 0..TILE {
         let mut mean = window[RADIUS] * samples.0[i + 3 * RADIUS];
-        for tap in 0..RADIUS {
-            mean += window[tap] * (samples.0[i + 3 * tap] + samples.0[i + 3 * (TAPS - 1 - tap)]);
+        for (tap, weight) in window[..RADIUS].iter().enumerate() {
+            mean += weight * (samples.0[i + 3 * tap] + samples.0[i + 3 * (TAPS - 1 - tap)]);
         }
         means.0[i] = mean;
     }
@@ -203,8 +203,8 @@ fn set_along_row(means: &mut Row<TILE>, window: &Window, samples: &Row<COVERED>)
 fn set_over_rows(means: &mut Row<TILE>, window: &Window, rows: [&Row<TILE>; TAPS]) {
     for i in 0..TILE {
         let mut mean = window[RADIUS] * rows[RADIUS].0[i];
-        for tap in 0..RADIUS {
-            mean += window[tap] * (rows[tap].0[i] + rows[TAPS - 1 - tap].0[i]);
+        for (tap, weight) in window[..RADIUS].iter().enumerate() {
+            mean += weight * (rows[tap].0[i] + rows[TAPS - 1 - tap].0[i]);
         }
         means.0[i] = mean;
     }
@@ -213,11 +213,7 @@ fn set_over_rows(means: &mut Row<TILE>, window: &Window, rows: [&Row<TILE>; TAPS
 /// The similarity of each window, from the means of x, y, x² + y² and xy.
 #[inline(always)]
 fn similarities([x, y, squares, product]: &[Row<TILE>; MOMENTS]) -> [f32; TILE] {
-    let mut similarities = [0.0; TILE];
-    for i in 0..TILE {
-        similarities[i] = similarity(x.0[i], y.0[i], squares.0[i], product.0[i]);
-    }
-    similarities
+    std::array::from_fn(|i| similarity(x.0[i], y.0[i], squares.0[i], product.0[i]))
 }
 
 /// The sum in `f64`, in an order that vector instructions can keep.
