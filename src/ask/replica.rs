@@ -201,14 +201,13 @@ impl Replica {
     /// The error text for a refused request.
     fn message(&self, answer: &HttpReply, complaint: &Complaint, remedy: &str) -> String {
         let status = answer.status.as_u16();
-        let mut message = format!("{} answered {status}", self.base());
         // Gateways send errors with the status of success.
-        if answer.status.is_success() {
-            message += &match complaint.status() {
-                Some(code) => format!(" with the error {code}"),
-                None => " with an error".to_owned(),
-            };
-        }
+        let error = match complaint.status().filter(|_| answer.status.is_success()) {
+            Some(code) => format!(" with the error {code}"),
+            None if answer.status.is_success() => " with an error".to_owned(),
+            None => String::new(),
+        };
+        let mut message = format!("{} answered {status}{error}", self.base());
         let text = self.connection.scrub.line(&complaint.message);
         if !text.is_empty() {
             message = format!("{message}: {text}");

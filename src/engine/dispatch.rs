@@ -491,7 +491,9 @@ impl<I: Item> ReplySink<'_, I> {
             }
             Err(error) => {
                 let source = trial.item.source();
-                if self.suspects.failed(trial.model, error, source) {
+                let is_set_aside = self.suspects.failed(trial.model, error, source);
+                // A server that answers nothing is the cause, not the image.
+                if is_set_aside && self.suspects.has_answered(trial.model) {
                     tracing::warn!(
                         "{source}: trials about it failed twice; the others about it are asked last ({})",
                         error.failure.message

@@ -62,7 +62,8 @@ impl Suspects {
         self.is_last = true;
     }
 
-    fn has_answered(&self, model: usize) -> bool {
+    /// Whether a model has answered any trial.
+    pub(crate) fn has_answered(&self, model: usize) -> bool {
         let mut from = self.answered.range((model, String::new())..);
         from.next().is_some_and(|(answered, _)| *answered == model)
     }

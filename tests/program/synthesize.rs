@@ -238,7 +238,7 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
     let checked = bench.call(&words("synthesize --check out"));
     assert_eq!(
         checked.stdout,
-        "out: images as they were written: 1; not as they were written: 0\n"
+        "out: images as they were written: 1; not as they were written: 0; without a JSON file: 0\n"
     );
 }
 

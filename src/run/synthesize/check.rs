@@ -1,5 +1,6 @@
 //! `synthesize check`: holding images to the digests in their JSON files.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,13 @@ use crate::runs::Outcome;
 /// The schemas of JSON files that vouch for an image. Other JSON files of the folder are left alone.
 const SCHEMAS: [&str; 3] = ["darkqa.image/1", "darkqa.image/2", "darkqa.sheet/1"];
 
-/// Checks all JSON files of a folder against their images. Nothing is changed.
+/// The ends of the names of images.
+const IMAGES: [&str; 4] = ["png", "jpg", "jpeg", "exr"];
+
+/// The most images without a JSON file that are named; chosen.
+const MAX_NAMED: usize = 3;
+
+/// Checks all JSON files of a folder against their images, and that each image has one. Nothing is changed.
 ///
 /// # Errors
 /// If the folder cannot be read, or no JSON file of an image is in it.
@@ -21,12 +28,25 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
     let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
     let files: std::io::Result<Vec<PathBuf>> = entries.map(|entry| Ok(entry?.path())).collect();
     let mut files = files.map_err(|e| Error::file(folder, "read", e))?;
-    files.retain(|file| file.extension().is_some_and(|end| end == "json"));
     files.sort();
     let (mut intact, mut wrong) = (0, 0);
-    for file in files {
-        match fault(&file) {
-            Ok(Some(())) => intact += 1,
+    let mut unknown: BTreeSet<String> = files
+        .iter()
+        .filter(|file| has_end(file, &IMAGES))
+        .filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    for file in files.iter().filter(|file| has_end(file, &["json"])) {
+        match vouched_image(file) {
+            Ok(Some(output)) => {
+                unknown.remove(&output.file);
+                match check_image(file, &output) {
+                    Ok(()) => intact += 1,
+                    Err(e) => {
+                        tracing::error!("{e}");
+                        wrong += 1;
+                    }
+                }
+            }
             Ok(None) => {}
             Err(e) => {
                 tracing::error!("{e}");
@@ -38,13 +58,33 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
         let problem = "no JSON file of an image of `synthesize` is in it";
         return Err(Error::data(folder.display(), problem));
     }
+    if !unknown.is_empty() {
+        let first: Vec<&str> = unknown.iter().take(MAX_NAMED).map(String::as_str).collect();
+        let more = if unknown.len() > first.len() {
+            ", …"
+        } else {
+            ""
+        };
+        tracing::error!(
+            "{}: no JSON file says how they were made: {}{more}",
+            folder.display(),
+            first.join(", ")
+        );
+    }
     Ok(Outcome::text(
-        Outcome::complete_if(wrong == 0),
+        Outcome::complete_if(wrong == 0 && unknown.is_empty()),
         format!(
-            "{}: images as they were written: {intact}; not as they were written: {wrong}\n",
-            folder.display()
+            "{}: images as they were written: {intact}; not as they were written: {wrong}; without a JSON file: {}\n",
+            folder.display(),
+            unknown.len()
         ),
     ))
+}
+
+/// Whether a name has one of these ends, in capital letters or not.
+fn has_end(file: &Path, ends: &[&str]) -> bool {
+    let end = file.extension().unwrap_or_default();
+    ends.iter().any(|known| end.eq_ignore_ascii_case(known))
 }
 
 /// The part of a JSON file that is checked. All schemas share it.
@@ -54,11 +94,11 @@ struct Vouched {
     output: Option<OutputFile>,
 }
 
-/// Holds one image to the digest in its JSON file; `None` for a JSON file of something else.
+/// The image that a JSON file vouches for; `None` for a JSON file of something else.
 ///
 /// # Errors
-/// If the image is missing, has other bytes, or the JSON file has no digest of it.
-fn fault(file: &Path) -> Result<Option<()>> {
+/// If the JSON file has no digest of its image, or names one outside of its folder.
+fn vouched_image(file: &Path) -> Result<Option<OutputFile>> {
     let text = reading::text(file)?;
     let Ok(vouched) = serde_json::from_str::<Vouched>(&text) else {
         return Ok(None);
@@ -75,10 +115,18 @@ fn fault(file: &Path) -> Result<Option<()>> {
     if Path::new(&output.file).components().count() != 1 {
         return wrong("names an image outside of its folder");
     }
+    Ok(Some(output))
+}
+
+/// Holds one image to the digest in its JSON file.
+///
+/// # Errors
+/// If the image is missing or has other bytes.
+fn check_image(file: &Path, output: &OutputFile) -> Result<()> {
     let image = file.with_file_name(&output.file);
     let bytes = reading::bytes(&image)?;
     match output.fault(&bytes) {
-        None => Ok(Some(())),
+        None => Ok(()),
         Some(fault) => Err(Error::data(image.display(), fault)),
     }
 }
