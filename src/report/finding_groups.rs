@@ -149,10 +149,28 @@ impl<'a> FindingGroups<'a> {
             .filter(|clause| !clause.is_empty())
             .collect();
         match (&clauses[..], self.first().first()) {
-            ([], Some((_, first))) => first.text() + ".",
+            ([], Some((_, first))) => capitalized(&first.text()) + ".",
             ([], None) => String::new(),
-            _ => clauses.join("; ") + ".",
+            _ => capitalized(&in_one_light(&clauses).join("; ")) + ".",
         }
+    }
+}
+
+/// The clauses of a sentence, the light of the first one named once.
+fn in_one_light(clauses: &[String]) -> Vec<&str> {
+    let light = clauses[0].split_once(": ").map_or("", |(light, _)| light);
+    let prefix = format!("{light}: ");
+    let rest = clauses[1..]
+        .iter()
+        .map(|clause| clause.strip_prefix(&prefix).unwrap_or(clause));
+    std::iter::once(&*clauses[0]).chain(rest).collect()
+}
+
+/// The text with a capital letter, unless it begins with a name.
+fn capitalized(text: &str) -> String {
+    match text.strip_prefix("with noise") {
+        Some(rest) => format!("With noise{rest}"),
+        None => text.to_owned(),
     }
 }
 
