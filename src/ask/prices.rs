@@ -1,4 +1,4 @@
-//! The prices of models: [`Prices`].
+//! Prices of models per token: [`Prices`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -20,70 +20,71 @@ pub(crate) struct Price {
     pub input: f64,
     /// The price of replies, hidden reasoning included, in dollars per million tokens.
     pub output: f64,
-    /// The price of what the server had in its cache, in dollars per million tokens; `None` if it is that of `input`.
+    /// The price of cached prompt tokens, in dollars per million tokens; `None` if they cost as much as `input`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cached_input: Option<f64>,
-    /// The number of tokens of an image; `None` to use the rule of the model's family.
+    /// Tokens per image; `None` to use the rule of the model's family.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_tokens: Option<u64>,
 }
 
 impl Price {
-    /// The price in dollars of these numbers of prompt and reply tokens.
+    /// The cost of this many prompt and reply tokens, in dollars.
     #[must_use]
     pub(crate) fn cost(&self, prompt: f64, reply: f64) -> f64 {
         (prompt * self.input + reply * self.output) / 1e6
     }
 
-    /// The most that a request within a bound costs, in dollars.
+    /// The maximum cost of a request within a token bound, in dollars.
     #[must_use]
     pub(crate) fn most(&self, bound: TokenBound) -> f64 {
         let input = self.input.max(self.cached_input.unwrap_or(self.input));
         (bound.prompt as f64 * input + bound.reply as f64 * self.output) / 1e6
     }
 
-    /// The price in dollars of a request; tokens that the server did not state count as 0.
+    /// The cost of a request from its reported usage, in dollars. A token count that the server did not report counts as 0.
     #[must_use]
     pub(crate) fn charged(&self, usage: Usage) -> f64 {
-        let tokens = |tokens: Option<u64>| tokens.unwrap_or(0) as f64;
-        let prompt = tokens(usage.prompt_tokens);
-        let cached = tokens(usage.cached_tokens).min(prompt);
-        let saved = self.input - self.cached_input.unwrap_or(self.input);
-        self.cost(prompt, tokens(usage.completion_tokens)) - cached * saved / 1e6
+        let or_zero = |tokens: Option<u64>| tokens.unwrap_or(0) as f64;
+        let prompt = or_zero(usage.prompt_tokens);
+        let reply = or_zero(usage.completion_tokens);
+        let cached = or_zero(usage.cached_tokens).min(prompt);
+        let discount = self.input - self.cached_input.unwrap_or(self.input);
+        self.cost(prompt, reply) - cached * discount / 1e6
     }
 }
 
-/// A table of prices by model, with its date.
+/// A dated table of prices by model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Prices {
     /// The date of the prices.
     pub as_of: String,
-    /// The share of the price that the Batch API charges.
+    /// The price in the Batch API, as a share of the normal price.
     pub batch: f64,
     models: BTreeMap<String, Price>,
-    /// Whether it is a table of the user (`--prices`).
+    /// True for a table of the user (`--prices`).
     #[serde(skip)]
-    is_own: bool,
+    is_custom: bool,
 }
 
 impl Prices {
-    /// The table that comes with the program, `src/ask/prices.toml`.
+    /// The built-in table, `src/ask/prices.toml`.
     ///
     /// # Errors
-    /// None in practice: a test reads the table.
+    /// Never in practice: a test parses the table.
     pub(crate) fn built_in() -> Result<Self> {
         toml::from_str(include_str!("prices.toml"))
             .map_err(|e| Error::usage("src/ask/prices.toml", e.message()))
     }
 
-    /// Reads a custom table in the form of the built-in one.
+    /// Reads a custom table in the format of the built-in one.
     ///
     /// # Errors
-    /// If it cannot be read, or a price is negative or not finite.
+    /// If the file cannot be read or parsed, or a price or the batch share is negative or not finite.
     pub(crate) fn load(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
-        let wrong = |problem: String| {
+        let invalid = |problem: String| {
             let expected = "expected as-of = \"2026-11-20\", batch = 0.5 and [models] with lines like \
                             gpt-4o = { input = 2.5, output = 10 }";
             let problem = format!("{}: {problem}; {expected}", path.display());
@@ -91,80 +92,91 @@ impl Prices {
         };
         let prices: Self = toml::from_str(&text).map_err(|e| {
             let TomlFault { line, problem } = TomlFault::new(&text, &e);
-            wrong(format!("line {line}: {problem}"))
+            invalid(format!("line {line}: {problem}"))
         })?;
-        let numbers = prices.models.iter().flat_map(|(name, price)| {
-            let cached = price.cached_input.unwrap_or(0.0);
-            [price.input, price.output, cached].map(|n| (name.as_str(), n))
-        });
-        let is_price = |n: f64| n.is_finite() && n >= 0.0;
-        let mut numbers = numbers.chain([("batch", prices.batch)]);
-        if let Some((name, number)) = numbers.find(|(_, n)| !is_price(*n)) {
-            return Err(wrong(format!(
+        let first_invalid = prices
+            .models
+            .iter()
+            .flat_map(|(name, price)| {
+                let cached = price.cached_input.unwrap_or(0.0);
+                [price.input, price.output, cached].map(|number| (name.as_str(), number))
+            })
+            .chain([("batch", prices.batch)])
+            .find(|(_, number)| !is_finite_and_not_negative(*number));
+        if let Some((name, number)) = first_invalid {
+            return Err(invalid(format!(
                 "{name}: {number} is not a number of 0 or more"
             )));
         }
-        drop(numbers);
         Ok(Self {
-            is_own: true,
+            is_custom: true,
             ..prices
         })
     }
 
-    /// The key of the settings in a manifest under which a run keeps the user's table.
+    /// The key under which the settings of a manifest store a custom table.
     pub(crate) const SETTING: &str = "prices";
 
-    /// The table as a manifest keeps it; `None` for the built-in one.
+    /// The table as a manifest stores it; `None` for the built-in table.
     pub(crate) fn setting(&self) -> Option<Value> {
-        self.is_own.then(|| serde_json::json!(self))
+        self.is_custom.then(|| serde_json::json!(self))
     }
 
-    /// The table that a run had: its own, if its settings have one, else the built-in one.
+    /// The table of a stored run: the custom table in its settings, or the built-in table.
     ///
     /// # Errors
-    /// If the table in the settings is broken.
+    /// If the table in the settings cannot be parsed.
     pub(crate) fn from_settings(settings: &BTreeMap<String, Value>) -> Result<Self> {
-        let Some(own) = settings.get(Self::SETTING) else {
+        let Some(stored) = settings.get(Self::SETTING) else {
             return Self::built_in();
         };
-        let read: Self = serde_json::from_value(own.clone())
+        let prices: Self = serde_json::from_value(stored.clone())
             .map_err(|e| Error::data("the prices in the manifest", e))?;
         Ok(Self {
-            is_own: true,
-            ..read
+            is_custom: true,
+            ..prices
         })
     }
 
-    /// The source of the prices, in words that follow "at".
+    /// The source of the prices as a phrase that follows "at".
     pub(crate) fn source(&self) -> String {
         let date = &self.as_of;
-        if self.is_own {
+        if self.is_custom {
             format!("the prices of {date} of --prices")
         } else {
             format!("the list prices of {date}")
         }
     }
 
-    /// The price of a model: by its name, by the name after a provider's (`openai/gpt-4o`), or by the name without a version
-    /// (`gpt-4o-2024-08-06`). `None` if the table has none of these.
+    /// The price of a model; `None` if the table has none. Looks up the full name, then the name after the provider prefix
+    /// (`openai/gpt-4o`). Each is tried exactly first, then without its version suffix (`gpt-4o-2024-08-06`).
     #[must_use]
     pub(crate) fn find(&self, model: &str) -> Option<Price> {
         let bare = model.rsplit('/').next().unwrap_or(model);
         [model, bare].into_iter().find_map(|name| {
-            let exact = self.models.get(name).copied();
-            exact.or_else(|| {
-                let mut models = self.models.iter();
-                let unversioned =
-                    models.find(|(known, _)| name.strip_prefix(&***known).is_some_and(is_version));
-                unversioned.map(|(_, price)| *price)
-            })
+            self.models
+                .get(name)
+                .or_else(|| self.find_unversioned(name))
+                .copied()
         })
+    }
+
+    /// The price of the model whose name is `name` without its version suffix.
+    fn find_unversioned(&self, name: &str) -> Option<&Price> {
+        self.models
+            .iter()
+            .find(|(model, _)| name.strip_prefix(model.as_str()).is_some_and(is_version))
+            .map(|(_, price)| price)
     }
 }
 
-/// Whether the rest of a model's name is only a version: a date, `latest` or `preview`.
-fn is_version(rest: &str) -> bool {
-    rest.strip_prefix(['-', '@']).is_some_and(|version| {
+fn is_finite_and_not_negative(number: f64) -> bool {
+    number.is_finite() && number >= 0.0
+}
+
+/// True if the suffix of a model name is a version: a date, `latest` or `preview`.
+fn is_version(suffix: &str) -> bool {
+    suffix.strip_prefix(['-', '@']).is_some_and(|version| {
         version == "latest"
             || version.starts_with("preview")
             || (version.len() >= 4 && version.chars().all(|c| c.is_ascii_digit() || c == '-'))
@@ -183,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_version_has_the_price_of_its_model() {
+    fn versioned_names_have_the_price_of_their_model() {
         let prices = Prices::built_in().unwrap();
         let input = |model| prices.find(model).map(|price| price.input);
         assert_eq!(input("gpt-4o"), Some(2.5));
@@ -203,7 +215,7 @@ mod tests {
             total_tokens: None,
         };
         assert!((price.charged(usage) - 3.5).abs() < 1e-12);
-        // Half of the prompt from the cache, at half the price; a server cannot cache more than the prompt.
+        // Half of the prompt is cached and costs half the price. A count of cached tokens above the prompt is capped.
         let cached = |tokens| Usage {
             cached_tokens: Some(tokens),
             ..usage
@@ -215,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn a_custom_table_is_checked() {
+    fn invalid_custom_tables_are_rejected() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let load = |text: &str| {
             std::fs::write(file.path(), text).unwrap();

@@ -1,4 +1,4 @@
-//! A model that guesses at random: [`Random`].
+//! [`Random`]: a model that guesses.
 
 use serde_json::{Value, json};
 
@@ -6,16 +6,16 @@ use super::call::Call;
 use crate::types::question::letter;
 use crate::types::{Digest, Question};
 
-/// A model that answers with the letter of a random choice, each equally likely. The guess depends only on the seed, question,
-/// condition and turn, and not on the order in which questions are asked.
+/// A model that answers with the letter of a random choice; all choices are equally likely. The guess depends only on the seed,
+/// question, condition and turn, not on the order in which questions are asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Random {
-    /// The seed of the guesses.
+    /// Seed of the guesses.
     pub seed: u64,
 }
 
 impl Random {
-    /// The name in records and tables.
+    /// Name in records and tables.
     pub const NAME: &'static str = "random";
 
     pub(super) fn content(self) -> Value {
@@ -34,13 +34,16 @@ impl Random {
             context.as_bytes(),
         ]);
         let count = question.choices.len() as u64;
-        // Numbers above the largest multiple of `count` are drawn again: their remainder would favour the first choices.
-        let fair = u64::MAX - u64::MAX % count;
+        // Reject draws from the largest multiple of `count` upwards: their remainders would favour the first choices.
+        let limit = u64::MAX - u64::MAX % count;
         loop {
-            let (words, _) = digest.as_bytes().as_chunks::<8>();
-            let mut words = words.iter().map(|word| u64::from_le_bytes(*word));
-            if let Some(word) = words.find(|word| *word < fair) {
-                return letter((word % count) as usize).to_string();
+            let (chunks, _) = digest.as_bytes().as_chunks::<8>();
+            let draw = chunks
+                .iter()
+                .map(|bytes| u64::from_le_bytes(*bytes))
+                .find(|draw| *draw < limit);
+            if let Some(draw) = draw {
+                return letter((draw % count) as usize).to_string();
             }
             digest = Digest::from_bytes(digest.as_bytes());
         }
@@ -77,13 +80,13 @@ mod tests {
     }
 
     #[test]
-    fn guesses_are_even() {
+    fn guesses_are_uniform() {
         let mut counts = [0_u32; 3];
         for id in 0..3000 {
             let reply = guess(7, &question(id, 3), None, 0);
             counts[usize::from(reply.as_bytes()[0] - b'A')] += 1;
         }
-        // Five standard deviations of a fair draw are 129.
+        // 129 is five standard deviations of a count of uniform guesses.
         assert!(
             counts.iter().all(|count| count.abs_diff(1000) < 130),
             "{counts:?}"

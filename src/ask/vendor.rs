@@ -1,4 +1,4 @@
-//! Facts about a host that serves models: [`Vendor`], from `vendors.toml`.
+//! Vendors that host models, and the limits of their endpoints: [`Vendor`]. The built-in table is `vendors.toml`.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -11,54 +11,55 @@ use super::url::BaseUrl;
 use super::vendor_batch::VendorBatch;
 use crate::error::Error;
 
-/// A vendor and the particularities of its endpoints; a field that is `None` is not known.
+/// A vendor that hosts models, and what its endpoints accept. `None` means unknown, unless a field says otherwise.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Vendor {
-    /// The vendor's name, for messages.
+    /// Name of the vendor, for messages.
     pub(crate) name: String,
-    /// Ends of the host names of its endpoints.
+    /// Host name suffixes of its endpoints, such as `api.example.com` or `.example.com`.
     hosts: Vec<String>,
-    /// The variables in which the vendor's own tools look for a key, in order.
+    /// Environment variables in which the vendor's own tools look for a key, in this order.
     pub(super) key: Vec<String>,
-    /// How the vendor's keys look, if no other vendor's do; else empty.
+    /// Patterns of keys that only this vendor uses, with `*` for any text; empty if there are none.
     #[serde(default)]
     key_form: Vec<String>,
-    /// The header that carries the key.
+    /// Header that carries the key.
     #[serde(default)]
     header: Header,
-    /// The field that carries the token limit.
+    /// Request field that carries the token limit.
     #[serde(default)]
     token_field: LimitField,
-    /// Whether the tokens of thinking do not count toward the token limit.
+    /// True if reasoning tokens do not count toward the token limit.
     #[serde(default)]
     pub(super) thinks_beyond_limit: bool,
-    /// The largest image file, in bytes.
+    /// Maximum size of an image file, in bytes.
     pub(super) image_bytes: Option<usize>,
-    /// The longest side of an image, in pixels.
+    /// Maximum side of an image, in pixels.
     pub(super) image_side: Option<u32>,
-    /// The most images in a request.
+    /// Maximum number of images in a request.
     pub(super) images: Option<usize>,
-    /// The longest side of an image, in pixels, in a request with more than 20.
+    /// Maximum side of an image, in pixels, if a request has more than 20 images.
     pub(super) image_side_many: Option<u32>,
-    /// The largest body of a request, in bytes.
+    /// Maximum size of a request body, in bytes.
     pub(super) request_bytes: Option<usize>,
-    /// Whether the probabilities of tokens are stated; `None` if they are, by some models, or that is not known.
+    /// Why replies lack token probabilities; `None` if some models return them, or if that is unknown.
     logprobs: Option<Logprobs>,
-    /// The Batch API; `None` if nothing is known of it.
+    /// Batch API; `None` if unknown.
     pub(super) batch: Option<VendorBatch>,
-    /// The vendor's handling of a constraint on replies; `None` if it keeps the constraint, or if that is unknown.
+    /// Failure to constrain replies; `None` if the vendor obeys a constraint, or if that is unknown.
     constrain: Option<Constraining>,
-    /// A field of the body without which requests are not repeatable.
+    /// Field of the request body without which requests are not repeatable.
     pub(super) pin: Option<String>,
-    /// Headers that name the account and are not secret, each with the variable that holds its value.
+    /// Headers that name the account and are not secret, each with the environment variable that holds its value.
     #[serde(default)]
     pub(super) account: BTreeMap<String, String>,
-    /// Forms of an address, if an address without a path cannot be used; else empty.
+    /// Valid forms of a base URL; empty if a base URL without a path is valid.
     #[serde(default)]
     pub(super) addresses: Vec<String>,
 }
 
+/// A [`KeyHeader`] other than `Auto`, as written in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Header {
@@ -67,19 +68,25 @@ enum Header {
     ApiKey,
 }
 
+/// Handling of a constraint on replies by a vendor that does not obey it.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Constraining {
+    /// The constraint is accepted and has no effect.
     Ignored,
 }
 
+/// Handling of a request for token probabilities by a vendor that never returns them.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Logprobs {
+    /// The request is accepted and has no effect.
     Ignored,
+    /// Token probabilities cannot be requested.
     No,
 }
 
+/// A [`TokenField`] that a vendor may expect, as written in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum LimitField {
@@ -88,7 +95,7 @@ enum LimitField {
     MaxCompletionTokens,
 }
 
-/// The table of vendors, with its date.
+/// The built-in table of vendors, with its date.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct Vendors {
@@ -103,22 +110,24 @@ static VENDORS: LazyLock<Vendors> = LazyLock::new(|| {
 });
 
 impl Vendor {
-    /// The vendor of a host; `None` if the host is not in the table.
+    /// Finds the vendor of a host; `None` if the built-in table lacks the host.
     pub(crate) fn at_host(host: &str) -> Option<&'static Self> {
         VENDORS.vendor.iter().find(|vendor| vendor.is_of(host))
     }
 
-    /// The vendor of the built-in table whose keys look like this one; `None` if keys of several do, or that is not known.
+    /// Finds the vendor in the built-in table that uses keys of this form; `None` if several vendors do, or if that is unknown.
     pub(super) fn by_key(key: &str) -> Option<&'static Self> {
         VENDORS.vendor.iter().find(|vendor| vendor.has_key(key))
     }
 
-    /// Whether a key looks like this vendor's.
+    /// True if a key has a form that only this vendor uses.
     pub(super) fn has_key(&self, key: &str) -> bool {
-        self.key_form.iter().any(|form| has_form(key, form))
+        self.key_form
+            .iter()
+            .any(|pattern| matches_key_pattern(key, pattern))
     }
 
-    /// Whether a vendor of the built-in table has a host of this very name; a name below a domain may be that of any customer.
+    /// True if the built-in table lists exactly this host name. A name below a listed domain may belong to any customer.
     pub(super) fn has_host(host: &str) -> bool {
         VENDORS
             .vendor
@@ -127,21 +136,19 @@ impl Vendor {
             .any(|known| known == host)
     }
 
-    /// Whether a host is one of the vendor's.
+    /// True if the host belongs to this vendor.
     pub(super) fn is_of(&self, host: &str) -> bool {
-        self.hosts.iter().any(|end| is_below(host, end))
+        self.hosts
+            .iter()
+            .any(|suffix| matches_host_suffix(host, suffix))
     }
 
-    /// Checks what no type can say: that ends of host names are given, and nothing else in their place.
+    /// Checks what the types do not: that `hosts` is a non-empty list of host name suffixes.
     ///
     /// # Errors
-    /// The text names the field.
+    /// The message names the field.
     pub(super) fn check(&self) -> Result<(), String> {
-        let is_end = |end: &String| {
-            let mut letters = end.chars();
-            !end.is_empty() && letters.all(|c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-'))
-        };
-        if self.hosts.is_empty() || !self.hosts.iter().all(is_end) {
+        if self.hosts.is_empty() || !self.hosts.iter().all(|text| is_host_suffix(text)) {
             return Err(
                 "hosts: ends of host names expected, such as \"api.example.com\" or \".example.com\""
                     .to_owned(),
@@ -150,10 +157,10 @@ impl Vendor {
         Ok(())
     }
 
-    /// Checks that an address has a path, if the vendor's addresses need one.
+    /// Checks that a base URL has a path if this vendor requires one.
     ///
     /// # Errors
-    /// The error names the forms of its addresses.
+    /// The message lists the valid forms.
     pub(super) fn check_address(&self, base: &BaseUrl) -> Result<(), Error> {
         if self.addresses.is_empty() || base.has_path() {
             return Ok(());
@@ -163,12 +170,12 @@ impl Vendor {
         Err(Error::usage("--base-url", problem))
     }
 
-    /// Whether a constraint on replies has no effect.
+    /// True if constraints on replies have no effect at this vendor.
     pub(super) fn ignores_constraints(&self) -> bool {
         self.constrain == Some(Constraining::Ignored)
     }
 
-    /// The vendor's reaction to a request for probabilities of tokens, in words; `None` if it may state them.
+    /// Why the vendor returns no token probabilities, as a verb phrase for messages; `None` if it may return them.
     pub(super) fn without_probabilities(&self) -> Option<&'static str> {
         self.logprobs.map(|logprobs| match logprobs {
             Logprobs::Ignored => "takes the request for probabilities and ignores it",
@@ -176,7 +183,7 @@ impl Vendor {
         })
     }
 
-    /// The header in which this vendor expects the key.
+    /// Header in which the vendor expects the key.
     pub(super) fn key_header(&self) -> KeyHeader {
         match self.header {
             Header::Bearer => KeyHeader::Bearer,
@@ -184,7 +191,7 @@ impl Vendor {
         }
     }
 
-    /// The field that carries the token limit at a vendor: never `Auto`.
+    /// Resolves `Auto` to the field that the vendor expects, or to `MaxTokens` without a vendor. Never returns `Auto`.
     pub(super) fn token_field_at(vendor: Option<&Self>, field: TokenField) -> TokenField {
         match field {
             TokenField::Auto => vendor.map_or(TokenField::MaxTokens, Self::token_field),
@@ -192,7 +199,7 @@ impl Vendor {
         }
     }
 
-    /// The field in which this vendor expects the token limit.
+    /// Request field in which the vendor expects the token limit.
     fn token_field(&self) -> TokenField {
         match self.token_field {
             LimitField::MaxTokens => TokenField::MaxTokens,
@@ -201,17 +208,25 @@ impl Vendor {
     }
 }
 
-/// Whether a text begins as a form states, in which `*` is for any text between two parts.
-fn has_form(text: &str, form: &str) -> bool {
-    let (begin, inside) = form.split_once('*').unwrap_or((form, ""));
-    let rest = text.strip_prefix(begin);
-    rest.is_some_and(|rest| rest.contains(inside))
+/// True if a key starts with a pattern, in which `*` matches any text between two parts.
+fn matches_key_pattern(key: &str, pattern: &str) -> bool {
+    let (prefix, infix) = pattern.split_once('*').unwrap_or((pattern, ""));
+    key.strip_prefix(prefix)
+        .is_some_and(|rest| rest.contains(infix))
 }
 
-/// Whether a host name is this one or one below it: a name that merely ends with the same letters is another host.
-fn is_below(host: &str, end: &str) -> bool {
-    match host.strip_suffix(end) {
-        Some(rest) => rest.is_empty() || rest.ends_with('.') || end.starts_with('.'),
+/// True for a non-empty text of ASCII letters, digits, dots and hyphens.
+fn is_host_suffix(text: &str) -> bool {
+    !text.is_empty()
+        && text
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-'))
+}
+
+/// True if a host is the suffix itself or a subdomain of it. `notapi.example.com` does not match `api.example.com`.
+fn matches_host_suffix(host: &str, suffix: &str) -> bool {
+    match host.strip_suffix(suffix) {
+        Some(rest) => rest.is_empty() || rest.ends_with('.') || suffix.starts_with('.'),
         None => false,
     }
 }
@@ -220,7 +235,7 @@ fn is_below(host: &str, end: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn name(host: &str) -> Option<&'static str> {
+    fn vendor_at(host: &str) -> Option<&'static str> {
         Vendor::at_host(host).map(|vendor| &*vendor.name)
     }
 
@@ -244,13 +259,13 @@ mod tests {
 
     #[test]
     fn a_key_tells_its_vendor() {
-        let of = |key: &str| Vendor::by_key(key).map(|vendor| &*vendor.name);
-        assert_eq!(of("sk-ant-api03-x"), Some("Anthropic"));
-        assert_eq!(of("sk-proj-x"), Some("OpenAI"));
-        assert_eq!(of("sk-abcT3BlbkFJdef"), Some("OpenAI"));
-        assert_eq!(of("sk-or-v1-x"), Some("OpenRouter"));
-        for of_nobody in ["sk-1234", "", "x-sk-ant-", "T3BlbkFJ"] {
-            assert_eq!(of(of_nobody), None, "{of_nobody}");
+        let vendor_name = |key: &str| Vendor::by_key(key).map(|vendor| &*vendor.name);
+        assert_eq!(vendor_name("sk-ant-api03-x"), Some("Anthropic"));
+        assert_eq!(vendor_name("sk-proj-x"), Some("OpenAI"));
+        assert_eq!(vendor_name("sk-abcT3BlbkFJdef"), Some("OpenAI"));
+        assert_eq!(vendor_name("sk-or-v1-x"), Some("OpenRouter"));
+        for unknown in ["sk-1234", "", "x-sk-ant-", "T3BlbkFJ"] {
+            assert_eq!(vendor_name(unknown), None, "{unknown}");
         }
     }
 
@@ -286,10 +301,10 @@ mod tests {
 
     #[test]
     fn a_host_is_known_by_its_end() {
-        assert_eq!(name("api.openai.com"), Some("OpenAI"));
-        assert_eq!(name("eu.api.openai.com"), Some("OpenAI"));
-        assert_eq!(name("r.openai.azure.com"), Some("Azure"));
-        assert_eq!(name("dashscope-intl.aliyuncs.com"), Some("DashScope"));
+        assert_eq!(vendor_at("api.openai.com"), Some("OpenAI"));
+        assert_eq!(vendor_at("eu.api.openai.com"), Some("OpenAI"));
+        assert_eq!(vendor_at("r.openai.azure.com"), Some("Azure"));
+        assert_eq!(vendor_at("dashscope-intl.aliyuncs.com"), Some("DashScope"));
         for other in [
             "127.0.0.1",
             "notapi.openai.com",
@@ -298,7 +313,7 @@ mod tests {
             "openai.azure.com",
             "",
         ] {
-            assert_eq!(name(other), None, "{other}");
+            assert_eq!(vendor_at(other), None, "{other}");
         }
     }
 }

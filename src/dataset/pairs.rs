@@ -1,4 +1,4 @@
-//! Pairs of images of the same scene in normal and in low light: [`Pairs`].
+//! Image pairs of the same scene in normal and in low light: [`Pairs`].
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,17 +7,17 @@ use super::image_names::ImageNames;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 
-/// The folder names of pairs, normal light first, as in LISU, in LOL and by plain words.
+/// Names of the normal-light and the low-light folder: plain words, those of LOL, and those of LISU.
 const FOLDERS: [[&str; 2]; 3] = [
     ["normal", "low"],
     ["high", "low"],
     ["val_rgb_h", "val_rgb_l"],
 ];
 
-/// Two images of one scene: in normal and in low light.
+/// One scene in normal and in low light.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Pair {
-    /// The part that both file names share.
+    /// The common part of both file names.
     pub name: String,
     /// The image in normal light.
     pub normal: PathBuf,
@@ -25,7 +25,7 @@ pub(crate) struct Pair {
     pub low: PathBuf,
 }
 
-/// The pairs of a data set, by name.
+/// The image pairs of a data set.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Pairs {
     /// Sorted by name.
@@ -34,7 +34,7 @@ pub(crate) struct Pairs {
     pub unmatched: Vec<PathBuf>,
 }
 
-/// The light of an image, by its file name.
+/// The side of a pair that an image belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum PairSide {
     Normal,
@@ -42,12 +42,13 @@ enum PairSide {
 }
 
 impl Pairs {
-    /// The pairs below a folder. They are in the folders `normal` and `low`, `high` and `low`, or `val_rgb_h` and
-    /// `val_rgb_l` (upper or lower case). Or they are in one folder, and their names begin or end with `normal` or `high`
-    /// and with `low` (`normal00733.png`, `low00733.png`).
+    /// Finds the pairs in a folder. Two layouts are known:
+    /// - Subfolders `normal` and `low`, `high` and `low`, or `val_rgb_h` and `val_rgb_l`, in upper or lower case.
+    /// - All images in the folder itself. Names begin or end with `normal` or `high` in normal light, with `low` in low light
+    ///   (`normal00733.png`, `low00733.png`).
     ///
     /// # Errors
-    /// If there is no pair, or two images of one side have the same name.
+    /// If no pair is found, or two images of the same side have the same name.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let entries = entries(folder)?;
         let subfolder = |name: &str| {
@@ -63,36 +64,39 @@ impl Pairs {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         let mut unmatched = Vec::new();
         for path in images(entries, folder) {
-            match role(&stem(&path)) {
-                (name, Some(light)) => add(&mut sides[light as usize], name, &path)?,
+            match split_side(&stem(&path)) {
+                (name, Some(side)) => add_image(&mut sides[side as usize], name, &path)?,
                 (_, None) => unmatched.push(path),
             }
         }
-        Self::matched(sides, unmatched).ok_or_else(|| {
+        Self::match_names(sides, unmatched).ok_or_else(|| {
             let problem = "no pairs in it; expected are folders normal and low (or high and low, val_rgb_h and val_rgb_l), or files like normal1.png and low1.png; --normal DIR and --low DIR name any two folders";
             Error::data(folder.display(), problem)
         })
     }
 
-    /// The pairs of two folders, by the file names without their extensions and without `normal`, `high` or `low`.
+    /// Pairs the images of two folders by name. The extension and the words `normal`, `high` and `low` at the beginning or end of
+    /// a name are ignored.
     ///
     /// # Errors
-    /// If there is no pair, or two images of one side have the same name.
+    /// If no pair is found, or two images of the same folder have the same name.
     pub(crate) fn from_folders(normal: &Path, low: &Path) -> Result<Self> {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         for (side, folder) in sides.iter_mut().zip([normal, low]) {
             for path in images(entries(folder)?, folder) {
-                add(side, role(&stem(&path)).0, &path)?;
+                let (name, _) = split_side(&stem(&path));
+                add_image(side, name, &path)?;
             }
         }
-        Self::matched(sides, Vec::new()).ok_or_else(|| {
+        Self::match_names(sides, Vec::new()).ok_or_else(|| {
             let problem =
                 format_args!("no image in it has the name of one in {}", normal.display());
             Error::data(low.display(), problem)
         })
     }
 
-    fn matched(
+    /// Pairs the images whose names occur on both sides; `None` if there are none.
+    fn match_names(
         [mut normal, low]: [BTreeMap<String, PathBuf>; 2],
         mut unmatched: Vec<PathBuf>,
     ) -> Option<Self> {
@@ -109,7 +113,11 @@ impl Pairs {
     }
 }
 
-fn add(side: &mut BTreeMap<String, PathBuf>, name: String, path: &Path) -> Result<()> {
+/// Adds an image to a side of the pairs.
+///
+/// # Errors
+/// If the side already has an image of this name.
+fn add_image(side: &mut BTreeMap<String, PathBuf>, name: String, path: &Path) -> Result<()> {
     match side.insert(name, path.to_owned()) {
         None => Ok(()),
         Some(other) => {
@@ -119,31 +127,31 @@ fn add(side: &mut BTreeMap<String, PathBuf>, name: String, path: &Path) -> Resul
     }
 }
 
-/// A name without the word for the light at its beginning or end, and that light. A name that begins with one light and
-/// ends with the other has the light that it begins with.
-fn role(stem: &str) -> (String, Option<PairSide>) {
+/// Splits a file name into the name of the pair and the side, which a word at its beginning or end states. If the two words
+/// contradict each other, the one at the beginning counts.
+fn split_side(stem: &str) -> (String, Option<PairSide>) {
     const WORDS: [(&str, PairSide); 3] = [
         ("normal", PairSide::Normal),
         ("high", PairSide::Normal),
         ("low", PairSide::Low),
     ];
-    let bare = |rest: &str| rest.trim_matches(['_', '-', '.', ' ']).to_owned();
+    let trimmed = |rest: &str| rest.trim_matches(['_', '-', '.', ' ']).to_owned();
     let lower = stem.to_ascii_lowercase();
     let prefix = WORDS.iter().find(|(word, _)| lower.starts_with(word));
-    let suffix = WORDS.iter().find(|(word, light)| {
-        lower.ends_with(word) && prefix.is_none_or(|(_, prefix)| prefix == light)
+    let suffix = WORDS.iter().find(|(word, side)| {
+        lower.ends_with(word) && prefix.is_none_or(|(_, prefix_side)| prefix_side == side)
     });
-    let first = prefix.map_or(0, |(word, _)| word.len());
-    let last = stem.len() - suffix.map_or(0, |(word, _)| word.len());
+    let start = prefix.map_or(0, |(word, _)| word.len());
+    let end = stem.len() - suffix.map_or(0, |(word, _)| word.len());
     match prefix.or(suffix) {
-        Some((_, light)) if first <= last => (bare(&stem[first..last]), Some(*light)),
-        // The name is the word alone.
-        Some((_, light)) => (String::new(), Some(*light)),
+        Some((_, side)) if start <= end => (trimmed(&stem[start..end]), Some(*side)),
+        // One word is the whole name: it is both prefix and suffix.
+        Some((_, side)) => (String::new(), Some(*side)),
         None => (stem.to_owned(), None),
     }
 }
 
-/// The images among the paths of a folder. Says how many others look like images and are not read.
+/// The image files among the paths of a folder. Warns of images in formats that are not supported.
 fn images(paths: Vec<PathBuf>, folder: &Path) -> Vec<PathBuf> {
     let names = ImageNames::from_paths(paths);
     names.warn_of_unread(folder);
@@ -185,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn the_usual_forms_are_known() {
+    fn known_layouts_are_paired() {
         for files in [
             &["normal/1.png", "low/1.png"][..],
             &["high/1.png", "low/1.jpg"],
@@ -203,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn images_without_a_partner_are_named() {
+    fn images_without_a_partner_are_unmatched() {
         let folder = folder(&[
             "normal1.png",
             "low1.png",
@@ -217,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn no_pair_and_two_images_of_one_name_are_errors() {
+    fn missing_pairs_and_duplicate_names_are_errors() {
         let none = folder(&["a.png", "low/1.png"]);
         let error = Pairs::open(none.path()).unwrap_err().to_string();
         assert!(error.contains("--normal DIR"), "{error}");

@@ -1,4 +1,4 @@
-//! The interface between the engine and what is asked: [`Experiment`].
+//! The interface between the engine and a type of evaluation: [`Experiment`].
 
 use serde_json::Value;
 
@@ -17,100 +17,102 @@ use crate::types::manifest::PartPlace;
 use crate::types::manifest::{Columns, Identity};
 use crate::types::{Record, RunQuestion};
 
-/// The record of a trial of an experiment.
+/// Record type of an experiment's trials.
 pub(crate) type RecordOf<E> = Record<DetailOf<E>>;
 
 /// The fields that an experiment adds to a record.
 pub(crate) type DetailOf<E> = <<E as Experiment>::Item as Item>::Detail;
 
-/// A request of a later phase that cannot be planned yet.
+/// A request of a later phase that cannot be planned before the replies of an earlier one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ExpectedRequest {
-    /// Index of the model among those of the phase.
+    /// Index of the model in [`Experiment::models`] of its phase.
     pub(crate) model: usize,
-    /// Expected tokens of its text.
+    /// Expected number of text tokens in the prompt.
     pub(crate) text_tokens: f64,
-    /// Expected tokens of its reply.
+    /// Expected number of tokens in the reply.
     pub(crate) reply_tokens: f64,
 }
 
-/// Questions with choices, or open questions with marks; opened and checked. Nothing is asked or written before it is carried out.
+/// An evaluation that is ready to run: multiple-choice questions, or open questions whose answers a judge marks. Its inputs are opened
+/// and checked, but no request was sent and nothing was written yet.
 pub(crate) trait Experiment: Sync {
-    /// The subject of one trial.
+    /// The question, or the answer to judge, of one trial.
     type Item: Item;
 
-    /// Names of the phases, in order. A phase is planned when those before it have ended.
+    /// Names of the phases, in order. A phase is planned after all earlier phases have ended.
     const PHASES: &'static [&'static str];
 
-    /// Description of the shortest reply, for the estimate of cost.
+    /// Description of the shortest reply, as the cost estimate prints it.
     const REPLY: &'static str;
 
-    /// The noun for one source: frame or walk.
+    /// The word for one source: `frame` or `walk`.
     const SOURCE: &'static str;
 
-    /// The settings that every experiment has.
+    /// Settings that are common to all experiments.
     fn settings(&self) -> &JobSettings;
 
-    /// Name of the data, for the name of a run folder.
+    /// Name of the data set, used in the name of the run folder.
     fn data(&self) -> &str;
 
-    /// Models that are asked in a phase.
+    /// Models that receive requests in a phase.
     fn models(&self, phase: usize) -> &[ModelUnderTest];
 
-    /// The flag of the token limit in a phase.
+    /// The command-line flag that limits the reply tokens in a phase.
     fn token_flag(&self, _phase: usize) -> &'static str {
         "--max-tokens"
     }
 
-    /// All sources of the run.
+    /// Image sources (frames or walks) of this run or shard.
     fn sources(&self) -> &[Source];
 
-    /// Place of these sources among those of the whole run; `None` if this is the whole run.
+    /// Position of these sources in the whole run, for a shard; `None` if this is the whole run.
     fn part(&self) -> Option<PartPlace>;
 
-    /// Reader of the frames' files.
+    /// Reader of the frame files.
     fn frames(&self) -> &dyn Frames;
 
-    /// Settings that decide the pixels that are sent.
+    /// Settings that determine the pixels sent to the models.
     fn recipe(&self) -> &Recipe;
 
-    /// Questions, as the run folder stores them.
+    /// Questions in the form that the run folder stores.
     fn questions(&self) -> Vec<RunQuestion>;
 
-    /// Settings that all trials share and no column tells apart.
+    /// Settings that apply to all trials of a run and are not a column of the tables.
     fn identity(&self) -> Identity;
 
-    /// Definition of each value of a column.
+    /// Definition of each value in each column of the tables.
     fn columns(&self) -> Columns;
 
-    /// Settings that decide neither a reply nor an image, but may explain how a run went.
+    /// Settings that affect neither a reply nor an image, recorded because they may explain a run.
     fn notes(&self) -> Vec<(&'static str, Value)> {
         Vec::new()
     }
 
-    /// The effect that the whole run can detect; `None` if unknown.
+    /// The effect size that the whole run can detect; `None` if unknown.
     fn power(&self) -> Option<PowerForecast> {
         None
     }
 
-    /// Records from files of answers, which are not asked.
+    /// Records imported from answer files; no model is asked for them.
     fn imported_records(&self) -> &[RecordOf<Self>] {
         &[]
     }
 
-    /// All trials of a phase, including those with a reply. The records so far are read only where the trials follow from replies.
+    /// All trials of a phase, including those that already have a reply. `records` reads the records so far; it is called only if the
+    /// trials depend on replies of an earlier phase.
     fn plan(
         &self,
         phase: usize,
         records: impl FnOnce() -> Result<Vec<RecordOf<Self>>>,
     ) -> Result<Vec<SourcePlan<Self::Item>>>;
 
-    /// Requests of later phases that cannot be planned yet: marks of answers that have not arrived.
+    /// Requests of later phases that cannot be planned yet, such as the judge's marks for answers that have not arrived.
     fn expected_requests(&self, _remaining: &[SourcePlan<Self::Item>]) -> Vec<ExpectedRequest> {
         Vec::new()
     }
 
-    /// Scores a run, and writes its report and manifest into its folder. The outcome is incomplete if a reply cannot be scored.
+    /// Scores a run, and writes the report and the manifest into the run folder. The outcome is incomplete if a reply cannot be scored.
     fn report(
         &self,
         store: &Store<DetailOf<Self>>,

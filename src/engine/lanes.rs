@@ -1,4 +1,4 @@
-//! The trials that wait for their turn, one queue for each endpoint: [`Lanes`].
+//! Queues of trials waiting to be sent, one per endpoint: [`Lanes`].
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Weak};
@@ -9,86 +9,91 @@ use crate::images::trial::{Stimulus, Trial};
 use crate::images::workers::ThreadArgs;
 use crate::text::words::counted;
 
-/// The most bytes of images that may wait ahead of the slowest endpoint; chosen: some fifty images of 1280×720 as PNG.
+/// Maximum bytes of images held so that idle endpoints can work ahead of the slowest; chosen: about fifty images of 1280×720 as PNG.
 const BYTES_AHEAD: usize = 64 << 20;
 
-/// One trial, with the stimulus that its group shares.
+/// A trial with its stimulus, which it shares with the other trials of its group.
 pub(crate) struct PreparedTrial<I> {
     pub(crate) trial: Trial<I>,
     pub(crate) stimulus: Arc<Stimulus>,
 }
 
-/// The trials of the models that share an endpoint. The built-in models are one lane, too.
+/// The queue of the models that share an endpoint. The built-in models share one lane.
 struct Lane<I> {
-    /// Indexes of the models.
+    /// Indexes of its models.
     models: Vec<usize>,
     waiting: VecDeque<PreparedTrial<I>>,
-    /// Trials that are asked last.
-    aside: VecDeque<PreparedTrial<I>>,
+    /// Trials set aside, to be asked after all others.
+    deferred: VecDeque<PreparedTrial<I>>,
     in_flight: usize,
-    /// Number of addresses, each with its own connections.
+    /// Number of server addresses, each with its own connections.
     addresses: usize,
-    /// The maximum number of requests in flight for which there is room.
-    room: usize,
-    /// The budget does not allow its next trial now.
+    /// Maximum number of requests in flight within the limit on open files.
+    max_in_flight: usize,
+    /// True while the lane waits because the budget refused its next trial.
     is_held: bool,
 }
 
-/// The trials that wait, and the number in flight, by endpoint: a slow endpoint does not hold up the others. The images of a group
-/// are made once for all of them.
+/// Waiting trials and the number in flight, per endpoint, so that a slow endpoint does not hold up the others. All endpoints share the
+/// images of a group, which are made once.
 pub(crate) struct Lanes<'a, I> {
     models: &'a [ModelUnderTest],
-    all: Vec<Lane<I>>,
-    /// Index of the lane of each model.
-    of_model: Vec<usize>,
-    /// Width of a lane of models that have none.
+    by_endpoint: Vec<Lane<I>>,
+    /// Index into `by_endpoint`, by index of the model.
+    lane_of_model: Vec<usize>,
+    /// Maximum number of requests in flight in a lane whose models set no limit.
     default_width: usize,
-    /// The images that were accepted, with their bytes, until all their trials have ended.
-    held: VecDeque<(Weak<Stimulus>, usize)>,
+    /// The stimulus of each accepted group and the bytes of its images, until all its trials have ended.
+    live_images: VecDeque<(Weak<Stimulus>, usize)>,
 }
 
 impl<'a, I> Lanes<'a, I> {
     pub(crate) fn new(models: &'a [ModelUnderTest], default_width: usize) -> Self {
         let mut lanes: Vec<Lane<I>> = Vec::new();
-        let mut of_model = Vec::new();
+        let mut lane_of_model = Vec::new();
         for (index, model) in models.iter().enumerate() {
-            let shares =
-                |lane: &Lane<I>| models[lane.models[0]].model.shares_endpoint(&model.model);
-            let lane = lanes.iter().position(shares).unwrap_or_else(|| {
+            let shared = lanes
+                .iter()
+                .position(|lane| models[lane.models[0]].model.shares_endpoint(&model.model));
+            let lane = shared.unwrap_or_else(|| {
                 let server = model.server.as_ref();
                 lanes.push(Lane {
                     models: Vec::new(),
                     addresses: server.map_or(0, |server| server.replicas.len()),
-                    room: usize::MAX,
+                    max_in_flight: usize::MAX,
                     waiting: VecDeque::new(),
-                    aside: VecDeque::new(),
+                    deferred: VecDeque::new(),
                     in_flight: 0,
                     is_held: false,
                 });
                 lanes.len() - 1
             });
             lanes[lane].models.push(index);
-            of_model.push(lane);
+            lane_of_model.push(lane);
         }
         Self {
             models,
-            all: lanes,
-            of_model,
+            by_endpoint: lanes,
+            lane_of_model,
             default_width,
-            held: VecDeque::new(),
+            live_images: VecDeque::new(),
         }
     }
 
-    /// Limits the requests in flight to the connections that this process may open beside the files of these threads. Says so if they are
-    /// fewer than the settings allow.
+    /// Limits the requests in flight to the connections that this process may open in addition to the files of these threads. Prints a
+    /// warning if that is fewer than the settings allow.
     pub(crate) fn keep_within_open_files(&mut self, threads: ThreadArgs) {
         let Some(ConnectionRoom { limit, requests }) = ConnectionRoom::now(threads.number()) else {
             return;
         };
-        let addresses: usize = self.all.iter().map(|lane| lane.addresses).sum();
+        let addresses: usize = self.by_endpoint.iter().map(|lane| lane.addresses).sum();
         let mut most = 0;
-        for lane in self.all.iter_mut().filter(|lane| lane.addresses > 0) {
-            lane.room = (requests / addresses * lane.addresses).max(1);
+        for lane in self
+            .by_endpoint
+            .iter_mut()
+            .filter(|lane| lane.addresses > 0)
+        {
+            lane.max_in_flight = (requests / addresses * lane.addresses).max(1);
             let server = self.models[lane.models[0]].server.as_ref();
             most += server.map_or(0, |server| server.most_in_flight());
         }
@@ -102,13 +107,12 @@ impl<'a, I> Lanes<'a, I> {
 
     /// The maximum number of requests in flight in a lane now.
     fn width(&self, lane: &Lane<I>) -> usize {
-        let width = lane
-            .models
+        lane.models
             .iter()
             .filter_map(|model| self.models[*model].model.width())
             .max()
-            .unwrap_or(self.default_width);
-        width.min(lane.room)
+            .unwrap_or(self.default_width)
+            .min(lane.max_in_flight)
     }
 
     /// Adds the trials of a group.
@@ -120,34 +124,34 @@ impl<'a, I> Lanes<'a, I> {
                 .iter()
                 .map(|image| image.facts().bytes)
                 .sum();
-            self.held
+            self.live_images
                 .push_back((Arc::downgrade(&first.stimulus), bytes));
         }
         for ready in ready {
-            let lane = self.of_model[ready.trial.model];
-            self.all[lane].waiting.push_back(ready);
+            let lane = self.lane_of_model[ready.trial.model];
+            self.by_endpoint[lane].waiting.push_back(ready);
         }
     }
 
-    /// Takes the next trial of a lane that has room and is not held; trials that `is_dropped` names are dropped, those that `is_aside`
-    /// names wait until [`Self::ask_aside`].
+    /// Takes the next trial from a lane that has room and is not held by the budget. Trials for which `is_dropped` is true are dropped;
+    /// those for which `is_aside` is true are set aside until [`Self::ask_aside`].
     pub(crate) fn next(
         &mut self,
         is_dropped: impl Fn(&Trial<I>) -> bool,
         is_aside: impl Fn(&Trial<I>) -> bool,
     ) -> Option<PreparedTrial<I>> {
-        for index in 0..self.all.len() {
-            let lane = &self.all[index];
+        for index in 0..self.by_endpoint.len() {
+            let lane = &self.by_endpoint[index];
             if lane.is_held || lane.in_flight >= self.width(lane) {
                 continue;
             }
-            let lane = &mut self.all[index];
+            let lane = &mut self.by_endpoint[index];
             while let Some(ready) = lane.waiting.pop_front() {
                 if is_dropped(&ready.trial) {
                     continue;
                 }
                 if is_aside(&ready.trial) {
-                    lane.aside.push_back(ready);
+                    lane.deferred.push_back(ready);
                     continue;
                 }
                 lane.in_flight += 1;
@@ -157,66 +161,75 @@ impl<'a, I> Lanes<'a, I> {
         None
     }
 
-    /// Whether trials were set aside.
+    /// True if any trial is set aside.
     pub(crate) fn has_aside(&self) -> bool {
-        self.all.iter().any(|lane| !lane.aside.is_empty())
+        self.by_endpoint
+            .iter()
+            .any(|lane| !lane.deferred.is_empty())
     }
 
-    /// Has the trials that were set aside wait as the others.
+    /// Appends the trials that were set aside to the waiting ones.
     pub(crate) fn ask_aside(&mut self) {
-        for lane in &mut self.all {
-            lane.waiting.append(&mut lane.aside);
+        for lane in &mut self.by_endpoint {
+            lane.waiting.append(&mut lane.deferred);
         }
     }
 
-    /// Puts back a trial that the budget does not allow now; its lane is held until something ends.
+    /// Returns a trial that the budget does not allow now to its queue, and holds its lane until a trial ends or [`Self::release`] is
+    /// called.
     pub(crate) fn put_back(&mut self, ready: PreparedTrial<I>) {
-        let lane = &mut self.all[self.of_model[ready.trial.model]];
+        let lane = &mut self.by_endpoint[self.lane_of_model[ready.trial.model]];
         lane.in_flight -= 1;
         lane.is_held = true;
         lane.waiting.push_front(ready);
     }
 
-    /// Notes that a trial of a model has ended.
+    /// Records that a trial of a model has ended, and releases all lanes held by the budget.
     pub(crate) fn ended(&mut self, model: usize) {
-        let lane = &mut self.all[self.of_model[model]];
+        let lane = &mut self.by_endpoint[self.lane_of_model[model]];
         lane.in_flight = lane.in_flight.saturating_sub(1);
         self.release();
     }
 
-    /// Whether the budget keeps back a trial that its endpoint would take now.
+    /// True if the budget holds a lane whose endpoint has room for another request.
     pub(crate) fn is_held_back(&self) -> bool {
-        self.all
+        self.by_endpoint
             .iter()
             .any(|lane| lane.is_held && lane.in_flight < self.width(lane))
     }
 
-    /// Tries again the trials that the budget did not allow.
+    /// Releases all lanes held by the budget, so that their next trials are tried again.
     pub(crate) fn release(&mut self) {
-        self.all.iter_mut().for_each(|lane| lane.is_held = false);
+        for lane in &mut self.by_endpoint {
+            lane.is_held = false;
+        }
     }
 
-    /// Whether no trial waits.
+    /// True if no trial is waiting; trials set aside do not count.
     pub(crate) fn is_empty(&self) -> bool {
-        self.all.iter().all(|lane| lane.waiting.is_empty())
+        self.by_endpoint.iter().all(|lane| lane.waiting.is_empty())
     }
 
-    /// Whether more trials wait than may be sent.
+    /// True if trials are waiting. Once [`Self::next`] has returned `None`, none of them may be sent now.
     pub(crate) fn is_full(&self) -> bool {
         !self.is_empty()
     }
 
-    /// Whether a lane has nothing to do, and the images that wait for the others are few enough for one group more.
+    /// True if another group should be prepared: no trial is waiting, or a lane of a model that is not stopped has none waiting and the
+    /// images held are smaller than [`BYTES_AHEAD`].
     pub(crate) fn wants_more(&mut self, is_stopped: impl Fn(usize) -> bool) -> bool {
         if self.is_empty() {
             return true;
         }
-        let mut idle = self.all.iter().filter(|lane| lane.waiting.is_empty());
-        if !idle.any(|lane| lane.models.iter().any(|model| !is_stopped(*model))) {
+        let has_idle_lane = self.by_endpoint.iter().any(|lane| {
+            lane.waiting.is_empty() && lane.models.iter().any(|model| !is_stopped(*model))
+        });
+        if !has_idle_lane {
             return false;
         }
-        self.held
+        self.live_images
             .retain(|(stimulus, _)| stimulus.strong_count() > 0);
-        self.held.iter().map(|(_, bytes)| bytes).sum::<usize>() < BYTES_AHEAD
+        let held_bytes: usize = self.live_images.iter().map(|(_, bytes)| bytes).sum();
+        held_bytes < BYTES_AHEAD
     }
 }

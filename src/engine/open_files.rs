@@ -1,40 +1,41 @@
-//! The number of files that this process may have open, and the connections for which that leaves room.
+//! The limit of open files of this process, and the number of requests in flight that it allows: [`ConnectionRoom`].
 //!
-//! A connection is an open file. Without room for one more, a request fails, and so does each file that is opened for its reply.
+//! Each connection counts as an open file. At the limit, new requests fail, and so does opening a file for a reply.
 
-/// Files that are opened for a moment beside connections: images, maps, caches and the manifest; chosen.
-const OTHERS: usize = 16;
+/// Files reserved for short use besides connections: images, maps, caches and the manifest; chosen.
+const RESERVED_FILES: usize = 16;
 
-/// The same for each thread that makes images, up to a quarter of the limit; chosen: it seldom has two open.
-const EACH_THREAD: usize = 2;
+/// Files reserved for each thread that makes images, up to a quarter of the limit in total. Chosen: a thread seldom has two open.
+const FILES_PER_THREAD: usize = 2;
 
-/// Connections for each request in flight: the client opens one while another, which the request takes, becomes free.
-const EACH_REQUEST: usize = 2;
+/// Connections per request in flight: the client may open a new connection for a request that then takes one that became free.
+const CONNECTIONS_PER_REQUEST: usize = 2;
 
-/// A soft limit that every system allows, if the hard one is refused: macOS states no hard limit, and allows no more.
+/// Soft limit to try if the system refuses the hard limit. macOS reports no hard limit, but allows no more than this.
 #[cfg(unix)]
-const ALLOWED: libc::rlim_t = 10_240;
+const FALLBACK_LIMIT: libc::rlim_t = 10_240;
 
-/// The room for connections.
+/// How many requests can be in flight within the limit of open files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ConnectionRoom {
-    /// The number of files that this process may have open.
+    /// Maximum number of open files of this process.
     pub(crate) limit: usize,
-    /// The number of requests in flight for which the limit leaves room; at least one.
+    /// Number of requests in flight that fit within the limit; at least one.
     pub(crate) requests: usize,
 }
 
 impl ConnectionRoom {
-    /// The room beside the files that are open now and those that `threads` open; `None` without a limit.
+    /// Raises the limit, and subtracts the files that are open now and those reserved for `threads` image threads. `None` if the limit
+    /// is unknown or infinite.
     pub(crate) fn now(threads: usize) -> Option<Self> {
         let limit = raise_limit()?;
-        Some(Self::beside(limit, open_now(), threads))
+        Some(Self::within(limit, open_files(), threads))
     }
 
-    fn beside(limit: usize, open: usize, threads: usize) -> Self {
-        let images = EACH_THREAD.saturating_mul(threads).min(limit / 4);
-        let taken = open + OTHERS + images;
-        let requests = limit.saturating_sub(taken) / EACH_REQUEST;
+    fn within(limit: usize, open: usize, threads: usize) -> Self {
+        let for_threads = FILES_PER_THREAD.saturating_mul(threads).min(limit / 4);
+        let taken = open + RESERVED_FILES + for_threads;
+        let requests = limit.saturating_sub(taken) / CONNECTIONS_PER_REQUEST;
         Self {
             limit,
             requests: requests.max(1),
@@ -42,7 +43,7 @@ impl ConnectionRoom {
     }
 }
 
-/// Raises the limit of open files to the highest that this process may set; returns it, `None` if there is none.
+/// Raises the soft limit of open files as far as the system allows, and returns it. `None` if it is unknown or infinite.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "a limit of the operating system")]
 pub(crate) fn raise_limit() -> Option<usize> {
@@ -50,17 +51,17 @@ pub(crate) fn raise_limit() -> Option<usize> {
         rlim_cur: 0,
         rlim_max: 0,
     };
-    // SAFETY: each call reads or writes the one structure that it is given.
+    // SAFETY: each call only reads or writes the `rlimit` structure passed to it.
     unsafe {
         if libc::getrlimit(libc::RLIMIT_NOFILE, &raw mut limit) != 0 {
             return None;
         }
-        for highest in [limit.rlim_max, ALLOWED.min(limit.rlim_max)] {
+        for target in [limit.rlim_max, FALLBACK_LIMIT.min(limit.rlim_max)] {
             let raised = libc::rlimit {
-                rlim_cur: highest,
+                rlim_cur: target,
                 ..limit
             };
-            if highest > limit.rlim_cur
+            if target > limit.rlim_cur
                 && libc::setrlimit(libc::RLIMIT_NOFILE, &raw const raised) == 0
             {
                 limit = raised;
@@ -71,15 +72,15 @@ pub(crate) fn raise_limit() -> Option<usize> {
     is_limited.then(|| usize::try_from(limit.rlim_cur).unwrap_or(usize::MAX))
 }
 
-/// Raises the limit of open files; this system has none.
+/// `None`: this system sets no limit of open files.
 #[cfg(not(unix))]
 pub(crate) fn raise_limit() -> Option<usize> {
     None
 }
 
-/// The number of files that are open now, as far as the system lists them.
-fn open_now() -> usize {
-    std::fs::read_dir("/dev/fd").map_or(OTHERS, Iterator::count)
+/// Number of files that are open now. [`RESERVED_FILES`] stands in for it on systems that do not list open files.
+fn open_files() -> usize {
+    std::fs::read_dir("/dev/fd").map_or(RESERVED_FILES, Iterator::count)
 }
 
 #[cfg(test)]
@@ -87,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_fit_beside_other_files() {
+    fn requests_fit_within_the_limit() {
         for (limit, threads, requests) in [
             (0, 2, 1),
             (32, 2, 1),
@@ -97,7 +98,7 @@ mod tests {
             (256, usize::MAX, 81),
             (1 << 20, 2, 524_271),
         ] {
-            let room = ConnectionRoom::beside(limit, 14, threads);
+            let room = ConnectionRoom::within(limit, 14, threads);
             assert_eq!(room.requests, requests, "{limit}, {threads} threads");
         }
     }
@@ -105,9 +106,9 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn open_files_are_counted() {
-        let before = open_now();
+        let before = open_files();
         let files: Vec<_> = (0..5).map(|_| tempfile::tempfile().unwrap()).collect();
-        assert!(before > 2 && open_now() > before, "{}", files.len());
+        assert!(before > 2 && open_files() > before, "{}", files.len());
         assert_eq!(raise_limit(), raise_limit());
     }
 }

@@ -1,4 +1,4 @@
-//! The report of a run of open questions: scored from its records, and written into its folder.
+//! Report of a run of open questions: scores its records, and writes the report into its folder.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
@@ -41,7 +41,7 @@ use darkqa_score::open::{
 };
 use darkqa_score::subject::Subject;
 
-/// The answers of a run, with their scores.
+/// Scored answers of a run.
 pub(crate) struct Scores {
     pub(crate) run: OpenRun,
     judge: Option<String>,
@@ -53,7 +53,7 @@ pub(crate) struct Scores {
 }
 
 impl Scores {
-    /// The scores of a run, from the marks of the judge in its manifest.
+    /// Scores a run by the marks of the judge that its manifest names.
     pub(super) fn new(joined: JoinedRuns) -> Result<Self> {
         let JoinedRuns {
             run,
@@ -71,13 +71,14 @@ impl Scores {
         let (mut scored, mut answers) = (Vec::new(), Vec::new());
         for prediction in predictions {
             let question = ids[prediction.question];
-            let record = match &prediction.state {
+            let mark_record = match &prediction.state {
                 AnswerState::Text { answer, .. } => marks.get(question, answer).copied(),
                 AnswerState::Missing | AnswerState::Null => None,
             };
-            let outcome = outcome(&prediction, record, protocol);
-            let failure = failures.get(&(question, prediction.subject.clone()));
-            let failure = failure.filter(|_| outcome == AnswerOutcome::Missing);
+            let outcome = outcome(&prediction, mark_record, protocol);
+            let failure = failures
+                .get(&(question, prediction.subject.clone()))
+                .filter(|_| outcome == AnswerOutcome::Missing);
             scored.push(ScoredAnswer {
                 subject: prediction.subject.clone(),
                 question: prediction.question,
@@ -89,13 +90,13 @@ impl Scores {
                 question: prediction.question,
                 answer: prediction.full_answer,
                 outcome,
-                judgement: record.and_then(|record| record.reply.clone()),
+                judgement: mark_record.and_then(|record| record.reply.clone()),
                 failure: failure.cloned(),
             });
         }
-        let topics: Vec<QuestionGroups> = run.questions.iter().map(topic).collect();
+        let groups: Vec<QuestionGroups> = run.questions.iter().map(question_groups).collect();
         Ok(Self {
-            summary: open_summary_listed(&scored, &topics, &listing),
+            summary: open_summary_listed(&scored, &groups, &listing),
             run,
             judge,
             protocol,
@@ -105,14 +106,13 @@ impl Scores {
         })
     }
 
-    /// Whether the mark of an answer cannot be read.
+    /// True if the mark of an answer cannot be parsed.
     fn has_unmarked(&self) -> bool {
         self.answers
             .iter()
             .any(|answer| answer.outcome == AnswerOutcome::Unmarked)
     }
 
-    /// The scores.
     pub(super) fn summary(&self) -> &OpenSummary {
         &self.summary
     }
@@ -133,13 +133,13 @@ impl Scores {
         }
     }
 
-    /// The files of the report by name.
+    /// Files of the report by name, without the JSON summary.
     pub(crate) fn products(&self) -> Result<Vec<(String, Vec<u8>)>> {
         let report = self.report();
         products(&report, &tables(&report))
     }
 
-    /// The whole report of the run.
+    /// Files of the report, including the JSON summary, and the report as Markdown.
     pub(super) fn whole(&self) -> Result<WholeReport> {
         let report = self.report();
         let tables = tables(&report);
@@ -149,13 +149,13 @@ impl Scores {
         })
     }
 
-    /// The text for standard output.
+    /// Text of the report for standard output.
     pub(crate) fn shown(&self, show: StdoutFormat) -> Result<String> {
         let report = self.report();
-        self.show(&report, &tables(&report), show)
+        self.stdout_text(&report, &tables(&report), show)
     }
 
-    fn show(
+    fn stdout_text(
         &self,
         report: &OpenReport<'_>,
         tables: &[Table],
@@ -169,7 +169,7 @@ impl Scores {
         }
     }
 
-    /// Writes the report of the run; returns the text for standard output.
+    /// Writes the report of the run. Returns the text for standard output.
     pub(super) fn write(
         &self,
         target: &ReportFolder<'_, OpenDetail>,
@@ -178,7 +178,7 @@ impl Scores {
         let report = self.report();
         let tables = tables(&report);
         target.write(&files(&report, &tables)?, &self.run.manifest)?;
-        let mut text = self.show(&report, &tables, show)?;
+        let mut text = self.stdout_text(&report, &tables, show)?;
         if !show.is_document() {
             let page = target.path().join(PAGE);
             let _ = writeln!(text, "report: {}", page.display());
@@ -187,29 +187,29 @@ impl Scores {
     }
 }
 
-/// The files of the report of one run, by name.
+/// Files of the report of one run by name, including the JSON summary.
 fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, tables)?;
     let summary = summary_json(report, tables, None, ReportLength::Summary)?;
     Ok(with_summary(products, summary))
 }
 
-/// A run of open questions, or several joined to one, with its whole records.
+/// A run of open questions, or several joined into one, with complete records.
 pub(crate) struct OpenRun {
-    /// The name of the run, or of the first of several.
+    /// Name of the run; the first one's if several are joined.
     name: String,
     pub(crate) folder: PathBuf,
     pub(crate) layout: RunLayout,
     pub(crate) manifest: RunManifest,
-    /// In the order of the questions, conditions and models.
+    /// Ordered by question, condition and model.
     pub(crate) records: Vec<Record<OpenDetail>>,
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
-    /// The runs after the first, if there are several.
+    /// Joined runs after the first.
     others: Vec<OtherRun>,
 }
 
-/// A run that was joined to the first one.
+/// A run joined to the first one.
 struct OtherRun {
     name: String,
     folder: PathBuf,
@@ -217,75 +217,60 @@ struct OtherRun {
 }
 
 impl OpenRun {
-    /// The names and manifests of all runs.
+    /// Names and manifests of all runs.
     fn runs(&self) -> Vec<(&str, &RunManifest)> {
         let first = std::iter::once((&*self.name, &self.manifest));
         let others = self.others.iter().map(|run| (&*run.name, &run.manifest));
         first.chain(others).collect()
     }
 
-    /// The folders of all runs.
+    /// Folders of all runs.
     fn folders(&self) -> Vec<&Path> {
         let others = self.others.iter().map(|run| &*run.folder);
         std::iter::once(&*self.folder).chain(others).collect()
     }
 }
 
-/// Several runs, joined to one.
+/// Several runs joined into one.
 pub(super) struct JoinedRuns {
     pub(super) run: OpenRun,
-    /// Differences between the runs, and faults of their numbers.
+    /// Alerts about differences between the runs and faults in their numbers.
     pub(super) alerts: Vec<Alert>,
-    /// How their enhancers were used.
+    /// Use of each enhancer.
     enhancers: Vec<EnhancerRow>,
-    /// The order, groups and marks of the models.
+    /// Order, groups and marks of the models.
     pub(super) listing: ModelListing,
 }
 
-/// Several runs, joined to one by [`join`], with what differs between them.
+/// Joins several runs into one by [`join`], with alerts about differences between them.
 ///
 /// # Errors
 /// If the runs have different judges or protocols, or different questions under the same name.
 pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     judges::check(&runs)?;
-    let mut questions = HashMap::<QuestionId, RunQuestion>::new();
-    for run in &runs {
-        for question in &run.questions {
-            let known = questions
-                .entry(question.id.clone())
-                .or_insert_with(|| question.clone());
-            if !known.is_same(&RunQuestion {
-                image: None,
-                ..question.clone()
-            }) {
-                let problem = format!(
-                    "the question {} is different in the other runs; report each run alone",
-                    question.id
-                );
-                let path = run.folder.clone();
-                return Err(Error::Run { path, problem });
-            }
-        }
-    }
+    check_questions(&runs)?;
     let joined = join(runs, is_answer)?;
     let mut alerts = run_alerts(&joined);
     alerts.extend(joining_alerts(&joined));
     if joined.runs.len() == 1 {
-        // The text and the page of one run say more about the missing part.
+        // The text and the page of a single run describe the missing part in more detail.
         alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
     }
     let enhancers = enhancers::rows(&joined.runs);
     let listing = listing(&joined);
     let mut runs = joined.runs.into_iter();
-    let first = runs.next();
-    let first = first.ok_or_else(|| Error::usage("RUN", "no run is named"))?;
+    let first = runs
+        .next()
+        .ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let mut trials = joined.trials;
     let ids = joined.questions.iter().map(|question| &question.id);
     sort(&mut trials, ids, &first.manifest.models);
     let mut records: Vec<Record<OpenDetail>> = trials.iter().map(TrialRef::record).collect();
-    // A model that stands under two names may be the judge, who has one.
-    let is_mark = |record: &&mut Record<OpenDetail>| record.detail.step == Step::Mark;
-    for record in records.iter_mut().filter(is_mark) {
+    // Marks keep the name under which the judge was asked: a model that has two names in the report may also be the judge.
+    for record in records
+        .iter_mut()
+        .filter(|record| record.detail.step == Step::Mark)
+    {
         record.model = joined.models.asked(&record.model).to_owned();
     }
     let run = OpenRun {
@@ -312,7 +297,29 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     })
 }
 
-/// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be read.
+/// Checks that questions with the same name are the same in all runs; their images may differ.
+fn check_questions(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
+    let mut first_seen = HashMap::<&QuestionId, &RunQuestion>::new();
+    for run in runs {
+        for question in &run.questions {
+            let known = first_seen.entry(&question.id).or_insert(question);
+            if !known.is_same(&RunQuestion {
+                image: None,
+                ..question.clone()
+            }) {
+                let problem = format!(
+                    "the question {} is different in the other runs; report each run alone",
+                    question.id
+                );
+                let path = run.folder.clone();
+                return Err(Error::Run { path, problem });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be parsed.
 pub(crate) fn write(
     store: &Store<OpenDetail>,
     mut run: StoredRun<OpenDetail>,
@@ -331,41 +338,41 @@ pub(crate) fn write(
     .in_format(show))
 }
 
-/// Whether an answer was asked for, and no mark.
+/// True if the trial asked for an answer, false if it asked for a mark.
 fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
     trial.is_answer()
 }
 
-/// The marks of the judge of a run.
+/// Marks that the judge of a run gave, without failed ones.
 fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<OpenDetail>> {
     let mut marks = MarkIndex::new(&run.questions);
     for record in &run.records {
-        let is_of_judge = Some(&*record.model) == judge && record.failure.is_none();
-        if let (Step::Mark, Some(answer)) = (record.detail.step, &record.detail.judged)
-            && is_of_judge
-        {
+        if Some(&*record.model) != judge || record.failure.is_some() {
+            continue;
+        }
+        if let (Step::Mark, Some(answer)) = (record.detail.step, &record.detail.judged) {
             marks.add(&record.question, answer, record);
         }
     }
     marks
 }
 
-/// Why trials have no answer, in words with what the error states, by question and subject.
+/// Kind and message of the error of each failed answer, by question and subject.
 fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, Subject), String> {
     records
         .iter()
         .filter(|record| record.detail.step == Step::Answer)
         .filter_map(|record| {
             let failure = record.failure.as_ref()?;
-            let why = outcome_words::failed(failure.kind, failure.status);
+            let kind = outcome_words::failed(failure.kind, failure.status);
             let subject = Subject::new(&record.model, record.condition.as_ref());
-            let why = format!("{why}: {}", failure.message);
-            Some(((&record.question, subject), why))
+            let text = format!("{kind}: {}", failure.message);
+            Some(((&record.question, subject), text))
         })
         .collect()
 }
 
-/// The outcome of an answer, from the record of its mark.
+/// Outcome of an answer, given the record of its mark.
 fn outcome(
     prediction: &Prediction,
     mark_record: Option<&Record<OpenDetail>>,
@@ -376,14 +383,15 @@ fn outcome(
         (AnswerState::Null, _) => AnswerOutcome::Null,
         (AnswerState::Text { .. }, None) => AnswerOutcome::Unjudged,
         (AnswerState::Text { .. }, Some(record)) => {
-            // Marks of earlier versions are read again, so that all tables use the same reading.
+            // Marks of earlier versions are parsed again, so that all tables use the same reading.
             let reply = record.reply.as_deref().unwrap_or_default();
             mark(reply, protocol).map_or(AnswerOutcome::Unmarked, AnswerOutcome::Marked)
         }
     }
 }
 
-fn topic(question: &RunQuestion) -> QuestionGroups {
+/// Groups of a question. Its split is the first part of the episode's name.
+fn question_groups(question: &RunQuestion) -> QuestionGroups {
     let episode = question.frame.0.clone();
     QuestionGroups {
         split: episode.split('/').next().unwrap_or_default().to_owned(),

@@ -1,4 +1,4 @@
-//! The command `report`, for one run or several: [`report`].
+//! The `report` command, for one run or several: [`report`].
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -91,7 +91,7 @@ pub(crate) struct BaselineArgs {
 }
 
 impl ReportArgs {
-    fn shown(&self) -> ShownModels {
+    fn shown_models(&self) -> ShownModels {
         if self.all {
             ShownModels::All
         } else {
@@ -99,13 +99,13 @@ impl ReportArgs {
         }
     }
 
-    /// Whether the report goes into the folder of its one run.
+    /// True if the report is written into the folder of its only run.
     pub(crate) fn writes_into_run(&self) -> bool {
-        let is_of_one = self.runs.len() == 1 && self.baseline.baseline.is_none();
-        is_of_one && self.out.is_none() && !self.common
+        let is_of_single_run = self.runs.len() == 1 && self.baseline.baseline.is_none();
+        is_of_single_run && self.out.is_none() && !self.common
     }
 
-    /// How the report is printed.
+    /// Format of the report on standard output.
     fn format(&self) -> StdoutFormat {
         let format = self.show.show.format();
         if self.show.markdown {
@@ -119,7 +119,7 @@ impl ReportArgs {
     }
 }
 
-/// The report of a run, or a comparison of several of the same kind. With `--rescore`, changed readings are stored in their run.
+/// Reports on a run, or compares several of the same kind. With `--rescore`, changed readings are stored in their run.
 ///
 /// # Errors
 /// If a folder holds no run, a record is broken, or the runs asked different questions.
@@ -128,7 +128,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
         let problem = "compares with an old run: name it with --baseline OLD";
         return Err(Error::usage(FAIL_IF_WORSE, problem));
     }
-    let (folders, again) = distinct(&args.runs);
+    let (folders, duplicate_alerts) = distinct(&args.runs);
     let (mut choice, mut open) = (Vec::new(), Vec::new());
     for folder in folders {
         match any_run(folder)? {
@@ -137,8 +137,8 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
         }
     }
     let outcome = match (choice.is_empty(), open.is_empty()) {
-        (_, true) => report_choices(args, choice, &again)?,
-        (true, false) => report_open(args, open, &again)?,
+        (_, true) => report_choices(args, choice, &duplicate_alerts)?,
+        (true, false) => report_open(args, open, &duplicate_alerts)?,
         (false, false) => {
             return Err(Error::usage(
                 "RUN",
@@ -149,52 +149,54 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
     Ok(outcome.in_format(args.format()))
 }
 
-/// The folders without those that are named before, and the alerts about these.
+/// Removes duplicate folders; also returns alerts about them.
 pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
-    let mut times = Vec::<(PathBuf, &PathBuf, usize)>::new();
+    let mut counted = Vec::<(PathBuf, &PathBuf, usize)>::new();
     for folder in folders {
-        // A folder that cannot be read is named when it is opened.
-        let place = folder.canonicalize().unwrap_or_else(|_| folder.clone());
-        match times.iter_mut().find(|(known, ..)| *known == place) {
-            Some((.., times)) => *times += 1,
-            None => times.push((place, folder, 1)),
+        // The error about an unreadable folder comes when it is opened.
+        let canonical = folder.canonicalize().unwrap_or_else(|_| folder.clone());
+        match counted.iter_mut().find(|(known, ..)| *known == canonical) {
+            Some((.., count)) => *count += 1,
+            None => counted.push((canonical, folder, 1)),
         }
     }
-    let again: Vec<(String, usize)> = times
+    let duplicates: Vec<(String, usize)> = counted
         .iter()
-        .filter(|(.., times)| *times > 1)
-        .map(|(_, folder, times)| (name(folder), *times))
+        .filter(|(.., count)| *count > 1)
+        .map(|(_, folder, count)| (name(folder), *count))
         .collect();
-    let folders = times.into_iter().map(|(_, folder, _)| folder);
-    (folders.collect(), named_again(&again))
+    let folders = counted.into_iter().map(|(_, folder, _)| folder);
+    (folders.collect(), named_again(&duplicates))
 }
 
 fn report_choices(
     args: &ReportArgs,
     mut runs: Vec<StoredRun<ChoiceDetail>>,
-    again: &[Alert],
+    duplicate_alerts: &[Alert],
 ) -> Result<Outcome> {
-    let mut reread_lines = String::new();
+    let mut rescore_text = String::new();
     for run in &mut runs {
         if run.trials.is_empty() {
             return Err(no_records(run.folder.clone()));
         }
         if args.rescore {
-            reread_lines += &reread(run)?;
+            rescore_text += &reread(run)?;
             let failed = run.trials.iter().map(TrialRef::failed);
             run.manifest.counts = Counts::new(run.manifest.counts.trials, failed);
         }
-        run.leave_out(args.shown());
+        run.leave_out(args.shown_models());
     }
     if args.format().is_document() {
-        reread_lines.clear();
+        rescore_text.clear();
     }
-    let old = args.baseline.baseline.as_ref().map(|folder| {
-        let mut old = choice_run(folder, "--baseline compares runs of questions with choices")?;
-        old.leave_out(args.shown());
-        Ok::<_, Error>((runs.clone(), old))
-    });
-    let old = old.transpose()?;
+    let new_and_old = match &args.baseline.baseline {
+        Some(folder) => {
+            let mut old = choice_run(folder, "--baseline compares runs of questions with choices")?;
+            old.leave_out(args.shown_models());
+            Some((runs.clone(), old))
+        }
+        None => None,
+    };
     let mut combined = combine(runs)?;
     if combined.truths() == Truths::Unknown {
         refuse_without_truths(args)?;
@@ -203,37 +205,39 @@ fn report_choices(
         combined = restrict(combined)?;
     }
     combined.listing.show(&args.columns);
-    let baseline = old.map(|(new, old)| Baseline::new(&combined, new, old));
-    let baseline = baseline.transpose()?;
-    let is_worse = baseline
-        .as_ref()
-        .filter(|_| args.baseline.fail_if_worse)
-        .map(|baseline| baseline.is_worse(combined.unit()));
-    let is_worse = is_worse.transpose()?.unwrap_or(false);
-    let in_folder = args.out.is_none() && !args.common && baseline.is_none() && again.is_empty();
-    let place = match &*combined.runs {
-        [run] if in_folder => Some((run.folder.clone(), run.layout)),
+    let baseline = new_and_old
+        .map(|(new, old)| Baseline::new(&combined, new, old))
+        .transpose()?;
+    let is_worse = match &baseline {
+        Some(baseline) if args.baseline.fail_if_worse => baseline.is_worse(combined.unit())?,
+        _ => false,
+    };
+    let in_folder =
+        args.out.is_none() && !args.common && baseline.is_none() && duplicate_alerts.is_empty();
+    let written = match &*combined.runs {
+        [run] if in_folder => {
+            let text = write_in_place((&*run.folder, run.layout), &run.manifest, |target| {
+                in_its_folder(target, &run.manifest, &combined, args.format())
+            })?;
+            text.map(|text| (run.folder.clone(), run.layout, text))
+        }
         _ => None,
     };
-    let written = place.as_ref().map(|(folder, layout)| {
-        let manifest = &combined.runs[0].manifest;
-        write_in_place((folder, *layout), manifest, |target| {
-            in_its_folder(target, manifest, &combined, args.format())
-        })
-    });
-    let text = written.transpose()?.flatten();
-    let place = place.filter(|_| text.is_some());
-    let reported = match (&place, text) {
-        (Some((folder, _)), Some(text)) => Outcome::wrote(folder, Status::Complete, text),
-        _ => compare(&combined, baseline.as_ref(), args, again)?,
+    let (reported, table_folder) = if let Some((folder, layout, text)) = written {
+        // A run in parts has a record table in each part instead.
+        let table_folder = (layout == RunLayout::Whole).then(|| folder.clone());
+        let reported = Outcome::wrote(folder, Status::Complete, text);
+        (reported, table_folder)
+    } else {
+        let reported = report_combined(&combined, baseline.as_ref(), args, duplicate_alerts)?;
+        (reported, None)
     };
-    // The table takes as much memory as the trials.
+    // The record table takes as much memory as the trials, so free these first.
     drop(combined);
-    // Each part has a table of its own records.
-    if let Some((folder, RunLayout::Whole)) = place {
+    if let Some(folder) = table_folder {
         record_table::update(&folder, args.show.show.table())?;
     }
-    // A command whose outcome is not what was asked for ends with 1.
+    // `Incomplete` makes the command exit with 1.
     let status = if is_worse {
         Status::Incomplete
     } else {
@@ -241,12 +245,12 @@ fn report_choices(
     };
     Ok(Outcome {
         status,
-        output: reread_lines + &reported.output,
+        output: rescore_text + &reported.output,
         written: reported.written,
     })
 }
 
-/// Refuses what compares accuracies, for runs whose questions have no true answers.
+/// Refuses flags that compare accuracies; for runs whose questions have no true answers.
 fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
     let flags = [
         (
@@ -266,29 +270,29 @@ fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
     }
 }
 
-/// The text of several runs, joined. Writes the report if `--out` is set.
-fn compare(
+/// Reports on joined runs. Writes the report only if `--out` is set.
+fn report_combined(
     combined: &Combined,
     baseline: Option<&Baseline>,
     args: &ReportArgs,
-    again: &[Alert],
+    duplicate_alerts: &[Alert],
 ) -> Result<Outcome> {
     if combined.truths() == Truths::Unknown {
         let show = args.format();
-        let output = own_answers::compared(combined, again, show, args.out.is_some())?;
+        let output = own_answers::compared(combined, duplicate_alerts, show, args.out.is_some())?;
         return write_files(args, output.text, output.files);
     }
     let findings = combined.findings();
     let runs = combined.manifests();
-    let mut above = again.to_vec();
-    above.extend(alerts(combined, &findings));
+    let mut all_alerts = duplicate_alerts.to_vec();
+    all_alerts.extend(alerts(combined, &findings));
     let mut report =
-        ChoiceReport::new(&findings, above).with_enhancers(&enhancers::rows(&combined.runs));
+        ChoiceReport::new(&findings, all_alerts).with_enhancers(&enhancers::rows(&combined.runs));
     if let Some(baseline) = baseline {
         baseline.add_to(&mut report);
     }
     let list = RunList::Several(&runs);
-    let shown = text(&report, &runs, list, args.format())?;
+    let stdout_text = text(&report, &runs, list, args.format())?;
     let files = match &args.out {
         Some(out) => {
             let files = report_files(&report, combined, list)?;
@@ -297,10 +301,10 @@ fn compare(
         }
         None => Vec::new(),
     };
-    write_files(args, shown, files)
+    write_files(args, stdout_text, files)
 }
 
-/// The text, with a line about the report. Writes the files of the report into `--out` if it is set.
+/// Writes the files of the report into `--out`, if it is set, and adds a line about them to the text.
 fn write_files(
     args: &ReportArgs,
     mut text: String,
@@ -324,7 +328,7 @@ fn write_files(
 fn report_open(
     args: &ReportArgs,
     mut runs: Vec<StoredRun<OpenDetail>>,
-    again: &[Alert],
+    duplicate_alerts: &[Alert],
 ) -> Result<Outcome> {
     let flags = [
         ("--common", args.common),
@@ -338,11 +342,11 @@ fn report_open(
         return Err(no_records(run.folder.clone()));
     }
     for run in &mut runs {
-        run.leave_out(args.shown());
+        run.leave_out(args.shown_models());
     }
-    let is_single = runs.len() == 1 && again.is_empty();
+    let is_single = runs.len() == 1 && duplicate_alerts.is_empty();
     let mut joined = open::combine(runs)?;
-    joined.alerts.splice(..0, again.iter().cloned());
+    joined.alerts.splice(..0, duplicate_alerts.iter().cloned());
     joined.listing.show(&args.columns);
     let scores = open::Scores::new(joined)?;
     let run = &scores.run;
@@ -365,8 +369,8 @@ fn report_open(
     write_files(args, scores.shown(args.format())?, files)
 }
 
-/// Reads all stored replies again, and stores the readings that changed, with the version of the reading; returns lines about the
-/// change.
+/// Reads all stored replies again by the current rules. Stores the changed readings and the version of the rules, and returns a text
+/// about the change.
 ///
 /// # Errors
 /// If the run is in parts, or one of its files cannot be read or written.
@@ -383,10 +387,10 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     let mut lenient = LenientChange::new(&run.manifest);
     for trial in run.trials.iter() {
         let record = run.record(trial)?;
-        let now = record::reread(record.clone())?;
-        lenient.add(&record.detail, &now.detail);
-        if now != record {
-            store.append(&now)?;
+        let current = record::reread(record.clone())?;
+        lenient.add(&record.detail, &current.detail);
+        if current != record {
+            store.append(&current)?;
             changed += 1;
         }
     }

@@ -1,7 +1,7 @@
-//! Models of a run that have another name now, other settings under their name, or are asked no more: [`note`], [`rename`].
+//! Models of a run that were renamed, have other settings under their name, or are no longer asked: [`note`], [`rename`].
 //!
-//! The name of a model is in no trial's key, so its replies stay. Their records keep the name that they have, and are read with the
-//! one of now ([`RecordedNames`]).
+//! The key of a trial does not contain the model's name, so a renamed model keeps its replies. Records keep the name that they were
+//! written with, and are shown under the current one ([`RecordedNames`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,33 +15,35 @@ use crate::types::recorded_names::RecordedNames;
 use crate::types::{Control, Digest, Record, Trials};
 use darkqa_score::record::Detail;
 
-/// The beginning of the fields of a manifest that hold the changes to requests to a model; its name follows.
+/// Prefix of the manifest settings that hold the changes to the requests to a model; the model's name follows.
 pub(crate) const ADAPTED_FOR: &str = "adapted for ";
 
-/// The entry of a manifest's settings that holds the models which its file of models no longer has.
+/// Manifest setting that lists the models that are no longer in the models file.
 const LEFT_OUT: &str = "models left out";
 
-/// Whether a model may get other settings in a run that has it.
+/// Whether the settings of a model may change within a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum OtherSettings {
-    /// It is another model then: its name is its own in a file of models.
+    /// With other settings it is another model of the run, as a models file gives each model a name of its own.
     Allowed,
-    /// The run is another one.
+    /// With other settings it is another run.
     Refused,
 }
 
-/// The models of a command.
+/// Models of the current command.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Now<'a> {
     /// Settings that determine the replies of each model, by name.
     pub(crate) models: &'a BTreeMap<String, Value>,
-    /// The view of each model, by name.
+    /// Inputs that each model is shown, by name.
     pub(crate) views: &'a Views,
+    /// Whether the settings of the stored models may change.
     pub(crate) settings: OtherSettings,
 }
 
-/// Notes in a manifest which models of the stored one have another name in these columns. Two names are of one model if all that
-/// decides its replies is the same, and both are shown images, or none. A model whose name another one has now is `NAME (before)`.
+/// Records in a manifest which models of the stored one have another name now. Two names belong to one model if all settings that
+/// determine its replies are the same, and both are shown images, or neither is. A model whose name another one has taken becomes
+/// `NAME (before)`.
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
@@ -58,55 +60,59 @@ pub(crate) fn note(
     let empty = BTreeMap::new();
     let before = stored.columns.get("model").unwrap_or(&empty);
     let stored_views = StoredViews::from_manifest(stored);
-    let moves = moves(before, &stored_views, command);
+    let new_names = new_names(before, &stored_views, command);
     let mut names = RecordedNames::from_manifest(stored);
-    names.rename(&moves);
+    names.rename(&new_names);
     for (name, content) in now {
-        let digest = Digest::canonical("darkqa.model-name/1", &decides(content))?.to_string();
+        let digest =
+            Digest::canonical("darkqa.model-name/1", &reply_settings(content))?.to_string();
         names.ensure(name, || format!("{name} [{}]", &digest[..8]));
     }
     names.note(manifest);
-    let new = |name: &String| moves.get(name).unwrap_or(name).clone();
+    let new_name = |name: &String| new_names.get(name).unwrap_or(name).clone();
     for model in &mut manifest.models {
-        // Names of a file of models are those of now.
+        // Names in the models file are already current.
         if !now.contains_key(&model.name) {
-            model.name = new(&model.name);
+            model.name = new_name(&model.name);
         }
     }
     if let Some(models) = manifest.columns.get_mut("model") {
-        let known = before
+        *models = before
             .iter()
-            .map(|(name, content)| (new(name), content.clone()));
-        *models = known.chain(now.clone()).collect();
+            .map(|(name, content)| (new_name(name), content.clone()))
+            .chain(now.clone())
+            .collect();
     }
-    let adapted = |name: &String| format!("{ADAPTED_FOR}{name}");
-    // Two models may have exchanged their names: all are taken out before one is put in.
-    for name in moves
+    let adapted_key = |name: &String| format!("{ADAPTED_FOR}{name}");
+    // Two models may have swapped names: remove all old entries before inserting new ones.
+    for name in new_names
         .keys()
-        .filter(|name| stored.settings.contains_key(&adapted(name)))
+        .filter(|name| stored.settings.contains_key(&adapted_key(name)))
     {
-        manifest.settings.remove(&adapted(name));
+        manifest.settings.remove(&adapted_key(name));
     }
-    for (name, new) in &moves {
-        if let Some(changes) = stored.settings.get(&adapted(name)) {
-            manifest.settings.insert(adapted(new), changes.clone());
+    for (name, new) in &new_names {
+        if let Some(changes) = stored.settings.get(&adapted_key(name)) {
+            manifest.settings.insert(adapted_key(new), changes.clone());
         }
     }
-    let known = before.keys().map(|name| (name, new(name)));
     if settings == OtherSettings::Allowed || stored_views.is_noted() {
-        stored_views.note(manifest, known, command.views);
+        let stored_names = before.keys().map(|name| (name, new_name(name)));
+        stored_views.note(manifest, stored_names, command.views);
     }
-    let left = left_out(manifest, stored, now, &moves, settings);
-    if left.is_empty() {
+    let left_out = left_out(manifest, stored, now, &new_names, settings);
+    if left_out.is_empty() {
         manifest.settings.remove(LEFT_OUT);
     } else {
-        manifest.settings.insert(LEFT_OUT.to_owned(), json!(left));
+        manifest
+            .settings
+            .insert(LEFT_OUT.to_owned(), json!(left_out));
     }
     Ok(())
 }
 
-/// The new name of each model that has one.
-fn moves(
+/// New name of each renamed model.
+fn new_names(
     before: &BTreeMap<String, Value>,
     views: &StoredViews,
     command: Now<'_>,
@@ -116,95 +122,100 @@ fn moves(
         settings,
         ..
     } = command;
-    // How well a model of before fits one of now; `None` if it is another one.
+    // How well a stored model matches a current one; `None` if they are different models.
     let fit = |old: &String, new: &String| {
-        let is_same = decides(before.get(old)?) == decides(now.get(new)?);
+        let is_same = reply_settings(before.get(old)?) == reply_settings(now.get(new)?);
         let fit = views.fit(old, command.views.get(new)?);
-        is_same.then_some(fit).filter(|fit| *fit > Fit::Apart)
+        (is_same && fit > Fit::Apart).then_some(fit)
     };
-    let is_same = |name: &String| match (before.get(name), now.get(name)) {
-        // A model that is shown something else now keeps its name unless another one of before has it now.
+    let keeps_name = |name: &String| match (before.get(name), now.get(name)) {
+        // A model that is shown other inputs now keeps its name, unless the name fits another stored model.
         (Some(old), Some(new)) => {
-            decides(old) == decides(new)
+            reply_settings(old) == reply_settings(new)
                 && (fit(name, name).is_some() || !before.keys().any(|old| fit(old, name).is_some()))
         }
         _ => false,
     };
-    let mut moves: BTreeMap<String, String> = BTreeMap::new();
-    let mut found = BTreeSet::new();
-    for least in [Fit::Whole, Fit::Part, Fit::Unknown] {
-        for new in now.keys().filter(|new| !is_same(new)) {
-            let mut same = before.keys().filter(|old| {
-                let is_free = !moves.contains_key(*old) && !is_same(old);
-                *old != new && is_free && fit(old, new) >= Some(least)
+    let mut new_names: BTreeMap<String, String> = BTreeMap::new();
+    let mut taken = BTreeSet::new();
+    // Take the best fits first.
+    for min_fit in [Fit::Whole, Fit::Part, Fit::Unknown] {
+        for new in now.keys().filter(|new| !keeps_name(new)) {
+            if taken.contains(new) {
+                continue;
+            }
+            let renamed = before.keys().find(|old| {
+                let is_free = !new_names.contains_key(*old) && !keeps_name(old);
+                *old != new && is_free && fit(old, new) >= Some(min_fit)
             });
-            if !found.contains(new)
-                && let Some(old) = same.next()
-            {
-                moves.insert(old.clone(), new.clone());
-                found.insert(new.clone());
+            if let Some(old) = renamed {
+                new_names.insert(old.clone(), new.clone());
+                taken.insert(new.clone());
             }
         }
     }
     if settings == OtherSettings::Refused {
-        return moves;
+        return new_names;
     }
-    let displaced = now.keys().filter(|name| before.contains_key(*name));
-    for name in displaced.filter(|name| !is_same(name)) {
-        if moves.contains_key(name) {
+    // Stored models whose name another model has now.
+    for name in now
+        .keys()
+        .filter(|name| before.contains_key(*name) && !keeps_name(name))
+    {
+        if new_names.contains_key(name) {
             continue;
         }
-        let free = |candidate: &String| {
-            let stays = before.contains_key(candidate) && !moves.contains_key(candidate);
-            !stays && !now.contains_key(candidate) && !moves.values().any(|new| new == candidate)
+        let is_free = |candidate: &String| {
+            let is_kept = before.contains_key(candidate) && !new_names.contains_key(candidate);
+            !is_kept
+                && !now.contains_key(candidate)
+                && !new_names.values().any(|new| new == candidate)
         };
-        let first = std::iter::once(format!("{name} (before)"));
-        let mut candidates = first.chain((2..).map(|n| format!("{name} (before {n})")));
-        if let Some(new) = candidates.find(free) {
-            moves.insert(name.clone(), new);
+        let free_name = std::iter::once(format!("{name} (before)"))
+            .chain((2..=before.len() + now.len() + 2).map(|n| format!("{name} (before {n})")))
+            .find(is_free);
+        if let Some(new) = free_name {
+            new_names.insert(name.clone(), new);
         }
     }
-    moves
+    new_names
 }
 
-/// The models that this command neither asks nor lists. Without a file of models these are those that were left out before.
+/// Models that this command neither asks nor lists. Without a models file, only those that were left out before.
 fn left_out(
     manifest: &RunManifest,
     stored: &RunManifest,
     now: &BTreeMap<String, Value>,
-    moves: &BTreeMap<String, String>,
+    new_names: &BTreeMap<String, String>,
     settings: OtherSettings,
 ) -> BTreeSet<String> {
-    let known: BTreeSet<String> = manifest
+    let left_out_before: BTreeSet<String> = left_out_models(stored)
+        .iter()
+        .map(|name| new_names.get(name).unwrap_or(name).clone())
+        .chain(new_names.values().cloned())
+        .collect();
+    let has = |name: &str| {
+        now.contains_key(name) || manifest.models.iter().any(|model| model.name == name)
+    };
+    let is_listed = |name: &str| {
+        // Controls are asked together with the observer.
+        let asked = Control::from_model_name(name).map_or(name, |_| OBSERVER);
+        has(name) || has(asked)
+    };
+    manifest
         .columns
         .get("model")
         .into_iter()
         .flatten()
-        .map(|(name, _)| name.clone())
-        .collect();
-    let earlier: BTreeSet<String> = left_out_models(stored).into_iter().collect();
-    let earlier: BTreeSet<String> = earlier
-        .iter()
-        .map(|name| moves.get(name).unwrap_or(name).clone())
-        .chain(moves.values().cloned())
-        .collect();
-    let is_listed = |name: &str| {
-        // A control is asked with the observer.
-        let asked = Control::from_model_name(name).map_or(name, |_| OBSERVER);
-        let has = |name: &str| {
-            now.contains_key(name) || manifest.models.iter().any(|model| model.name == name)
-        };
-        has(name) || has(asked)
-    };
-    let is_left = |name: &String| {
-        let is_candidate = settings == OtherSettings::Allowed || earlier.contains(name);
-        is_candidate && !is_listed(name)
-    };
-    known.into_iter().filter(is_left).collect()
+        .map(|(name, _)| name)
+        .filter(|name| settings == OtherSettings::Allowed || left_out_before.contains(*name))
+        .filter(|name| !is_listed(name))
+        .cloned()
+        .collect()
 }
 
 /// Settings that determine the replies of a model: all but the address.
-fn decides(content: &Value) -> Value {
+fn reply_settings(content: &Value) -> Value {
     let mut content = content.clone();
     if let Some(fields) = content.as_object_mut() {
         fields.remove("--base-url");
@@ -212,30 +223,32 @@ fn decides(content: &Value) -> Value {
     content
 }
 
-/// The models that a report leaves out.
+/// Models that reports leave out.
 pub(crate) fn left_out_models(manifest: &RunManifest) -> Vec<String> {
-    let names = manifest.settings.get(LEFT_OUT).cloned();
-    names
+    manifest
+        .settings
+        .get(LEFT_OUT)
+        .cloned()
         .and_then(|names| serde_json::from_value(names).ok())
         .unwrap_or_default()
 }
 
-/// Gives the records the names that the models have now.
+/// Changes the model names in records to the current ones.
 pub(crate) fn rename<D>(records: &mut [Record<D>], manifest: &RunManifest) {
     let names = RecordedNames::from_manifest(manifest);
     for record in records {
-        let shown = names.shown(&record.model);
-        if shown != record.model {
-            record.model = shown.to_owned();
+        let current = names.shown(&record.model);
+        if current != record.model {
+            record.model = current.to_owned();
         }
     }
 }
 
-/// Gives trials the names that the models have now.
+/// Changes the model names in trials to the current ones.
 pub(crate) fn rename_trials<D: Detail>(trials: &mut Trials<D>, manifest: &RunManifest) {
     let names = RecordedNames::from_manifest(manifest);
     trials.rename(|model| {
-        let shown = names.shown(model);
-        (shown != model).then(|| shown.to_owned())
+        let current = names.shown(model);
+        (current != model).then(|| current.to_owned())
     });
 }

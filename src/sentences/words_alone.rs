@@ -1,4 +1,4 @@
-//! Sentences about models that are less often right with images than without: all together, or in one family.
+//! Sentences about models that are right less often with images than without: pooled, or in one family.
 
 use std::collections::BTreeSet;
 
@@ -15,88 +15,95 @@ use darkqa_score::pooled::PooledFinding;
 use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 
-/// The second side of a comparison of images with no images, if both are of the same models.
+/// Second side of a comparison if the same models answered with images and without.
 const WITHOUT: &str = "without images";
 
-/// Where the models are less often right than without images.
-pub(super) fn pooled(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
-    let shown = with_verdict(levels, Significance::Worse);
+/// Reports the levels at which the models are right less often with images than without. If none has a verdict, [`format_alone`]
+/// reports a loss that only the strict parsing detects.
+pub(super) fn pooled(findings: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
+    let shown = with_verdict(findings, Significance::Worse);
     let Some(largest) = PooledFinding::largest(&shown) else {
-        let worse = levels
+        let strict_only: Vec<&PooledFinding> = findings
             .iter()
             .copied()
-            .filter(|of| of.claim() == Claim::StrictOnly(Significance::Worse));
-        return format_alone(&worse.collect::<Vec<_>>(), unit);
+            .filter(|finding| finding.claim() == Claim::StrictOnly(Significance::Worse))
+            .collect();
+        return format_alone(&strict_only, unit);
     };
     let mut numbers = Numbers::new(unit);
     let who = match &largest.models[..] {
         [one] => format!("{one} is"),
         _ => "the models are".to_owned(),
     };
-    let below = second_side(largest);
-    let at = runs(&shown, levels);
+    let below = pooled_second_side(largest);
+    let at = runs(&shown, findings);
     let place = capitalised(largest.level.axis().unwrap_or(Axis::LIGHT).place);
     let text = format!("{place} {who} less often right than {below} at {at}.");
     let detail = detail(largest, &mut numbers, &format!("; at {}", largest.level));
     Some(numbers.sentence("below blind", Tone::Worse, text, detail))
 }
 
-/// The side with which a finding compares images.
-fn second_side(finding: &PooledFinding) -> String {
-    let mut models = finding.blind_models.iter();
-    match &finding.blind_models[..] {
-        _ if models.all(|model| finding.models.contains(model)) => WITHOUT.to_owned(),
+/// Second side of a pooled finding, in words.
+fn pooled_second_side(finding: &PooledFinding) -> String {
+    let blind_models = &finding.blind_models;
+    if blind_models
+        .iter()
+        .all(|model| finding.models.contains(model))
+    {
+        return WITHOUT.to_owned();
+    }
+    match &blind_models[..] {
         [other] => format!("{other} without images"),
         _ => "the models without images".to_owned(),
     }
 }
 
-/// Another model that images are compared with, as ` against NAME without images`; empty if each model is compared with itself.
+/// Second side of a pooled finding, as ` against NAME without images`; empty if each model is compared with itself.
 fn against(finding: &PooledFinding) -> String {
-    match &*second_side(finding) {
+    match &*pooled_second_side(finding) {
         WITHOUT => String::new(),
         other => format!(" against {other}"),
     }
 }
 
-/// The gain from untouched images, over all models.
+/// Reports the gain from untouched images, over all models.
 pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
-    let of = findings.pooled.iter().find(|finding| {
+    let finding = findings.pooled.iter().find(|finding| {
         finding.kind == PooledKind::Blind
             && finding.family.is_none()
             && finding.enhancer.is_none()
             && finding.level == AxisLevel::L0
     })?;
-    let mut numbers = Numbers::new(findings.unit);
-    if let Some(format) = format_alone(&[of], findings.unit) {
+    if let Some(format) = format_alone(&[finding], findings.unit) {
         return Some(format);
     }
+    let mut numbers = Numbers::new(findings.unit);
     let (with, without) = (
-        numbers.percent("with", of.strict.first),
-        numbers.percent("without", of.strict.second),
+        numbers.percent("with", finding.strict.first),
+        numbers.percent("without", finding.strict.second),
     );
-    let text = match of.claim() {
+    let text = match finding.claim() {
         Claim::Detected(Significance::Better) => format!(
             "At L0 images add {} points{}: {with} % with them, {without} % without.",
-            numbers.size("gain", of.strict.difference.value),
-            against(of)
+            numbers.size("gain", finding.strict.difference.value),
+            against(finding)
         ),
         Claim::Detected(_) => format!(
             "At L0 images cost {} points{}: {with} % with them, {without} % without.",
-            numbers.size("cost", of.strict.difference.value),
-            against(of)
+            numbers.size("cost", finding.strict.difference.value),
+            against(finding)
         ),
-        // That no verdict is possible is said for all topics together.
+        // One sentence for all topics reports that no verdict is possible.
         Claim::Impossible => return None,
         _ => format!(
             "No gain by images was detected at L0: {with} % with them, {without} % without."
         ),
     };
-    let detail = detail(of, &mut numbers, "");
-    Some(numbers.sentence("images", Tone::from(of.claim()), text, detail))
+    let detail = detail(finding, &mut numbers, "");
+    Some(numbers.sentence("images", Tone::from(finding.claim()), text, detail))
 }
 
-/// The comparisons by family of raw images of a variant with no images, of the models over which findings are pooled.
+/// Comparisons by family between raw images of a variant and no images, for the models whose findings are pooled.
 pub(super) fn by_family<'f>(
     findings: &'f Findings<'_>,
     variant: &KindReading,
@@ -116,65 +123,79 @@ pub(super) fn by_family<'f>(
         .collect()
 }
 
-/// The family in which a model is furthest below its score without images, and how many models do in that family. `all` are the
-/// comparisons of all models and families. `None` if the findings over all families (`pooled`) say it of the same single model.
+/// Reports the family and the model with the largest loss from images, and the number of models with a loss in that family. `all`
+/// holds the comparisons of all models and families. `None` without a loss, or if the findings over all families (`pooled`) already
+/// report a loss of this model alone.
 pub(super) fn in_a_family(
     all: &[&Comparison],
     pooled: &[&PooledFinding],
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let difference = |of: &Comparison| of.strict.paired.difference.value;
-    let below = all.iter().copied().filter(|of| is_below(of));
-    let most = below.min_by(|a, b| difference(a).total_cmp(&difference(b)))?;
-    let model = &most.first.model;
-    let said = with_verdict(pooled, Significance::Worse);
-    if said.iter().any(|finding| finding.models == [&**model]) {
+    let difference = |comparison: &Comparison| comparison.strict.paired.difference.value;
+    let worst = all
+        .iter()
+        .copied()
+        .filter(|comparison| is_below(comparison))
+        .min_by(|a, b| difference(a).total_cmp(&difference(b)))?;
+    let model = &worst.first.model;
+    if with_verdict(pooled, Significance::Worse)
+        .iter()
+        .any(|finding| finding.models == [&**model])
+    {
         return None;
     }
-    let of_family: Vec<&Comparison> = all
+    let in_family: Vec<&Comparison> = all
         .iter()
         .copied()
-        .filter(|of| of.family == most.family)
+        .filter(|comparison| comparison.family == worst.family)
         .collect();
-    let below: Vec<&Comparison> = of_family
+    let below: Vec<&Comparison> = in_family
         .iter()
         .copied()
-        .filter(|of| is_below(of))
+        .filter(|comparison| is_below(comparison))
         .collect();
-    let [models, fallen] = [&of_family, &below].map(|of| {
-        let models: BTreeSet<&str> = of.iter().map(|of| &*of.first.model).collect();
-        models.len()
-    });
+    let models_below = model_count(&below);
     let mut numbers = Numbers::new(unit);
-    let family = capitalised(family_name(most.family.as_ref()));
-    let text = if fallen == 1 {
-        let (than, at) = (than(most), levels_below(&of_family, most));
+    let family = capitalised(family_name(worst.family.as_ref()));
+    let text = if models_below == 1 {
+        let than = second_side(worst);
+        let at = levels_below(&in_family, worst);
         format!("{family}: {model} is less often right than {than} at {at}.")
     } else {
-        let than = if below.iter().all(|of| is_own(of)) {
+        let than = if below.iter().all(|comparison| is_own(comparison)) {
             WITHOUT
         } else {
             "a model without images"
         };
-        let fallen = numbers.count("fallen", fallen);
-        let models = numbers.count("models", models);
+        let fallen = numbers.count("fallen", models_below);
+        let models = numbers.count("models", model_count(&in_family));
         format!("{family}: {fallen} of {models} models are less often right than {than}.")
     };
-    let detail = comparison_detail(most, &mut numbers)?;
+    let detail = comparison_detail(worst, &mut numbers)?;
     Some(numbers.sentence("below blind", Tone::Worse, text, detail))
 }
 
+/// Number of different models on the first sides of comparisons.
+fn model_count(comparisons: &[&Comparison]) -> usize {
+    let models: BTreeSet<&str> = comparisons
+        .iter()
+        .map(|comparison| &*comparison.first.model)
+        .collect();
+    models.len()
+}
+
+/// True if images are detected to make a model worse than the second side.
 fn is_below(comparison: &Comparison) -> bool {
     comparison.claim() == Claim::Detected(Significance::Worse)
 }
 
-/// Whether a model is compared with its own replies.
+/// True if a model is compared with its own replies.
 fn is_own(comparison: &Comparison) -> bool {
     comparison.first.model == comparison.second.model
 }
 
-/// The second side of a comparison with no images, in words.
-fn than(comparison: &Comparison) -> String {
+/// Second side of a comparison of images with no images, in words.
+fn second_side(comparison: &Comparison) -> String {
     if is_own(comparison) {
         WITHOUT.to_owned()
     } else {
@@ -182,21 +203,35 @@ fn than(comparison: &Comparison) -> String {
     }
 }
 
-/// The levels at which a model is below the second side of a comparison. A model that was not asked without images is compared with
-/// every model that was: the levels are those of one of them.
-fn levels_below(of_family: &[&Comparison], of: &Comparison) -> String {
-    let pair = of_family.iter().copied().filter(|other| {
-        other.first.model == of.first.model && other.second.model == of.second.model
-    });
-    let sorted = |pair: Vec<&Comparison>| -> Vec<AxisLevel> {
-        let levels: BTreeSet<AxisLevel> = pair.iter().filter_map(|of| of.first.level).collect();
-        levels.into_iter().collect()
-    };
-    let below = sorted(pair.clone().filter(|of| is_below(of)).collect());
-    level_runs(&below, &sorted(pair.collect()))
+/// Levels at which the model of a comparison is below the second side. Only comparisons of the same two models count, because a model
+/// without blind replies is compared with every model that has some.
+fn levels_below(in_family: &[&Comparison], comparison: &Comparison) -> String {
+    let same_models: Vec<&Comparison> = in_family
+        .iter()
+        .copied()
+        .filter(|other| {
+            other.first.model == comparison.first.model
+                && other.second.model == comparison.second.model
+        })
+        .collect();
+    let below: Vec<&Comparison> = same_models
+        .iter()
+        .copied()
+        .filter(|comparison| is_below(comparison))
+        .collect();
+    level_runs(&levels(&below), &levels(&same_models))
 }
 
-/// Effect, interval, p and n of a comparison with no images.
+/// Levels of the first sides of comparisons, sorted and without duplicates.
+fn levels(comparisons: &[&Comparison]) -> Vec<AxisLevel> {
+    let levels: BTreeSet<AxisLevel> = comparisons
+        .iter()
+        .filter_map(|comparison| comparison.first.level)
+        .collect();
+    levels.into_iter().collect()
+}
+
+/// Effect, interval, p and n of a comparison of images with no images.
 fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<String> {
     let (model, level) = (&comparison.first.model, comparison.first.level?);
     let against = if is_own(comparison) {
@@ -204,10 +239,10 @@ fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<S
     } else {
         format!(" against {}", comparison.second.model)
     };
-    let paired = &comparison.strict.paired;
+    let tested = &comparison.strict;
+    let paired = &tested.paired;
     numbers.at(&level);
     let difference = numbers.difference("", paired.difference);
-    let tested = &comparison.strict;
     let p = numbers.p("p", tested.p_report.unwrap_or(tested.holm));
     let n = numbers.count("n", paired.difference.n);
     let clusters = numbers.clusters(paired.clusters);

@@ -1,16 +1,16 @@
-//! Names and numbers as text: [`light`], [`family`], [`percent`] and others, and [`words`] for any cell.
+//! Text formatting of names and numbers in reports: [`light`], [`family`], [`percent`] and others; [`words`] formats any table cell.
 
 use crate::text::table::{ColumnKind, TableCell};
 use crate::types::{EnhancerName, Family, KindReading};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::subject::Subject;
 
-/// A variant in words, with its enhancer.
+/// Title of a variant and its enhancer, such as `with noise + lift`.
 pub(crate) fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
     light_with(variant, enhancer.map(EnhancerName::as_str))
 }
 
-/// A variant in words, with a name for its enhancer.
+/// Title of a variant and an enhancer given by any display name. The group of runs comes last.
 pub(crate) fn light_with(variant: &KindReading, enhancer: Option<&str>) -> String {
     let (title, group) = (variant.title(), variant.group_suffix());
     match enhancer {
@@ -19,7 +19,7 @@ pub(crate) fn light_with(variant: &KindReading, enhancer: Option<&str>) -> Strin
     }
 }
 
-/// A family in words: the paper's names for its five families, other families by their own names.
+/// Display name of a family: the paper's name for its five families, the family's own name for others.
 pub(crate) fn family(family: Option<&Family>) -> &str {
     match family {
         None => "all families",
@@ -32,47 +32,47 @@ pub(crate) fn family(family: Option<&Family>) -> &str {
     }
 }
 
-/// A subject in words: its model and condition.
+/// Display name of a subject: its model and condition.
 pub(crate) fn name(subject: &Subject) -> String {
     format!("{} {}", subject.model, subject.condition())
 }
 
-/// A number of things: `1 pair`, `2 pairs`.
+/// A count with its noun; the plural adds an s: `1 pair`, `2 pairs`.
 pub(crate) fn counted(number: usize, noun: &str) -> String {
     plural(number, noun, &format!("{noun}s"))
 }
 
-/// A number of things by its two words: `1 reply`, `2 replies`.
+/// A count with its noun, given in singular and plural: `1 reply`, `2 replies`.
 pub(crate) fn plural(number: usize, one: &str, several: &str) -> String {
     format!("{number} {}", if number == 1 { one } else { several })
 }
 
-/// A name with its middle left out, if it is longer than `width`.
+/// Shortens a name to `width` characters by replacing its middle with `…`. Shorter names are unchanged.
 pub(crate) fn shortened(name: &str, width: usize) -> String {
-    let letters: Vec<char> = name.chars().collect();
-    if letters.len() <= width {
+    let chars: Vec<char> = name.chars().collect();
+    if chars.len() <= width {
         return name.to_owned();
     }
     let (head, tail) = (width.div_ceil(2) - 1, width / 2);
-    let middle = letters.len() - tail;
-    letters[..head]
+    let tail_start = chars.len() - tail;
+    chars[..head]
         .iter()
         .chain(&['…'])
-        .chain(&letters[middle..])
+        .chain(&chars[tail_start..])
         .collect()
 }
 
-/// A share in percent, with one decimal.
+/// A share (0 to 1) in percent, with one decimal and no percent sign.
 pub(crate) fn percent(share: f64) -> String {
     format!("{:.1}", 100.0 * share).replace('-', "−")
 }
 
-/// Whether a condition or a light in words, as `L3-noise+lift` or `with noise + lift`, is enhanced by an enhancer.
+/// True if a condition (`L3-noise+lift`) or the title of a variant (`with noise + lift`) names this enhancer.
 pub(crate) fn names_enhancer(text: &str, enhancer: &str) -> bool {
     text.split([' ', '+']).any(|word| word == enhancer)
 }
 
-/// A difference of shares in percentage points, with its sign and one decimal.
+/// A difference of shares in percentage points, with its sign and one decimal; zero has no sign.
 pub(crate) fn points(difference: f64) -> String {
     let text = format!("{:+.1}", 100.0 * difference);
     match &*text {
@@ -81,12 +81,12 @@ pub(crate) fn points(difference: f64) -> String {
     }
 }
 
-/// Both ends of the interval of a difference in percentage points, as `−1.2, +5.0`.
+/// Interval of a difference in percentage points, such as `−1.2, +5.0`.
 pub(crate) fn ends_in_points(difference: Estimate) -> String {
     format!("{}, {}", points(difference.low), points(difference.high))
 }
 
-/// A p-value with three decimals, or "< 0.001".
+/// A p-value with three decimals, or `< 0.001`.
 pub(crate) fn p(value: f64) -> String {
     if value < 0.001 {
         "< 0.001".to_owned()
@@ -95,7 +95,7 @@ pub(crate) fn p(value: f64) -> String {
     }
 }
 
-/// An interval of exposure drops in EV; "–" if all of it lies beyond the darkest level.
+/// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if even its lower end is infinite, that is, beyond the darkest level.
 pub(crate) fn reach(low: f64, high: f64, darkest: f64) -> String {
     if low.is_infinite() {
         "–".to_owned()
@@ -104,7 +104,7 @@ pub(crate) fn reach(low: f64, high: f64, darkest: f64) -> String {
     }
 }
 
-/// An exposure drop in EV; "> " and the darkest level asked if it lies beyond that.
+/// An exposure drop in EV with one decimal; if infinite, `>` and the exposure drop of the darkest level asked.
 pub(crate) fn stops(value: f64, darkest: f64) -> String {
     if value.is_infinite() {
         format!("> {darkest}")
@@ -113,13 +113,13 @@ pub(crate) fn stops(value: f64, darkest: f64) -> String {
     }
 }
 
-/// A share in percent with its interval, as `96.4 [93.0, 98.2]`.
+/// A share in percent with its interval, such as `96.4 [93.0, 98.2]`.
 pub(crate) fn with_interval(share: Estimate) -> String {
     let [value, low, high] = [share.value, share.low, share.high].map(percent);
     format!("{value} [{low}, {high}]")
 }
 
-/// The estimate of a cell whose interval does not stand in the same text: accuracies and scores.
+/// Estimate of an accuracy, a score or an effect, for which [`words`] leaves out the interval; `None` for other cells.
 pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
     match (kind, cell) {
         (
@@ -134,37 +134,39 @@ pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
     }
 }
 
-/// How far the widest of some intervals reaches down and up, in points, as `−7.7 +7.1`; empty without any.
+/// Largest distances from an estimate down and up to the ends of its interval, in percentage points, such as `−7.7 +7.1`; empty
+/// without estimates.
 pub(crate) fn reach_of(shares: impl Iterator<Item = Estimate>) -> String {
-    let widest = shares.fold(None, |widest: Option<[f64; 2]>, share| {
-        let [down, up] = widest.unwrap_or_default();
-        Some([
-            down.max(share.value - share.low),
-            up.max(share.high - share.value),
-        ])
-    });
-    widest.map_or(String::new(), |reach| {
-        let [down, up] = reach.map(percent);
-        format!("−{down} +{up}")
-            .replace("−0.0", "0.0")
-            .replace("+0.0", "0.0")
-    })
+    shares
+        .map(|share| [share.value - share.low, share.high - share.value])
+        .fold(None, |widest: Option<[f64; 2]>, [down, up]| {
+            let [widest_down, widest_up] = widest.unwrap_or_default();
+            Some([widest_down.max(down), widest_up.max(up)])
+        })
+        .map_or(String::new(), |widest| {
+            let [down, up] = widest.map(percent);
+            format!("−{down} +{up}")
+                .replace("−0.0", "0.0")
+                .replace("+0.0", "0.0")
+        })
 }
 
-/// Both ends of an interval in percent, as `93.0–98.2`.
+/// Interval of a share in percent, such as `93.0–98.2`.
 pub(crate) fn ends(share: Estimate) -> String {
     format!("{}–{}", percent(share.low), percent(share.high))
 }
 
-/// A cell as text for people.
+/// Formats a table cell, by the kind of its column.
 pub(crate) fn words(kind: ColumnKind, cell: &TableCell) -> String {
     match cell {
         TableCell::Blank | TableCell::Absent => String::new(),
         TableCell::Missing => "–".to_owned(),
         TableCell::Text(text) | TableCell::Unknown(text) => text.clone(),
         TableCell::Count(count) => count.to_string(),
-        TableCell::Number(value) => number(kind, *value),
-        TableCell::Estimate(number) | TableCell::Below(number) => estimate(kind, *number),
+        TableCell::Number(value) => format_number(kind, *value),
+        TableCell::Estimate(estimate) | TableCell::Below(estimate) => {
+            format_estimate(kind, *estimate)
+        }
         TableCell::Guess(share) | TableCell::Strict(share, _) | TableCell::Changed(share, None) => {
             percent(share.value)
         }
@@ -173,14 +175,14 @@ pub(crate) fn words(kind: ColumnKind, cell: &TableCell) -> String {
         }
         TableCell::Effect(difference, _) => points(difference.value),
         TableCell::Threshold(threshold, darkest) => {
-            let reach = reach(threshold.low, threshold.high, *darkest);
-            format!("{} [{reach}]", stops(threshold.value, *darkest))
+            let range = reach(threshold.low, threshold.high, *darkest);
+            format!("{} [{range}]", stops(threshold.value, *darkest))
         }
         TableCell::Significance(significance) => significance.word().to_owned(),
     }
 }
 
-fn number(kind: ColumnKind, number: f64) -> String {
+fn format_number(kind: ColumnKind, number: f64) -> String {
     match kind {
         ColumnKind::P => p(number),
         ColumnKind::Percent | ColumnKind::Share | ColumnKind::Accuracy => percent(number),
@@ -189,8 +191,10 @@ fn number(kind: ColumnKind, number: f64) -> String {
     }
 }
 
-fn estimate(kind: ColumnKind, estimate: Estimate) -> String {
-    let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(|x| number(kind, x));
+/// An estimate with its interval, or without in columns of kind `Percent` and `Accuracy`.
+fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
+    let [value, low, high] =
+        [estimate.value, estimate.low, estimate.high].map(|number| format_number(kind, number));
     match kind {
         ColumnKind::Percent | ColumnKind::Accuracy => value,
         _ => format!("{value} [{low}, {high}]"),

@@ -1,67 +1,73 @@
-//! The wait that a server states in words: [`wait_in_words`].
+//! Parser for the wait in a server's error message: [`wait_in_words`].
 
 use std::sync::LazyLock;
 
 use regex::Regex;
 use tokio::time::Duration;
 
-/// Words of a sentence that is about a wait.
-const ABOUT_WAITS: [&str; 4] = ["try again", "retry", "wait", "available"];
+/// Phrases that mark a sentence as being about a wait, in lower case.
+const WAIT_PHRASES: [&str; 4] = ["try again", "retry", "wait", "available"];
 
-/// A duration behind “in”, “after” or “for”, as `1h2m3.5s`, `250ms`, `6 seconds` or `1 minute and 3 seconds`.
+/// Matches “in”, “after” or “for” and the duration that follows, such as `1h2m3.5s`, `250ms`, `6 seconds` or
+/// `1 minute and 3 seconds`. Group 1 is the duration.
 static DURATION: LazyLock<Regex> = LazyLock::new(|| {
     let pattern = r"(?i)\b(?:in|after|for)\s+(?:about\s+)?((?:\d+(?:\.\d+)?\s*(?:milliseconds?|ms|minutes?|mins?|hours?|seconds?|secs?|h|m|s)[,\s]*(?:and\s+)?)+)";
     Regex::new(pattern).unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
 });
 
-/// One number with its unit.
-static PART: LazyLock<Regex> = LazyLock::new(|| {
+/// Matches one number and its unit. Group 1 is the number, group 2 the unit.
+static NUMBER_AND_UNIT: LazyLock<Regex> = LazyLock::new(|| {
     let pattern =
         r"(?i)(\d+(?:\.\d+)?)\s*(milliseconds?|ms|minutes?|mins?|hours?|seconds?|secs?|h|m|s)";
     Regex::new(pattern).unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
 });
 
-/// The end of a sentence; the point of `6.5s` is none.
+/// Matches the end of a sentence, but not the decimal point in `6.5s`.
 static SENTENCE_END: LazyLock<Regex> = LazyLock::new(|| {
     Regex::new(r"[.!?]\s|\n").unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
 });
 
-/// The longest wait in the sentences of a text that are about one, as in “Please try again in 7m12s.”
+/// Returns the longest wait stated in a text, such as “Please try again in 7m12s.”
+///
+/// Only sentences with one of [`WAIT_PHRASES`] are searched. `None` if no wait is found.
 pub(in crate::ask) fn wait_in_words(text: &str) -> Option<Duration> {
     SENTENCE_END
         .split(text)
         .filter(|sentence| {
             let sentence = sentence.to_lowercase();
-            ABOUT_WAITS.iter().any(|words| sentence.contains(words))
+            WAIT_PHRASES.iter().any(|phrase| sentence.contains(phrase))
         })
         .flat_map(|sentence| {
-            DURATION.captures_iter(sentence).filter_map(|found| {
-                let found = found.get(1)?;
-                // “in 2 months” is not two minutes.
-                let behind = sentence[found.end()..].chars().next();
-                let is_cut = !found.as_str().ends_with(char::is_whitespace)
-                    && behind.is_some_and(char::is_alphabetic);
-                (!is_cut).then(|| duration(found.as_str())).flatten()
+            DURATION.captures_iter(sentence).filter_map(|captures| {
+                let found = captures.get(1)?;
+                // Skip a match that ends inside a word: “in 2 months” is not two minutes.
+                let next_char = sentence[found.end()..].chars().next();
+                let ends_inside_word = !found.as_str().ends_with(char::is_whitespace)
+                    && next_char.is_some_and(char::is_alphabetic);
+                (!ends_inside_word)
+                    .then(|| parse_duration(found.as_str()))
+                    .flatten()
             })
         })
         .max()
 }
 
-/// The sum of all parts of a duration; `None` if it is zero or too long.
-fn duration(text: &str) -> Option<Duration> {
-    let seconds: f64 = PART
+/// Adds up the numbers with units in a text. `None` if the sum is zero or does not fit into a [`Duration`].
+fn parse_duration(text: &str) -> Option<Duration> {
+    let seconds: f64 = NUMBER_AND_UNIT
         .captures_iter(text)
         .filter_map(|part| {
             let number: f64 = part[1].parse().ok()?;
             let unit = part[2].to_lowercase();
-            Some(number * seconds_of(&unit))
+            Some(number * seconds_per(&unit))
         })
         .sum();
     let wait = Duration::try_from_secs_f64(seconds).ok()?;
     (!wait.is_zero()).then_some(wait)
 }
 
-fn seconds_of(unit: &str) -> f64 {
+/// Length of a unit in seconds. The unit is in lower case and matched by [`NUMBER_AND_UNIT`].
+fn seconds_per(unit: &str) -> f64 {
     match unit {
         "ms" | "millisecond" | "milliseconds" => 1e-3,
         unit if unit.starts_with('h') => 3600.0,
@@ -75,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn waits_of_every_form_are_read() {
+    fn finds_waits_in_every_form() {
         for (text, seconds) in [
             (
                 "Rate limit reached for m … (TPM): Limit 30000, Used 29000, Requested 2000. Please try again in 2s. Visit x.",
@@ -98,6 +104,10 @@ mod tests {
                 "{text}: {found:?}"
             );
         }
+    }
+
+    #[test]
+    fn ignores_texts_without_a_wait() {
         for text in [
             "",
             "Limit 30000 in 60 s was used up.",

@@ -1,49 +1,55 @@
-//! The least value of a function of two numbers, without its derivatives: [`least`].
+//! Derivative-free minimization of a function of two variables: [`least`].
 
-/// The most steps of a search (chosen; the fits of read noise take about 80).
-const MOST_STEPS: usize = 600;
-/// A search ends when the simplex is smaller than this in both numbers (chosen: far below the errors of the fits).
-const SMALLEST: f64 = 1e-7;
+/// Maximum number of steps (chosen; the fits of read noise take about 80).
+const MAX_STEPS: usize = 600;
+/// Convergence tolerance: the search ends once the simplex is smaller than this in both variables (chosen: far below the errors of the
+/// fits).
+const TOLERANCE: f64 = 1e-7;
 
-/// Where a search begins.
+/// The initial simplex of a search.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
+    /// The first vertex.
     pub(super) at: [f64; 2],
-    /// Distance of the second and third corner of the simplex.
+    /// Distance from the first vertex to the second along the first axis, and to the third along the second axis.
     pub(super) step: [f64; 2],
 }
 
-type Corner = ([f64; 2], f64);
+/// A point and the value of the function there.
+type Vertex = ([f64; 2], f64);
 
-/// The place of the least value near a start, and the value, by the simplex method of Nelder and Mead (1965, The Computer Journal
-/// 7:308). An infinite value keeps the search away from a place.
-pub(super) fn least(start: Start, function: &impl Fn([f64; 2]) -> f64) -> Corner {
-    let corner = |at: [f64; 2]| (at, function(at));
+/// Finds a minimum of a function near a start by the simplex method of Nelder and Mead (1965, The Computer Journal 7:308). Returns
+/// the point and the value there.
+///
+/// The function may return infinity to exclude a point from the search.
+pub(super) fn least(start: Start, function: &impl Fn([f64; 2]) -> f64) -> Vertex {
+    let evaluate = |at: [f64; 2]| (at, function(at));
     let [x, y] = start.at;
     let mut simplex = [
-        corner([x, y]),
-        corner([x + start.step[0], y]),
-        corner([x, y + start.step[1]]),
+        evaluate([x, y]),
+        evaluate([x + start.step[0], y]),
+        evaluate([x, y + start.step[1]]),
     ];
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         simplex.sort_by(|a, b| a.1.total_cmp(&b.1));
         let [best, middle, worst] = simplex;
         let extent = |i: usize| {
             let sides = [middle.0[i] - best.0[i], worst.0[i] - best.0[i]];
             sides[0].abs().max(sides[1].abs())
         };
-        if extent(0).max(extent(1)) < SMALLEST {
+        if extent(0).max(extent(1)) < TOLERANCE {
             break;
         }
-        let centre: [f64; 2] = std::array::from_fn(|i| best.0[i].midpoint(middle.0[i]));
-        let beyond = |t: f64| {
-            corner(std::array::from_fn(|i| {
-                centre[i] + t * (worst.0[i] - centre[i])
+        let centroid: [f64; 2] = std::array::from_fn(|i| best.0[i].midpoint(middle.0[i]));
+        // The centroid is at t = 0, the worst vertex at t = 1.
+        let along_line = |t: f64| {
+            evaluate(std::array::from_fn(|i| {
+                centroid[i] + t * (worst.0[i] - centroid[i])
             }))
         };
-        let reflected = beyond(-1.0);
+        let reflected = along_line(-1.0);
         simplex[2] = if reflected.1 < best.1 {
-            let expanded = beyond(-2.0);
+            let expanded = along_line(-2.0);
             if expanded.1 < reflected.1 {
                 expanded
             } else {
@@ -52,14 +58,14 @@ pub(super) fn least(start: Start, function: &impl Fn([f64; 2]) -> f64) -> Corner
         } else if reflected.1 < middle.1 {
             reflected
         } else {
-            let contracted = beyond(if reflected.1 < worst.1 { -0.5 } else { 0.5 });
+            let contracted = along_line(if reflected.1 < worst.1 { -0.5 } else { 0.5 });
             if contracted.1 < reflected.1.min(worst.1) {
                 contracted
             } else {
-                let halfway =
-                    |at: [f64; 2]| corner(std::array::from_fn(|i| best.0[i].midpoint(at[i])));
-                simplex[1] = halfway(middle.0);
-                halfway(worst.0)
+                let shrunk =
+                    |at: [f64; 2]| evaluate(std::array::from_fn(|i| best.0[i].midpoint(at[i])));
+                simplex[1] = shrunk(middle.0);
+                shrunk(worst.0)
             }
         };
     }
@@ -72,8 +78,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_least_value_is_found() {
-        // Rosenbrock's valley, with its least value 0 at (1, 1).
+    fn finds_the_minimum_and_stays_out_of_excluded_points() {
+        // Rosenbrock's valley has its minimum, 0, at (1, 1).
         let valley = |[x, y]: [f64; 2]| (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2);
         let start = Start {
             at: [-1.2, 1.0],
@@ -82,7 +88,7 @@ mod tests {
         let ([x, y], value) = least(start, &valley);
         assert!((x - 1.0).abs() < 1e-5 && (y - 1.0).abs() < 1e-5, "{x}, {y}");
         assert!(value < 1e-10);
-        // A wall keeps it out.
+        // With x > 0.5 excluded, the search ends at the boundary.
         let walled = |[x, y]: [f64; 2]| {
             if x > 0.5 {
                 f64::INFINITY

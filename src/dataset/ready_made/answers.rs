@@ -1,26 +1,26 @@
-//! The meaning of a set's answers: [`Reading`], and the one that fits all rows: [`one_reading`].
+//! Interpretation of the answers in a ready-made set: [`Reading`], and [`one_reading`] to find the one that fits all rows.
 
 use super::offered::{Offered, Origin, one_line};
 use crate::types::Choices;
 use crate::types::question::letter;
 
-/// A way to read an answer.
+/// How an answer identifies a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Reading {
-    /// The letter of a choice, as `A`, `(a)` or `A.`; a lower-case letter alone is none.
+    /// Letter of the choice: `A`, `(a)` or `A.`. A lower-case letter needs a bracket, full stop or colon.
     Letter,
-    /// The text of a choice; letter case, space around it and a full stop at its end do not matter.
+    /// Text of the choice, ignoring letter case, surrounding space and a final full stop.
     Text,
-    /// The number of a choice, counted from 0.
+    /// Number of the choice, counted from 0.
     Index0,
-    /// The number of a choice, counted from 1.
+    /// Number of the choice, counted from 1.
     Index1,
 }
 
 impl Reading {
     pub(super) const ALL: [Self; 4] = [Self::Letter, Self::Text, Self::Index0, Self::Index1];
 
-    /// The name in `--map` and messages.
+    /// Name in `--map` and messages.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Letter => "letter",
@@ -34,20 +34,23 @@ impl Reading {
         Self::ALL.into_iter().find(|reading| reading.name() == name)
     }
 
-    /// The index of the choice that an answer means; `None` if it means none.
+    /// Index of the choice that the answer identifies; `None` if it identifies none.
     pub(super) fn truth(self, answer: &str, options: &Offered) -> Option<usize> {
-        let at = |wanted: usize| options.places.iter().position(|place| *place == wanted);
+        let option_at = |wanted: usize| options.places.iter().position(|place| *place == wanted);
         let answer = answer.trim();
         match self {
             Self::Letter => {
                 let bare = answer.trim_matches(['(', ')', '.', ':', ' ']);
                 let mut chars = bare.chars();
-                let (Some(name), None) = (chars.next(), chars.next()) else {
+                let (Some(character), None) = (chars.next(), chars.next()) else {
                     return None;
                 };
-                let is_marked = name.is_ascii_uppercase() || bare.len() < answer.len();
-                let mut letters = (0..Choices::MOST).filter(|_| is_marked);
-                at(letters.find(|&index| letter(index) == name.to_ascii_uppercase())?)
+                let is_bare = bare.len() == answer.len();
+                if is_bare && !character.is_ascii_uppercase() {
+                    return None;
+                }
+                let upper = character.to_ascii_uppercase();
+                option_at((0..Choices::MOST).find(|&index| letter(index) == upper)?)
             }
             Self::Text => {
                 let answer = folded(answer);
@@ -56,15 +59,13 @@ impl Reading {
                     .iter()
                     .position(|option| folded(option) == answer)
             }
-            Self::Index0 => at(number(answer)?),
-            Self::Index1 => at(number(answer)?.checked_sub(1)?),
+            Self::Index0 => option_at(number(answer)?),
+            Self::Index1 => option_at(number(answer)?.checked_sub(1)?),
         }
     }
-}
 
-impl Reading {
-    /// The index of the choice that an answer means, where the user names no reading: numbers reveal nothing about options with letters
-    /// in the text of a question.
+    /// Like [`Self::truth`], for a reading that the user did not choose: numbers identify none of the options that a question's text
+    /// lists by letter.
     pub(super) fn by_rule(self, answer: &str, options: &Offered) -> Option<usize> {
         let is_number = matches!(self, Self::Index0 | Self::Index1);
         if is_number && options.origin == Origin::Question {
@@ -74,56 +75,62 @@ impl Reading {
     }
 }
 
-/// A text on one line, without letter case, space around it and a full stop at its end.
+/// Normalizes a text for comparison: one line in lower case, without surrounding space and full stops at its end.
 pub(super) fn folded(text: &str) -> String {
     let text = one_line(text);
     text.trim_end_matches('.').trim_end().to_lowercase()
 }
 
-/// The whole number in a text, as `3` or `3.0`.
+/// Parses a whole number, written as `3` or `3.0`.
 fn number(text: &str) -> Option<usize> {
     let digits = text.strip_suffix(".0").unwrap_or(text);
     let is_number = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
     is_number.then(|| digits.parse().ok()).flatten()
 }
 
-/// An answer and the options of its row.
+/// An answer, with the options of its row.
 pub(super) type AnswerOf<'a> = (&'a str, &'a Offered);
 
-/// How the answers of all rows are read.
+/// Result of the search for one reading of all answers.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum OneReading {
-    /// By this reading, which fits all rows.
+    /// This reading fits all rows.
     Fits(Reading),
-    /// No reading fits all rows; the one that fits most of them, and the rows that it does not fit.
+    /// No reading fits all rows: the one that fits most, and the indices of the rows that it does not fit.
     None { best: Reading, unfit: Vec<usize> },
-    /// Two readings fit all rows, and differ in this row.
+    /// Two readings fit all rows, but identify different choices in this row.
     Ambiguous { readings: [Reading; 2], row: usize },
 }
 
-/// The reading that fits the answers of all rows. Several that agree in every row are one.
+/// Finds the reading that fits the answers of all rows; the first of several that agree in every row.
 pub(super) fn one_reading(rows: &[AnswerOf<'_>]) -> OneReading {
-    let unfit = Reading::ALL.map(|reading| {
-        let unfit =
-            (0..rows.len()).filter(|&row| reading.by_rule(rows[row].0, rows[row].1).is_none());
-        (reading, unfit.collect::<Vec<usize>>())
+    let unfit_rows = Reading::ALL.map(|reading| {
+        let unfit: Vec<usize> = rows
+            .iter()
+            .enumerate()
+            .filter(|(_, (answer, options))| reading.by_rule(answer, options).is_none())
+            .map(|(row, _)| row)
+            .collect();
+        (reading, unfit)
     });
-    let fitting: Vec<Reading> = unfit
+    let fitting: Vec<Reading> = unfit_rows
         .iter()
         .filter(|(_, unfit)| unfit.is_empty())
         .map(|(reading, _)| *reading)
         .collect();
     let Some((&first, others)) = fitting.split_first() else {
-        let best = unfit
+        let (best, unfit) = unfit_rows
             .into_iter()
-            .min_by_key(|(reading, unfit)| (unfit.len(), *reading));
-        let (best, unfit) = best.unwrap_or((Reading::Text, Vec::new()));
+            .min_by_key(|(reading, unfit)| (unfit.len(), *reading))
+            .unwrap_or((Reading::Text, Vec::new()));
         return OneReading::None { best, unfit };
     };
     for (row, (answer, options)) in rows.iter().enumerate() {
-        let differs =
-            |other: &&Reading| other.by_rule(answer, options) != first.by_rule(answer, options);
-        if let Some(&other) = others.iter().find(differs) {
+        let choice = first.by_rule(answer, options);
+        let differing = others
+            .iter()
+            .find(|other| other.by_rule(answer, options) != choice);
+        if let Some(&other) = differing {
             let readings = [first, other];
             return OneReading::Ambiguous { readings, row };
         }
@@ -131,7 +138,7 @@ pub(super) fn one_reading(rows: &[AnswerOf<'_>]) -> OneReading {
     OneReading::Fits(first)
 }
 
-/// The choice of a yes/no question that an answer means: 0 is yes, 1 is no.
+/// Index of the choice of a yes/no question that the answer identifies: 0 for yes, 1 for no.
 pub(super) fn yes_or_no(answer: &str) -> Option<usize> {
     match &*folded(answer) {
         "yes" | "true" => Some(0),
@@ -140,7 +147,7 @@ pub(super) fn yes_or_no(answer: &str) -> Option<usize> {
     }
 }
 
-/// The choice of a yes/no question that a digit means: 1 is yes (0), 0 is no (1).
+/// Index of the choice of a yes/no question that a digit identifies: 0 (yes) for the digit 1, 1 (no) for the digit 0.
 pub(super) fn digit(answer: &str) -> Option<usize> {
     match number(answer.trim()) {
         Some(1) => Some(0),
@@ -149,7 +156,7 @@ pub(super) fn digit(answer: &str) -> Option<usize> {
     }
 }
 
-/// Whether a question begins with a word that only yes or no can answer.
+/// True if the question begins with a verb that asks for yes or no.
 pub(super) fn asks_yes_or_no(question: &str) -> bool {
     const VERBS: [&str; 15] = [
         "is", "are", "was", "were", "do", "does", "did", "can", "could", "has", "have", "had",
@@ -172,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn letters_and_numbers_name_columns_also_behind_an_empty_one() {
+    fn letters_and_numbers_count_empty_columns() {
         let offered = Offered {
             texts: ["red", "blue"].map(str::to_owned).into(),
             places: vec![0, 2],
@@ -186,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn each_reading_takes_its_own_forms() {
+    fn each_reading_accepts_its_own_forms() {
         let texts = options(&["Red", "2", "blue."]);
         for (answer, letter, text, index0, index1) in [
             ("A", Some(0), None, None, None),
@@ -208,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn one_reading_fits_all_rows_or_none_is_taken() {
+    fn one_reading_must_fit_all_rows() {
         let (two, letters) = (options(&["x", "y", "z"]), options(&["B", "A"]));
         let rows: [AnswerOf<'_>; 2] = [("1", &two), ("0", &two)];
         assert_eq!(one_reading(&rows), OneReading::Fits(Reading::Index0));
@@ -233,7 +240,7 @@ mod tests {
                 unfit
             }
         );
-        // Readings that agree in every row are no problem.
+        // Readings that agree in every row are not ambiguous.
         let same = options(&["A", "B"]);
         assert_eq!(
             one_reading(&[("B", &same)]),
@@ -242,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_question_of_how_many_is_no_question_of_yes_or_no() {
+    fn yes_or_no_questions_and_answers_are_recognized() {
         assert!(asks_yes_or_no("Is it red?") && asks_yes_or_no(" are they?"));
         assert!(!asks_yes_or_no("How many?") && !asks_yes_or_no("Issue?"));
         assert_eq!(

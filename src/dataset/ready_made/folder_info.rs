@@ -1,4 +1,4 @@
-//! The `dataset.json` beside the rows of a set: [`FolderInfo`].
+//! The optional `dataset.json` of a ready-made data set: [`FolderInfo`].
 
 use std::path::Path;
 
@@ -7,17 +7,19 @@ use super::map::Map;
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// The `dataset.json` of a folder with a set.
+/// The fields that are read from `dataset.json`.
 #[derive(Debug, Default)]
 pub(super) struct FolderInfo {
+    /// Name of the data set; empty if none is given.
     pub(super) name: String,
+    /// Column mapping; `None` if none is given.
     pub(super) map: Option<Map>,
 }
 
 impl FolderInfo {
     const FILE: &str = "dataset.json";
 
-    /// Reads the file of a folder; empty without one.
+    /// Reads `dataset.json` in a folder; the default if it does not exist.
     pub(super) fn in_folder(folder: &Path) -> Result<Self> {
         let path = folder.join(Self::FILE);
         if !path.is_file() {
@@ -26,7 +28,7 @@ impl FolderInfo {
         Self::read(&path, &reading::json(&path)?)
     }
 
-    /// Reads the file at the top of a ZIP file.
+    /// Reads `dataset.json` at the top level of a ZIP file; the default if it does not exist.
     pub(super) fn in_archive(archive: &Archive) -> Result<Self> {
         if !archive.has(Self::FILE) {
             return Ok(Self::default());
@@ -45,12 +47,14 @@ impl FolderInfo {
     }
 
     fn read(path: &Path, info: &serde_json::Value) -> Result<Self> {
-        let text = |key: &str| info.get(key).and_then(serde_json::Value::as_str);
-        let map = text("map").map(str::parse).transpose();
-        let wrong = |problem: String| Error::data(path.display(), format_args!("map: {problem}"));
+        let field = |key: &str| info.get(key).and_then(serde_json::Value::as_str);
+        let map = field("map")
+            .map(str::parse::<Map>)
+            .transpose()
+            .map_err(|problem| Error::data(path.display(), format_args!("map: {problem}")))?;
         Ok(Self {
-            name: text("name").unwrap_or_default().to_owned(),
-            map: map.map_err(wrong)?,
+            name: field("name").unwrap_or_default().to_owned(),
+            map,
         })
     }
 }

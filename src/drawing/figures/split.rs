@@ -1,45 +1,52 @@
-//! Panels of few lines, from panels with any number: [`split`].
+//! [`split`]: divides panels with many curves into several.
 
 use crate::drawing::chart::{Panel, PanelContent, PlotLine};
 
-/// Most curves of a panel; chosen: as many as there are colours that everybody can tell apart.
+/// Maximum number of curves per panel (chosen): the number of colours that everybody can tell apart.
 const MAX_CURVES: usize = 6;
 
-/// Panels of at most [`MAX_CURVES`] curves each. A reference line is in each panel that has the curve of its model, or in all.
+/// Divides panels so that each has at most [`MAX_CURVES`] curves. A line that is no curve stays with the curves of its model; without
+/// such curves, it appears in every part.
 pub(crate) fn split(panels: Vec<Panel>) -> Vec<Panel> {
     panels.into_iter().flat_map(split_panel).collect()
 }
 
 fn split_panel(panel: Panel) -> Vec<Panel> {
-    let is_curve = |line: &PlotLine| matches!(line.content, PanelContent::Curve(_));
     let count = panel.lines.iter().filter(|line| is_curve(line)).count();
     if count <= MAX_CURVES {
         return vec![panel];
     }
-    let (curves, others): (Vec<PlotLine>, Vec<PlotLine>) =
+    let (curves, other_lines): (Vec<PlotLine>, Vec<PlotLine>) =
         panel.lines.into_iter().partition(is_curve);
-    let has_curve =
-        |curves: &[PlotLine], line: &PlotLine| curves.iter().any(|curve| curve.model == line.model);
-    // Parts of nearly equal size.
+    // Equal parts; the last one may have fewer curves.
     let parts = count.div_ceil(MAX_CURVES);
     let size = count.div_ceil(parts);
     curves
         .chunks(size)
         .enumerate()
-        .map(|(part, own)| Panel {
+        .map(|(part, part_curves)| Panel {
             title: format!("{} ({} of {parts})", panel.title, part + 1),
             model: panel.model.clone(),
-            lines: own
+            lines: part_curves
                 .iter()
                 .chain(
-                    others
-                        .iter()
-                        .filter(|line| has_curve(own, line) || !has_curve(&curves, line)),
+                    other_lines.iter().filter(|line| {
+                        share_model(part_curves, line) || !share_model(&curves, line)
+                    }),
                 )
                 .cloned()
                 .collect(),
         })
         .collect()
+}
+
+fn is_curve(line: &PlotLine) -> bool {
+    matches!(line.content, PanelContent::Curve(_))
+}
+
+/// True if a curve is about the same model as the line.
+fn share_model(curves: &[PlotLine], line: &PlotLine) -> bool {
+    curves.iter().any(|curve| curve.model == line.model)
 }
 
 #[cfg(test)]

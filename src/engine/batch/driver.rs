@@ -1,7 +1,6 @@
-//! Moves the parts of a run on, step by step, until nothing is left: [`Driver`].
+//! Advances the parts of a batch run, step by step, until nothing is left to do: [`Driver`].
 //!
-//! A step calls the server at most once, and the journal holds what is about to happen before each call that changes something. So
-//! the driver may be stopped anywhere.
+//! The journal records each upload and each creation of a batch before the call, so the driver may be stopped at any time.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,40 +24,40 @@ use crate::types::TrialKey;
 use crate::types::manifest::RunManifest;
 use darkqa_score::record::Detail;
 
-/// How many times as long as at first the wait between two looks may become; chosen: 5 minutes with the default of 10 s.
-const LONGEST_WAIT: u32 = 30;
+/// Maximum wait between two checks of the batches, as a multiple of `--poll`; chosen: 5 minutes with the default of 10 s.
+const MAX_WAIT_POLLS: u32 = 30;
 
-/// How many looks long a file or batch is looked for at least that may exist; chosen.
-pub(super) const SEARCH: u32 = 6;
+/// Minimum search time for a file or batch that may exist at the server, as a multiple of `--poll`; chosen.
+const MIN_SEARCH_POLLS: u32 = 6;
 
-/// How long a file or batch is looked for at least that may exist; chosen: lists of servers may be late.
-const SHORTEST_SEARCH: Duration = Duration::from_mins(1);
+/// Minimum search time for a file or batch that may exist at the server; chosen: the server's lists may be late.
+const MIN_SEARCH: Duration = Duration::from_mins(1);
 
-/// The shortest `--poll` with which a server on this machine is searched for that long; chosen.
-const SHORT_POLL: Duration = Duration::from_millis(200);
+/// The shortest `--poll` for which [`MIN_SEARCH`] applies to a server on this machine; chosen.
+const MIN_SEARCH_FROM_POLL: Duration = Duration::from_millis(200);
 
-/// How many refused looks in a row end the command; chosen.
-const MOST_REFUSED: u32 = 10;
+/// Number of consecutive refused checks of a part that ends the command; chosen.
+const MAX_REFUSED_CHECKS: u32 = 10;
 
 /// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Step {
-    /// The part has gone on, and may go on at once.
+    /// The part advanced, and the next step may follow at once.
     Moved,
     /// The part has to wait.
     Waiting,
 }
 
-/// How far parts are brought.
+/// Goal of a driver: how far it advances the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Until {
-    /// All replies are taken over.
+    /// All replies are in the records.
     TakenOver,
-    /// The batches are made, as far as the server takes them.
+    /// The batches are created, as far as the server accepts them.
     Submitted,
-    /// One look at each batch; nothing is submitted.
+    /// Each batch is checked once; nothing is submitted.
     LookedAt,
-    /// All batches are cancelled or have ended, and their replies are taken over.
+    /// All batches are cancelled or have ended, and their replies are in the records.
     Cancelled,
 }
 
@@ -67,70 +66,72 @@ pub(super) enum Until {
 pub(super) enum Driven {
     /// The goal is reached.
     Reached,
-    /// The next part would have gone beyond `--max-cost`.
+    /// The next part would exceed `--max-cost`.
     OverBudget,
 }
 
-/// The parts of a run, with all that moving them on needs.
+/// The parts of a run, with everything needed to advance them.
 pub(super) struct Driver<'a, D> {
     pub(super) store: &'a mut Store<D>,
     pub(super) manifest: &'a RunManifest,
     pub(super) journal: &'a mut Journal,
     pub(super) servers: &'a Servers,
-    /// The models of all phases of the run, to adapt their requests and to price their replies; empty if none is asked again.
+    /// Models of all phases of the run, used to adapt their requests and to price their replies; empty if no model is asked again.
     pub(super) models: &'a [&'a ModelUnderTest],
     pub(super) args: &'a BatchRunArgs,
-    /// Limits of the cost; `None` if nothing is submitted.
+    /// Cost limits; `None` if nothing is submitted.
     pub(super) money: Option<&'a MoneySettings>,
     pub(super) progress: &'a Progress,
     pub(super) until: Until,
-    /// Trials that were refused in a way in which they would be again.
+    /// Trials that the server refused and would refuse again.
     pub(super) refused: &'a mut BTreeSet<TrialKey>,
-    /// The models whose parts stay as they are.
+    /// Models whose parts are left as they are.
     pub(super) stopped: &'a mut Stopped,
     pub(super) notes: Notes,
 }
 
-/// State that a driver keeps only while it runs.
+/// State that a driver keeps only in memory, while it runs.
 #[derive(Debug, Default)]
 pub(super) struct Notes {
-    /// Files at servers that batches may be made of.
+    /// Files at servers that are ready for use in a batch.
     pub(super) ready: BTreeSet<String>,
-    /// Since when a part's file or batch was not found.
+    /// Time at which the file or batch was first not found, by part.
     pub(super) missing_since: BTreeMap<usize, Instant>,
-    /// Until when nothing is submitted, by address and model; with the number of refusals.
+    /// Time until which nothing is submitted and number of refusals so far, by address and model.
     pub(super) holds: BTreeMap<(String, String), (Instant, u32)>,
-    /// How often the batch of a part was refused because too many tokens wait.
+    /// Refusals of a batch because too many tokens were waiting, by part.
     pub(super) refused_parts: BTreeMap<usize, u32>,
-    /// Uploads and creations in a row at which the server failed, by part.
+    /// Consecutive uploads and creations that failed at the server, by part.
     pub(super) failed_calls: BTreeMap<usize, u32>,
-    /// Refused looks in a row, by part.
+    /// Consecutive checks that the server refused, by part.
     pub(super) refused_looks: BTreeMap<usize, u32>,
-    /// Looks in a row at a batch that has ended and whose files are not complete, by part.
+    /// Consecutive checks of an ended batch with incomplete files, by part.
     pub(super) incomplete_looks: BTreeMap<usize, u32>,
-    /// Parts that have been looked at since the last wait.
+    /// Parts checked since the last wait.
     pub(super) looked_at: BTreeSet<usize>,
-    /// US dollars that the stored replies were charged; `None` if it is to be summed again.
+    /// Total charge for the stored replies in US dollars; `None` if it must be summed again.
     pub(super) charged: Cell<Option<f64>>,
-    /// The last state of each part that was printed.
+    /// The last state printed, by part.
     pub(super) printed: BTreeMap<usize, String>,
-    /// Messages that have been printed.
-    pub(super) said: BTreeSet<String>,
+    /// Warnings that have been printed.
+    pub(super) warned: BTreeSet<String>,
 }
 
 impl<D: Detail> Driver<'_, D> {
-    /// Moves all parts on. If a server refuses what every further call would ask, the parts of that model stay as they are.
+    /// Advances all parts until the goal is reached or the budget is used up. If a server refuses a call in a way that would stop every
+    /// further call for a model, the parts of that model are left as they are.
     ///
     /// # Errors
-    /// If a file cannot be written, the server of a part is not known, or one refuses and the first model that is stopped ends the run.
+    /// If a file cannot be written, the server of a part is unknown, or a server refuses a call and the settings end the run with the
+    /// first stopped model.
     pub(super) async fn drive(&mut self) -> Result<Driven> {
-        let first = self.args.collect.poll;
-        let mut wait = first;
+        let poll = self.args.collect.poll;
+        let mut wait = poll;
         loop {
             let mut moved = false;
             self.notes.looked_at.clear();
             let mut part = 0;
-            // Parts that are divided add parts at the end.
+            // The list may grow: the pieces of a divided part are appended.
             while part < self.journal.parts.len() {
                 while self.step_or_stop(part).await? == Step::Moved {
                     moved = true;
@@ -144,15 +145,16 @@ impl<D: Detail> Driver<'_, D> {
                 return Ok(Driven::OverBudget);
             }
             wait = if moved {
-                first
+                poll
             } else {
-                (wait * 3 / 2).min(first * LONGEST_WAIT)
+                (wait * 3 / 2).min(poll * MAX_WAIT_POLLS)
             };
             sleep(wait).await;
         }
     }
 
-    /// A step of a part, unless its model is stopped; stops it if its server refuses what every further call would ask.
+    /// Runs one step of a part, unless its model is stopped. Stops the model if its server refuses the call in a way that would stop every
+    /// further call.
     async fn step_or_stop(&mut self, part: usize) -> Result<Step> {
         if self.is_stopped(part) {
             return Ok(Step::Waiting);
@@ -171,7 +173,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     async fn step(&mut self, part: usize) -> Result<Step> {
-        if self.is_elsewhere(part) {
+        if self.is_left_alone(part) {
             let base = &self.part(part).facts.base;
             let line = format!("batches at {base} are left alone; name that address, with its key");
             self.warn_once(line);
@@ -194,35 +196,38 @@ impl<D: Detail> Driver<'_, D> {
         }
     }
 
+    /// True if the goal is reached, or no part can advance any more.
     fn is_reached(&self) -> Result<bool> {
-        let has_ended = |part: &Part| part.stage == Stage::Ended;
-        let stays = |part: usize| self.is_elsewhere(part) || self.is_stopped(part);
-        let mut parts = 0..self.journal.parts.len();
-        if parts.all(|part| has_ended(self.part(part)) || stays(part)) {
+        let is_final = |part: usize| {
+            self.part(part).stage == Stage::Ended
+                || self.is_left_alone(part)
+                || self.is_stopped(part)
+        };
+        if (0..self.journal.parts.len()).all(is_final) {
             return Ok(true);
         }
         Ok(match self.until {
             Until::TakenOver | Until::Cancelled => false,
             Until::LookedAt => true,
             Until::Submitted => {
-                let mut waiting = true;
+                let mut nothing_to_submit = true;
                 for (index, part) in self.journal.parts.iter().enumerate() {
-                    let is_out = part.stage == Stage::Created;
-                    let is_left = has_ended(part) || is_out || self.is_stopped(index);
-                    waiting &= is_left || self.is_held(index)?;
+                    let is_submitted = part.stage == Stage::Created || is_final(index);
+                    nothing_to_submit &= is_submitted || self.is_held(index)?;
                 }
-                waiting
+                nothing_to_submit
             }
         })
     }
 
-    /// Whether a part is at a server that the flags do not name, in a command that does not ask anything.
-    fn is_elsewhere(&self, part: usize) -> bool {
-        let only_looks = matches!(self.until, Until::LookedAt | Until::Cancelled);
+    /// True if the command only checks or cancels batches, and no flag names the server of this part.
+    fn is_left_alone(&self, part: usize) -> bool {
+        let submits_nothing = matches!(self.until, Until::LookedAt | Until::Cancelled);
         let part = self.part(part);
-        only_looks && part.stage != Stage::Ended && !self.servers.has(&part.facts.base)
+        submits_nothing && part.stage != Stage::Ended && !self.servers.has(&part.facts.base)
     }
 
+    /// True if the model of a part is stopped.
     fn is_stopped(&self, part: usize) -> bool {
         self.stopped.has_part(&self.part(part).facts)
     }
@@ -236,15 +241,15 @@ impl<D: Detail> Driver<'_, D> {
         self.servers.server(&self.part(part).facts)
     }
 
-    /// Prints a line once.
+    /// Prints a warning, unless it has been printed before.
     pub(super) fn warn_once(&mut self, line: String) {
-        if !self.notes.said.contains(&line) {
+        if !self.notes.warned.contains(&line) {
             tracing::warn!("{line}");
-            self.notes.said.insert(line);
+            self.notes.warned.insert(line);
         }
     }
 
-    /// Prints how a part goes on, if that is new.
+    /// Prints the state of a part, if it differs from the last one printed.
     pub(super) fn say(&mut self, part: usize, what: &str) {
         let before = self.notes.printed.insert(part, what.to_owned());
         if before.as_deref() != Some(what) {
@@ -253,7 +258,7 @@ impl<D: Detail> Driver<'_, D> {
         }
     }
 
-    /// The error for a call that would fail again.
+    /// Builds the error for a failed call that would fail again.
     pub(super) fn fatal(&self, part: usize, failure: &AskError) -> Error {
         let part = self.part(part);
         Error::Endpoint {
@@ -265,16 +270,17 @@ impl<D: Detail> Driver<'_, D> {
         }
     }
 
-    /// Counts a look that the server refused.
+    /// Handles a failed check of a part: it is repeated later, and counted if the failure is permanent.
     ///
     /// # Errors
-    /// If the last looks were refused, too: the key or the address is wrong.
+    /// If the last [`MAX_REFUSED_CHECKS`] checks of the part failed permanently, or one did under [`Until::LookedAt`]: the key or the
+    /// address is wrong.
     pub(super) fn look_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
         tracing::debug!("{}: {failure}", self.part(part).name);
         if failure.is_permanent() {
-            let looks = self.notes.refused_looks.entry(part).or_default();
-            *looks += 1;
-            if *looks >= MOST_REFUSED || self.until == Until::LookedAt {
+            let refused = self.notes.refused_looks.entry(part).or_default();
+            *refused += 1;
+            if *refused >= MAX_REFUSED_CHECKS || self.until == Until::LookedAt {
                 return Err(self.fatal(part, failure));
             }
         }
@@ -283,19 +289,20 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Waiting)
     }
 
-    /// Whether a part's file or batch has been missing for long enough to be sure that it does not exist; states it if it has not.
+    /// True if the file or batch of a part has been missing for long enough to conclude that it does not exist. Otherwise warns that the
+    /// search goes on. `what` is `file` or `batch`.
     pub(super) fn is_missing(&mut self, part: usize, what: &str) -> bool {
         let now = Instant::now();
         let since = *self.notes.missing_since.entry(part).or_insert(now);
-        let search = self.search_time(part);
-        let is_missing = now - since >= search;
+        let search_time = self.search_time(part);
+        let is_missing = now - since >= search_time;
         if is_missing {
             self.notes.missing_since.remove(&part);
         } else {
             self.warn_once(format!(
                 "{}: the server does not list its {what}; looked for again for {} s, as a list may be late",
                 self.part(part).name,
-                search.as_secs_f64()
+                search_time.as_secs_f64()
             ));
         }
         is_missing
@@ -306,14 +313,15 @@ impl<D: Detail> Driver<'_, D> {
         self.notes.missing_since.remove(&part);
     }
 
-    /// How long a part's file or batch is looked for. A server on this machine that is looked at all the time has lists that are not late.
+    /// How long to search for the file or batch of a part. A server on this machine with a `--poll` below [`MIN_SEARCH_FROM_POLL`] is
+    /// assumed to have up-to-date lists.
     fn search_time(&self, part: usize) -> Duration {
         let poll = self.args.collect.poll;
         let base = self.part(part).facts.base.parse::<BaseUrl>();
-        let is_here = base.is_ok_and(|base| base.is_loopback());
-        if is_here && poll < SHORT_POLL {
-            return poll * SEARCH;
+        let is_local = base.is_ok_and(|base| base.is_loopback());
+        if is_local && poll < MIN_SEARCH_FROM_POLL {
+            return poll * MIN_SEARCH_POLLS;
         }
-        SHORTEST_SEARCH.max(poll * SEARCH)
+        MIN_SEARCH.max(poll * MIN_SEARCH_POLLS)
     }
 }

@@ -1,4 +1,4 @@
-//! A message with the intrinsics of a camera: [`CameraInfo`].
+//! Parser for camera calibration messages: [`CameraInfo`].
 
 use serde::Deserialize;
 
@@ -8,22 +8,22 @@ use super::image_message::skip_sequence;
 use super::protobuf::fields;
 use crate::types::Intrinsics;
 
-/// The intrinsics of a camera for images of one size.
+/// Intrinsics of a camera, for raw and rectified images of one size in pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CameraInfo {
     pub(crate) width: usize,
     pub(crate) height: usize,
-    /// Camera of the images as they are taken: the matrix K.
+    /// Intrinsics of raw images, from the matrix K; `None` if K is missing or invalid.
     pub(crate) raw: Option<Intrinsics>,
-    /// Camera of rectified images: the matrix P.
+    /// Intrinsics of rectified images, from the matrix P; `None` if P is missing or invalid.
     pub(crate) rectified: Option<Intrinsics>,
 }
 
 impl CameraInfo {
-    /// Reads a `sensor_msgs/CameraInfo` or `foxglove.CameraCalibration`.
+    /// Parses a `sensor_msgs/CameraInfo` or `foxglove.CameraCalibration` message.
     ///
     /// # Errors
-    /// If it is not a message of this type.
+    /// If `bytes` is not such a message.
     pub(crate) fn parse(schema: &str, encoding: Encoding, bytes: &[u8]) -> Result<Self, String> {
         match encoding {
             Encoding::Cdr => Self::from_fields(schema, encoding, FieldReader::cdr(bytes)?),
@@ -53,6 +53,7 @@ impl CameraInfo {
         }
     }
 
+    /// Parses a CDR or ROS 1 message.
     fn from_fields(
         schema: &str,
         encoding: Encoding,
@@ -62,40 +63,35 @@ impl CameraInfo {
         let _stamp = reader.time()?;
         let _frame_id = reader.text()?;
         let [first, second] = [reader.u32()?, reader.u32()?].map(|side| side as usize);
-        // Foxglove has the width first, ROS the height.
+        // Foxglove stores the width first, ROS the height.
         let size = if schema.starts_with("foxglove") {
             [first, second]
         } else {
             [second, first]
         };
-        let _model = reader.text()?;
-        let _distortion = reader.doubles()?;
-        let mut matrix = |count: usize| {
+        let _distortion_model = reader.text()?;
+        let _distortion_parameters = reader.doubles()?;
+        let mut read_matrix = |count: usize| {
             (0..count)
                 .map(|_| reader.f64())
                 .collect::<Result<Vec<f64>, _>>()
         };
-        let (k, _rotation, p) = (matrix(9)?, matrix(9)?, matrix(12)?);
+        let (k, _rotation, p) = (read_matrix(9)?, read_matrix(9)?, read_matrix(12)?);
         Ok(Self::new(size, &k, &p))
     }
 
+    /// The calibration from the matrices K (3×3) and P (3×4), each in row-major order.
     fn new([width, height]: [usize; 2], k: &[f64], p: &[f64]) -> Self {
-        let camera = |matrix: &[f64], row: usize| {
-            let [fx, cx, fy, cy] =
-                [0, 2, row + 1, row + 2].map(|i| matrix.get(i).copied().unwrap_or_default());
-            let is_camera =
-                [fx, cx, fy, cy].iter().all(|number| number.is_finite()) && fx > 0.0 && fy > 0.0;
-            is_camera.then_some(Intrinsics { fx, fy, cx, cy })
-        };
         Self {
             width,
             height,
-            raw: camera(k, 3),
-            rectified: camera(p, 4),
+            raw: intrinsics(k, 3),
+            rectified: intrinsics(p, 4),
         }
     }
 
-    /// The camera of an image of a topic; `None` if it is unknown, or of images of another size.
+    /// Intrinsics for an image of this size: rectified if the topic name contains `rect`, else raw. `None` if they are unknown or the
+    /// calibration is for another size.
     pub(crate) fn intrinsics_for(&self, topic: &str, size: (usize, usize)) -> Option<Intrinsics> {
         if (self.width, self.height) != size {
             return None;
@@ -108,7 +104,15 @@ impl CameraInfo {
     }
 }
 
-/// A `foxglove.CameraCalibration` in JSON.
+/// Intrinsics in a row-major matrix with this number of columns; `None` unless all are finite and both focal lengths positive.
+fn intrinsics(matrix: &[f64], columns: usize) -> Option<Intrinsics> {
+    let [fx, cx, fy, cy] =
+        [0, 2, columns + 1, columns + 2].map(|i| matrix.get(i).copied().unwrap_or_default());
+    let is_valid = [fx, cx, fy, cy].iter().all(|number| number.is_finite()) && fx > 0.0 && fy > 0.0;
+    is_valid.then_some(Intrinsics { fx, fy, cx, cy })
+}
+
+/// A `foxglove.CameraCalibration` message in JSON.
 #[derive(Deserialize)]
 struct JsonCamera {
     width: usize,
@@ -124,25 +128,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rectified_topics_have_the_camera_of_p() {
+    fn rectified_topics_use_matrix_p() {
         let k = [500.0, 0.0, 320.0, 0.0, 501.0, 240.0, 0.0, 0.0, 1.0];
         let p = [
             400.0, 0.0, 300.0, 0.0, 0.0, 401.0, 200.0, 0.0, 0.0, 0.0, 1.0, 0.0,
         ];
         let info = CameraInfo::new([640, 480], &k, &p);
-        let focal = |topic: &str, size| {
+        let intrinsics_of = |topic: &str, size| {
             info.intrinsics_for(topic, size)
                 .map(|camera| (camera.fx, camera.fy, camera.cx, camera.cy))
         };
         assert_eq!(
-            focal("/c/image_raw", (640, 480)),
+            intrinsics_of("/c/image_raw", (640, 480)),
             Some((500.0, 501.0, 320.0, 240.0))
         );
         assert_eq!(
-            focal("/c/image_rect", (640, 480)),
+            intrinsics_of("/c/image_rect", (640, 480)),
             Some((400.0, 401.0, 300.0, 200.0))
         );
-        assert_eq!(focal("/c/image_raw", (320, 240)), None);
+        assert_eq!(intrinsics_of("/c/image_raw", (320, 240)), None);
         assert_eq!(CameraInfo::new([640, 480], &[0.0; 9], &[]).raw, None);
     }
 }

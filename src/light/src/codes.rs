@@ -1,18 +1,18 @@
-//! Between 8-bit codes and the light that a display shows for them: [`shown_light`] and [`encode`].
+//! Conversion between 8-bit codes and the linear light of a display: [`shown_light`] and [`encode`].
 
 use std::sync::LazyLock;
 
 use super::curve;
 use darkqa_ground::types::isa::{Isa, Kernel};
 
-/// Light of each 8-bit code, as a display shows it (DarkQA, eq. 1).
-static SHOWN: LazyLock<[f32; 256]> =
+/// Linear light of each 8-bit code on a display (DarkQA, eq. 1).
+static SHOWN_LIGHT: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| curve::gamma_expand(code as f64 / 255.0) as f32));
 
-/// The light that a display shows for each 8-bit code.
+/// Returns the linear light of each 8-bit code on a display.
 #[must_use]
 pub(crate) fn shown_light() -> &'static [f32; 256] {
-    &SHOWN
+    &SHOWN_LIGHT
 }
 
 /// Writes the nearest code of each light, ⌊255 · L^(1/2.2) + ½⌋ (DarkQA, eq. 3). Light above 1 counts as 1.
@@ -20,46 +20,46 @@ pub(crate) fn encode(light: &[f32], codes: &mut [u8], isa: Isa) {
     isa.run(Encode { light, codes });
 }
 
-/// Pieces per octave of light, a power of two, large enough that no piece has more than one edge between two codes.
-const PIECES: usize = 128;
-/// Low bits of a single-precision number that give its position within a piece.
-const WITHIN: u32 = 23 - PIECES.ilog2();
-/// Octaves from 2⁻²⁰ to 1, which has its own. The edge between the codes 0 and 1 is the light 1.16 · 2⁻²⁰.
+/// Pieces per octave of light: a power of two, large enough for at most one edge between two codes in each piece.
+const PIECES_PER_OCTAVE: usize = 128;
+/// Number of low bits of a single-precision number that give its position within a piece.
+const OFFSET_BITS: u32 = 23 - PIECES_PER_OCTAVE.ilog2();
+/// Octaves of the table: 20 from 2⁻²⁰ to 1, and one that begins at 1. The edge between codes 0 and 1 is at light 1.16 · 2⁻²⁰.
 const OCTAVES: usize = 21;
 
-/// The first light of the table, 2⁻²⁰; darker light has the same code, 0.
+/// Smallest light in the table, 2⁻²⁰. Darker light has the same code, 0.
 const DARKEST: f32 = 1.0 / 1_048_576.0;
 
-/// The codes of light by pieces of equal width in each octave.
+/// Codes by light, for pieces of equal width within each octave.
 static TABLE: LazyLock<Box<[Piece]>> = LazyLock::new(|| {
-    (0..(OCTAVES as u32) << PIECES.ilog2())
-        .map(|piece| {
-            let begin = f32::from_bits(DARKEST.to_bits() + (piece << WITHIN));
-            let code = (255.0 * libm::pow(f64::from(begin), 1.0 / curve::GAMMA) + 0.5).floor();
+    (0..(OCTAVES * PIECES_PER_OCTAVE) as u32)
+        .map(|index| {
+            let start = f32::from_bits(DARKEST.to_bits() + (index << OFFSET_BITS));
+            let code = (255.0 * libm::pow(f64::from(start), 1.0 / curve::GAMMA) + 0.5).floor();
             Piece {
-                next: at_least(libm::pow((code + 0.5) / 255.0, curve::GAMMA)),
+                next: round_up(libm::pow((code + 0.5) / 255.0, curve::GAMMA)),
                 code: code as u32,
             }
         })
         .collect()
 });
 
-/// The smallest single-precision number that is not below `x`.
-fn at_least(x: f64) -> f32 {
-    let near = x as f32;
-    if f64::from(near) < x {
-        near.next_up()
+/// Rounds `x` up to single precision.
+fn round_up(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) < x {
+        nearest.next_up()
     } else {
-        near
+        nearest
     }
 }
 
-/// Light in a piece of the table.
+/// Codes of the light in one piece of the table.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
-    /// The least light of the next code.
+    /// Smallest light with the next code.
     next: f32,
-    /// Code where the piece begins.
+    /// Code at the start of the piece.
     code: u32,
 }
 
@@ -75,8 +75,8 @@ impl Kernel for Encode<'_> {
         for (code, light) in self.codes.iter_mut().zip(self.light) {
             let light = if *light > DARKEST { *light } else { DARKEST };
             let light = if light < 1.0 { light } else { 1.0 };
-            let piece = (light.to_bits() - DARKEST.to_bits()) >> WITHIN;
-            let piece = table[piece as usize % table.len()];
+            let index = (light.to_bits() - DARKEST.to_bits()) >> OFFSET_BITS;
+            let piece = table[index as usize % table.len()];
             *code = (piece.code + u32::from(light >= piece.next)) as u8;
         }
     }
@@ -93,15 +93,15 @@ mod tests {
     }
 
     #[test]
-    fn codes_are_those_of_their_light() {
+    fn encode_inverts_shown_light() {
         let all: Vec<u8> = (0..=255).collect();
         assert_eq!(encoded(shown_light()), all);
     }
 
-    /// Light at every edge between two codes, on both sides, and between.
+    /// Checks both sides of every edge between two codes, and a million values in [0, 1].
     #[test]
     fn light_has_the_nearest_code() {
-        let edge = |code: usize| at_least(libm::pow((code as f64 + 0.5) / 255.0, 2.2));
+        let edge = |code: usize| round_up(libm::pow((code as f64 + 0.5) / 255.0, 2.2));
         for code in 0..255 {
             let light = [edge(code).next_down(), edge(code)];
             assert_eq!(encoded(&light), [code as u8, code as u8 + 1]);

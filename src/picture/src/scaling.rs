@@ -1,4 +1,4 @@
-//! The size in which images are sent: [`Scaling`].
+//! Scaling of images before they are sent: [`Scaling`].
 
 use std::borrow::Cow;
 use std::num::NonZeroU32;
@@ -10,39 +10,39 @@ use crate::fitting::{fit, fitted_size};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
 
-/// The size in which an image is sent.
+/// How an image is scaled before it is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scaling {
-    /// The size of the frame.
+    /// Not scaled.
     Never,
-    /// Made smaller, if a side is longer than this number of pixels.
+    /// Reduced if a side is longer than this many pixels.
     MaxSide(NonZeroU32),
-    /// Made larger or smaller, so that the longer side has this number of pixels.
+    /// Enlarged or reduced to this many pixels on the longer side.
     LongerSide(usize),
 }
 
 impl Scaling {
-    /// The width and height in which an image of this width and height is sent, in pixels.
+    /// Width and height of an image after scaling, from its original width and height, in pixels.
     #[must_use]
-    pub fn size(self, size: (u32, u32)) -> (usize, usize) {
+    pub fn size(self, (width, height): (u32, u32)) -> (usize, usize) {
         match self {
-            Self::Never => (size.0 as usize, size.1 as usize),
+            Self::Never => (width as usize, height as usize),
             Self::MaxSide(side) => {
-                let (width, height) = fitted_size(size, side);
+                let (width, height) = fitted_size((width, height), side);
                 (width as usize, height as usize)
             }
             Self::LongerSide(side) => {
-                let [height, width] = bilinear_size(size.1 as usize, size.0 as usize, side);
+                let [height, width] = bilinear_size(height as usize, width as usize, side);
                 (width, height)
             }
         }
     }
 
-    /// The image in the size in which it is sent.
+    /// Scales an image.
     ///
     /// # Errors
-    /// If a side is too long for any format, or the result does not fit into memory.
+    /// If a side is too long for any image format, or the result does not fit into memory.
     pub fn scale(self, image: &Rgb) -> Result<Cow<'_, Rgb>> {
         match self {
             Self::MaxSide(side) => fit(image, side),

@@ -1,4 +1,4 @@
-//! [`Vocabulary`]: the words that a data set can name.
+//! [`Vocabulary`]: the words for objects that a data set uses.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,27 +6,28 @@ use super::rules::RuleBook;
 use super::statistics::{FrameStatistics, WordSource, plain_word};
 use darkqa_ground::types::Labels;
 
-/// The words of a data set: those of its labels, or of its segments if they have names.
+/// Words that a data set uses for objects: the names of its segments if they have any, otherwise its labels.
 ///
-/// Only such words are denied, and only activities that they could enable are asked about. Else "no" would be the answer to
-/// every question with a word that no annotator of the data set used, whatever the image shows.
+/// A question whose answer is "no" uses only these words, and an activity is asked about only if these words could enable it.
+/// Otherwise "no" would be the answer to every question with a word that no annotator of the data set used, whatever the image
+/// shows.
 #[derive(Debug, Default)]
 pub struct Vocabulary {
-    /// Words of questions by class.
+    /// Words used in questions, by class.
     words: BTreeMap<String, BTreeSet<String>>,
-    /// Tokens of the words.
+    /// Tokens of the words, by [`RuleBook::token()`].
     tokens: BTreeSet<String>,
 }
 
 impl Vocabulary {
-    /// The words of these frames and labels.
+    /// Collects the words of these frames and labels.
     pub fn new(frames: &[FrameStatistics], labels: &Labels, book: &RuleBook) -> Self {
         let mut vocabulary = Self::default();
         let segments = || frames.iter().flat_map(|frame| &frame.segments);
         for segment in segments().filter(|segment| segment.source != WordSource::Coarse) {
             vocabulary.add(&segment.class, &segment.word, book);
         }
-        // Where segments have names, labels are those of coarse classes, which no segment is called by.
+        // If segments have names, the labels are coarse classes, by which no segment is called.
         if !segments().any(|segment| segment.source == WordSource::Name) {
             for label in labels.labels.values() {
                 let (word, _) = plain_word(&label.name);
@@ -40,13 +41,13 @@ impl Vocabulary {
 
     fn add(&mut self, class: &str, word: &str, book: &RuleBook) {
         self.tokens.insert(book.token(word, class).to_owned());
-        if let Some(word) = book.called(class, word) {
+        if let Some(question_word) = book.called(class, word) {
             let words = self.words.entry(class.to_owned()).or_default();
-            words.insert(word.to_owned());
+            words.insert(question_word.to_owned());
         }
     }
 
-    /// The words by which things of a class are called.
+    /// Words that questions use for objects of a class.
     pub fn class_words(&self, class: &str) -> impl Iterator<Item = &str> {
         self.words
             .get(class)
@@ -55,7 +56,7 @@ impl Vocabulary {
             .map(String::as_str)
     }
 
-    /// Whether a thing with a token can be named in this data set.
+    /// True if the data set has a word for objects with this token; a class is a token, too.
     pub fn has_token(&self, token: &str) -> bool {
         self.tokens.contains(token) || self.words.contains_key(token)
     }

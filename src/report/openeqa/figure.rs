@@ -1,4 +1,4 @@
-//! Figures of the scores by level: [`figures`].
+//! Charts of OpenEQA scores by level of degradation: [`figures`].
 
 use super::open_report::OpenReport;
 use super::tables::ladder;
@@ -6,11 +6,12 @@ use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
 use crate::drawing::paper::figure;
 use crate::error::Result;
-use crate::text::ladder::Ladder;
+use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::types::AxisLevel;
 use darkqa_score::open::{Group, OpenCell};
+use darkqa_score::subject::Subject;
 
-/// Scores by level: all questions together, and by category if there are several.
+/// One chart of all questions, and one with a panel per category. None if the run has fewer than two levels.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     let whole = ladder(report.summary, &Group::All);
     if whole.levels.len() < 2 {
@@ -27,32 +28,28 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
         "bands and bars are 95 % intervals by {} ({} clusters)",
         report.summary.unit, report.summary.clusters
     );
+    let chart = |panels: Vec<Panel>, columns: usize| Chart {
+        measure: "score in %",
+        panels,
+        columns,
+        note: note.clone(),
+    };
     let charts = [
         (
             "scores",
             "Score by level. Broken lines: without images.",
-            panels(report, &Group::All, &whole),
-            1,
+            chart(panels(report, &Group::All, &whole), 1),
         ),
-        ("categories", "Score by category.", categories, 3),
+        ("categories", "Score by category.", chart(categories, 3)),
     ];
-    let mut figures = Vec::new();
-    for (name, caption, panels, columns) in charts {
-        if panels.is_empty() {
-            continue;
-        }
-        let chart = Chart {
-            measure: "score in %",
-            panels,
-            columns,
-            note: note.clone(),
-        };
-        figures.push(figure(name, caption, &Drawn::Lines(chart))?);
-    }
-    Ok(figures)
+    charts
+        .into_iter()
+        .filter(|(_, _, chart)| !chart.panels.is_empty())
+        .map(|(name, caption, chart)| figure(name, caption, &Drawn::Lines(chart)))
+        .collect()
 }
 
-/// The panels of a group, one for each axis.
+/// Panels of a group of questions: one per degradation axis.
 fn panels(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>) -> Vec<Panel> {
     ladder(report.summary, group)
         .by_axis()
@@ -61,62 +58,81 @@ fn panels(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>) 
         .collect()
 }
 
-/// A panel of a group: a curve for each series, and a flat line for each model without images. The style of a series is its place
-/// in the `whole`.
+/// One panel: a curve per series, and a flat line per model without images. A series has the same line style in every panel: that of its
+/// position in `whole`, the ladder of all questions.
 fn panel(
     report: &OpenReport<'_>,
     group: &Group,
     whole: &Ladder<'_, OpenCell>,
     ladder: &Ladder<'_, OpenCell>,
 ) -> Panel {
-    let seeing = whole.series.len();
-    let lines = ladder.series.iter().map(|(series, cells)| {
-        let index = whole.series.keys().position(|other| other == series);
-        let start = ladder.start(series).map(|cell| (AxisLevel::L0, cell));
-        let dark = cells
-            .iter()
-            .map(|(level, cell)| (*level, *cell))
-            .filter(|(level, _)| *level != AxisLevel::L0);
-        let points = start
-            .into_iter()
-            .chain(dark)
-            .filter_map(|(level, cell)| Some((level, cell.score?)));
-        PlotLine {
-            name: format!("{}, {}", series.model, series.light(&[])),
-            style: LineStyle(index.unwrap_or(seeing)),
-            content: PanelContent::Curve(points.collect()),
-            model: Some(series.model.to_owned()),
-            items: None,
-        }
+    let series_count = whole.series.len();
+    let curves = ladder.series.iter().map(|(series, cells)| {
+        let position = whole.series.keys().position(|other| other == series);
+        let style = LineStyle(position.unwrap_or(series_count));
+        curve(ladder, series, cells, style)
     });
-    let blind = ladder
-        .without_level
-        .iter()
-        .enumerate()
-        .filter_map(|(index, (subject, cell))| {
-            Some(PlotLine {
-                name: format!("{} without images", subject.model),
-                style: LineStyle(seeing + index),
-                content: PanelContent::Flat(cell.score?.value),
-                model: Some(subject.model.clone()),
-                items: None,
-            })
-        });
-    let n = report.questions.len();
-    let title = match group {
-        Group::All => format!("all, n {n}"),
-        part => {
-            let questions = report
-                .questions
-                .iter()
-                .filter(|question| question.family.name() == part.name())
-                .count();
-            format!("{}, n {questions}", part.name())
-        }
-    };
+    let flat_lines =
+        ladder
+            .without_level
+            .iter()
+            .enumerate()
+            .filter_map(|(index, (subject, cell))| {
+                flat_line(subject, cell, LineStyle(series_count + index))
+            });
     Panel {
-        title,
-        lines: lines.chain(blind).collect(),
+        title: title(report, group),
+        lines: curves.chain(flat_lines).collect(),
         model: None,
     }
+}
+
+/// Scores of a series over the levels. L0 is the start of the series in the ladder.
+fn curve(
+    ladder: &Ladder<'_, OpenCell>,
+    series: &Series<'_>,
+    cells: &SeriesByLevel<'_, OpenCell>,
+    style: LineStyle,
+) -> PlotLine {
+    let clean = ladder.start(series).map(|cell| (AxisLevel::L0, cell));
+    let degraded = cells
+        .iter()
+        .map(|(level, cell)| (*level, *cell))
+        .filter(|(level, _)| *level != AxisLevel::L0);
+    let points = clean
+        .into_iter()
+        .chain(degraded)
+        .filter_map(|(level, cell)| Some((level, cell.score?)))
+        .collect();
+    PlotLine {
+        name: format!("{}, {}", series.model, series.light(&[])),
+        style,
+        content: PanelContent::Curve(points),
+        model: Some(series.model.to_owned()),
+        items: None,
+    }
+}
+
+/// Score of a model without images, which is the same at all levels; `None` without a score.
+fn flat_line(subject: &Subject, cell: &OpenCell, style: LineStyle) -> Option<PlotLine> {
+    Some(PlotLine {
+        name: format!("{} without images", subject.model),
+        style,
+        content: PanelContent::Flat(cell.score?.value),
+        model: Some(subject.model.clone()),
+        items: None,
+    })
+}
+
+/// Title of a panel: the name of the group and its number of questions.
+fn title(report: &OpenReport<'_>, group: &Group) -> String {
+    let questions = match group {
+        Group::All => report.questions.len(),
+        Group::Split(name) | Group::Category(name) => report
+            .questions
+            .iter()
+            .filter(|question| question.family.name() == name)
+            .count(),
+    };
+    format!("{}, n {questions}", group.name())
 }

@@ -1,4 +1,4 @@
-//! The data and models of an evaluation, opened and checked: [`ChoiceSetup`].
+//! [`ChoiceSetup`]: the data and models of an evaluation, opened and checked.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -29,36 +29,36 @@ use darkqa_enhance::ModelFile;
 use darkqa_questions::observer::understood;
 use darkqa_questions::rules::Rules;
 
-/// All data and models of an evaluation, opened and checked. Nothing is asked or written yet.
+/// Data and models of an evaluation, opened and checked. Nothing has been asked or written yet.
 pub(super) struct ChoiceSetup<'a> {
     pub(super) config: &'a Evaluation,
     pub(super) dataset: Arc<Dataset>,
     pub(super) questions: Vec<Question>,
-    /// The questions of the control `observer:other-room` that are asked with an image of this run or shard.
+    /// Questions for the control `observer:other-room` whose image belongs to this run or shard.
     pub(super) with_other_rooms: Vec<Question>,
     pub(super) other_rooms: OtherRooms,
     pub(super) sources: Vec<Source>,
-    /// Place of the sources among those of the whole run; `None` if this is the whole run.
+    /// Position of the sources within the whole run; `None` if this is the whole run.
     pub(super) part: Option<PartPlace>,
-    /// The index of each frame in `sources`.
+    /// Index of each frame in `sources`.
     pub(super) places: HashMap<FrameId, usize>,
-    /// The place of each question among all that are selected, for models that are asked the first ones alone.
+    /// Position of each question among all selected ones, for models that are asked only the first few.
     pub(super) question_places: HashMap<QuestionId, usize>,
-    /// The index of each question among all questions of the data.
+    /// Position of each question among all questions of the data.
     pub(super) file_places: HashMap<QuestionId, usize>,
-    /// The digest of the file, or of all files, of each frame that a question is about; empty if no image is read.
+    /// Digest of each frame that a question is about, over its file or all its files. Empty if no image is read.
     pub(super) digests: HashMap<FrameId, Digest>,
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) conditions: Vec<Condition>,
     pub(super) recipe: Recipe,
-    /// The digest of the questions that are asked about every image; `None` if questions have answers.
+    /// Digest of the questions that are asked about every image; `None` if questions have answers.
     pub(super) bank: Option<Digest>,
-    /// Mean linear luminance of a sample of the frames and the size of the sample, of a set in the dark; `None` for others.
+    /// Mean linear luminance of a sample of the frames, and the sample size; `None` if the set is not dark.
     pub(super) brightness: Option<(f64, usize)>,
 }
 
 impl<'a> ChoiceSetup<'a> {
-    /// Opens the data and the models. The files of the enhancers are read but not yet loaded.
+    /// Opens the data and the models. Also returns the files of the enhancers, which are read but not yet loaded.
     pub(super) fn open(
         config: &'a Evaluation,
         progress: &Progress,
@@ -66,18 +66,18 @@ impl<'a> ChoiceSetup<'a> {
         let job = &config.job;
         // If every model is blind, no image is read and no enhancer is opened.
         let shows_images = job.shows_images();
-        let files = if shows_images {
+        let enhancer_files = if shows_images {
             job.enhancers()?
         } else {
             Vec::new()
         };
-        let (dataset, all) = asked_data(config, progress)?;
+        let (dataset, selected) = selected_data(config, progress)?;
         let dataset = Arc::new(dataset);
-        let file_places = file_places(config, &dataset, &all);
-        let other_rooms = OtherRooms::new(&all, |frame| dataset.scene(frame));
+        let file_places = file_places(config, &dataset, &selected);
+        let other_rooms = OtherRooms::new(&selected, |frame| dataset.scene(frame));
         let controls = AddedControls::new(config, other_rooms.is_some())?;
         let (questions, part) = part(
-            all.clone(),
+            selected.clone(),
             job.shard,
             |question| question.frame.0.clone(),
             |question| dataset.scene(&question.frame),
@@ -108,23 +108,27 @@ impl<'a> ChoiceSetup<'a> {
             let line = "the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too";
             progress.say(line);
         }
-        let recipe = Recipe::new(&job.light.kinds, job.format, job.max_side, &files);
-        let recipe = if shows_images {
-            recipe.with_elsewhere(&job.enhancers.enhanced)?
-        } else {
-            recipe
-        };
-        let photographed = photographs::names(&sources);
-        let on = job.enhancers.on();
-        let conditions = conditions(&job.light, &photographed, on, &recipe.enhancer_names());
+        let mut recipe = Recipe::new(&job.light.kinds, job.format, job.max_side, &enhancer_files);
+        if shows_images {
+            recipe = recipe.with_elsewhere(&job.enhancers.enhanced)?;
+        }
+        let conditions = conditions(
+            &job.light,
+            &photographs::names(&sources),
+            job.enhancers.on(),
+            &recipe.enhancer_names(),
+        );
         let brightness = (job.set_light == SetLight::Dark)
             .then(|| dark_already::brightness(&*dataset, &sources))
             .flatten();
-        let names = sources.iter().map(|source| source.name.clone());
         let mut setup = Self {
             config,
-            places: names.zip(0..).collect(),
-            question_places: all
+            places: sources
+                .iter()
+                .map(|source| source.name.clone())
+                .zip(0..)
+                .collect(),
+            question_places: selected
                 .iter()
                 .map(|question| question.id.clone())
                 .zip(0..)
@@ -144,7 +148,7 @@ impl<'a> ChoiceSetup<'a> {
             dataset,
         };
         if shows_images && setup.models.iter().any(is_other_room) {
-            setup.add_other_rooms(all)?;
+            setup.add_other_rooms(selected)?;
         }
         if shows_images {
             check_enhanced(&setup.conditions, &job.enhancers)?;
@@ -152,10 +156,10 @@ impl<'a> ChoiceSetup<'a> {
         setup.recipe.check(&setup.sources, &setup.conditions)?;
         controls.print(progress);
         print_training(config, progress);
-        Ok((setup, files))
+        Ok((setup, enhancer_files))
     }
 
-    /// Prints the inferred mapping in a ready-made set.
+    /// Prints the inferred column mapping of a ready-made set, and warns about unnamed scenes.
     pub(super) fn say_reading(&self, progress: &Progress) {
         for line in self.dataset.reading_to_say() {
             progress.note(line);
@@ -165,32 +169,32 @@ impl<'a> ChoiceSetup<'a> {
         }
     }
 
-    /// Adds the questions that are asked with the image of another frame, if that image is of this run or shard.
-    fn add_other_rooms(&mut self, mut all: Vec<Question>) -> Result<()> {
-        all.retain(|question| {
+    /// Adds the selected questions that are asked with the image of another frame, if that image belongs to this run or shard.
+    fn add_other_rooms(&mut self, mut questions: Vec<Question>) -> Result<()> {
+        questions.retain(|question| {
             let shown = self.other_rooms.shown_for(&question.frame);
             shown.is_some_and(|shown| self.places.contains_key(shown))
         });
-        for question in &all {
+        for question in &questions {
             if self.digests.contains_key(&question.frame) {
                 continue;
             }
-            let planned = self.config.plan.as_ref();
-            if let Some(digest) = planned.and_then(|plan| plan.digest(&question.frame)) {
+            let plan = self.config.plan.as_ref();
+            if let Some(digest) = plan.and_then(|plan| plan.digest(&question.frame)) {
                 self.digests.insert(question.frame.clone(), digest);
-            } else {
-                let source = Source::from_questions(&self.dataset, &question.frame)?;
-                let digest = source.digest();
-                self.digests
-                    .extend(digest.map(|digest| (source.name, digest)));
+                continue;
+            }
+            let source = Source::from_questions(&self.dataset, &question.frame)?;
+            if let Some(digest) = source.digest() {
+                self.digests.insert(source.name, digest);
             }
         }
-        self.with_other_rooms = all;
+        self.with_other_rooms = questions;
         Ok(())
     }
 }
 
-/// Warns of questions that `room-net` guesses because the rules did not make them.
+/// Warns if `room-net` will guess questions, because the rules did not make them.
 fn warn_of_guesses(questions: &[Question], rules: &Rules) {
     let unknown = questions
         .iter()
@@ -204,7 +208,7 @@ fn warn_of_guesses(questions: &[Question], rules: &Rules) {
     }
 }
 
-/// Prints the training data of `room-net`, if it is asked, and of the enhancer `lift`.
+/// Prints the training data of `room-net` and of the enhancer `lift`, if `room-net` is shown images.
 fn print_training(config: &Evaluation, progress: &Progress) {
     let job = &config.job;
     if !job.ask.shows_images_to(&ModelName::RoomNet) {
@@ -225,8 +229,9 @@ fn print_training(config: &Evaluation, progress: &Progress) {
     ));
 }
 
-/// The data, and the questions about them that are asked. Those of a plan are taken from there, so that no frame is measured.
-fn asked_data(config: &Evaluation, progress: &Progress) -> Result<(Dataset, Vec<Question>)> {
+/// Opens the data and selects the questions to ask. With a plan, the questions come from it, so that no frame is
+/// measured.
+fn selected_data(config: &Evaluation, progress: &Progress) -> Result<(Dataset, Vec<Question>)> {
     let (place, set, selection) = (&config.place, &config.set, &config.selection);
     let data = (place, &config.scene, set);
     let dataset = match (&config.bank, &config.plan) {
@@ -239,30 +244,33 @@ fn asked_data(config: &Evaluation, progress: &Progress) -> Result<(Dataset, Vec<
         return Ok((dataset, questions));
     };
     plan.check_identity(&plan_identity(config, &dataset)?)?;
-    let own = match dataset.questions() {
+    let data_questions = match dataset.questions() {
         [] => Vec::new(),
-        own => select(own.to_vec(), selection)?,
+        questions => select(questions.to_vec(), selection)?,
     };
-    let questions = plan.questions(&dataset, &own)?;
+    let questions = plan.questions(&dataset, &data_questions)?;
     Ok((dataset, questions))
 }
 
-/// The index of each question that is asked among all questions of the data.
+/// Position of each question among all questions of the data: from the plan if there is one, otherwise from the data set.
 fn file_places(
     config: &Evaluation,
     dataset: &Dataset,
-    asked: &[Question],
+    selected: &[Question],
 ) -> HashMap<QuestionId, usize> {
     if let Some(plan) = &config.plan {
-        let ids = asked.iter().map(|question| question.id.clone());
+        let ids = selected.iter().map(|question| question.id.clone());
         ids.zip(plan.question_places()).collect()
     } else {
-        let ids = dataset.questions().iter().map(|question| &question.id);
-        ids.cloned().zip(0..).collect()
+        let ids = dataset
+            .questions()
+            .iter()
+            .map(|question| question.id.clone());
+        ids.zip(0..).collect()
     }
 }
 
-/// The digest of the file of each source, or of all its files.
+/// Digest of each source, over its file or all its files. Sources without frames are left out.
 fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
     sources
         .iter()
@@ -270,7 +278,7 @@ fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
         .collect()
 }
 
-/// The models, opened; nothing is sent.
+/// Opens the models. Nothing is sent.
 fn open_models(
     config: &Evaluation,
     controls: &AddedControls,
@@ -278,28 +286,31 @@ fn open_models(
     questions: &[Question],
 ) -> Result<Vec<ModelUnderTest>> {
     let ask = &config.job.ask;
-    let prior = Random {
+    let guesser = Random {
         seed: config.job.light.kinds.sensor.seed,
     };
-    let mut models = ask.models.iter();
-    let observer = models.any(|model| matches!(model.id, ModelName::Observer(_)));
-    let open = || {
+    let asks_observer = ask
+        .models
+        .iter()
+        .any(|model| matches!(model.id, ModelName::Observer(_)));
+    let observer = if asks_observer {
         let rules = config.rules.clone();
-        Observer::open(dataset, &config.place, questions, rules)
+        Some(Observer::open(dataset, &config.place, questions, rules)?)
+    } else {
+        None
     };
-    let observer = observer.then(open).transpose()?;
     let runtime = config.job.loading.runtime.search();
     models::open_all(ask, &controls.names, |name| {
         Ok(match (name, &observer) {
             (ModelName::Observer(control), Some(observer)) => {
-                Model::Local(observer.model(*control, prior))
+                Model::Local(observer.model(*control, guesser))
             }
             (ModelName::RoomNet, _) => {
                 warn_of_guesses(questions, &config.rules);
                 let net = RoomNet::new(runtime.clone(), config.rules.clone())?;
-                Model::Local(net.model(prior))
+                Model::Local(net.model(guesser))
             }
-            _ => Model::Random(prior),
+            _ => Model::Random(guesser),
         })
     })
 }

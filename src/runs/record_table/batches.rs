@@ -1,4 +1,4 @@
-//! The rows of the table of records, some at once: [`RowBatches`].
+//! Rows of the record table, read in batches: [`RowBatches`].
 
 use std::path::Path;
 
@@ -11,25 +11,26 @@ use crate::runs::stored::manifest;
 use crate::store::{LinePlace, RecordLog, each_question};
 use crate::types::Record;
 
-/// The most records that are read at once. Chosen: enough for all cores.
-const RECORDS_AT_ONCE: usize = 1 << 14;
-/// The most bytes of records that are read at once; more only if one record has more. Chosen.
-const BYTES_AT_ONCE: usize = 16 << 20;
+/// Maximum number of records in a batch. Chosen to be enough for all cores.
+const MAX_RECORDS: usize = 1 << 14;
+/// Maximum size of a batch, in bytes. Only a batch of one record may exceed it. An arbitrary choice.
+const MAX_BYTES: usize = 16 << 20;
 
-/// The rows of a run in their order, read in batches, so that the records are not held in memory.
+/// Rows of a run in order, read in batches to keep the records out of memory.
 pub(super) struct RowBatches<D: Tabled> {
     log: RecordLog,
     rows: Rows<D>,
+    /// Places of the records in the log, in the order of the rows.
     places: Vec<LinePlace>,
-    /// The number of records that were read.
+    /// Number of records read so far.
     read: usize,
 }
 
 impl<D: Tabled> RowBatches<D> {
-    /// The rows of the run in a folder.
+    /// Opens the run in a folder.
     ///
     /// # Errors
-    /// If a line of the run is broken.
+    /// If a line of the run is malformed.
     pub(super) fn open(folder: &Path) -> Result<Self> {
         let manifest = manifest(folder)?;
         let mut questions = Vec::new();
@@ -44,38 +45,39 @@ impl<D: Tabled> RowBatches<D> {
         })
     }
 
-    /// The next rows; `None` at the end. A batch is empty if none of its records has a row.
+    /// Reads the next batch; `None` at the end. A batch is empty if none of its records has a row.
     ///
     /// # Errors
-    /// If a record is broken.
+    /// If a record is malformed.
     pub(super) fn next_batch(&mut self) -> Result<Option<Vec<Row<D>>>> {
-        let rest = &self.places[self.read..];
-        if rest.is_empty() {
+        let unread = &self.places[self.read..];
+        if unread.is_empty() {
             return Ok(None);
         }
-        let now = &rest[..at_once(rest)];
-        let lines = self.log.lines(now)?;
+        let batch = &unread[..batch_length(unread)];
+        let lines = self.log.lines(batch)?;
         let records: Result<Vec<Record<D>>> = lines
             .par_iter()
             .map(|line| self.log.record::<D>(line))
             .collect();
-        self.read += now.len();
-        let rows = records?.into_iter();
-        Ok(Some(
-            rows.filter_map(|record| self.rows.row(record)).collect(),
-        ))
+        self.read += batch.len();
+        let rows = records?
+            .into_iter()
+            .filter_map(|record| self.rows.row(record))
+            .collect();
+        Ok(Some(rows))
     }
 }
 
-/// How many of these records are read at once.
-fn at_once(places: &[LinePlace]) -> usize {
+/// Number of records in a batch that starts with the first of these places.
+fn batch_length(places: &[LinePlace]) -> usize {
     let mut bytes = 0;
     places
         .iter()
-        .take(RECORDS_AT_ONCE)
+        .take(MAX_RECORDS)
         .take_while(|place| {
             bytes += place.length;
-            bytes <= BYTES_AT_ONCE
+            bytes <= MAX_BYTES
         })
         .count()
         .max(1)

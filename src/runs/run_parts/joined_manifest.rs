@@ -1,4 +1,4 @@
-//! The manifest of the run that parts are together: [`joined_manifest`].
+//! [`joined_manifest`]: the manifest of a run that is joined from its parts.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use crate::types::InputSummary;
 use crate::types::keyed_flag::spelled_setting;
 use crate::types::manifest::{RunManifest, differences};
 
-/// Checks that all are parts of the same run.
+/// Checks that all parts belong to the same run.
 ///
 /// # Errors
-/// If one is not; names the first difference.
+/// If a part belongs to another run; names the first difference.
 pub(super) fn check_same_run(parts: &[StoredPart]) -> Result<()> {
     let Some(first) = parts.first() else {
         return Ok(());
@@ -33,62 +33,51 @@ pub(super) fn check_same_run(parts: &[StoredPart]) -> Result<()> {
     Ok(())
 }
 
-/// The first difference between two manifests that makes them different runs: the field, and its value in each.
-fn difference(first: &RunManifest, other: &RunManifest) -> Option<(String, String, String)> {
-    let identity = differences(&first.identity, &other.identity).next();
-    let identity = identity.map(|(field, own, other)| (spelled_setting(field), own, other));
-    identity.or_else(|| {
-        let column = first.column_differences(other).into_iter().next()?;
-        let setting = spelled_setting(&column.field);
-        let field = format!("{setting} of the {} {}", column.column, column.value);
-        Some((field, column.first, column.second))
-    })
+/// First difference by which two manifests belong to different runs: the field, and its value in each.
+fn difference(one: &RunManifest, other: &RunManifest) -> Option<(String, String, String)> {
+    if let Some((field, first, second)) = differences(&one.identity, &other.identity).next() {
+        return Some((spelled_setting(field), first, second));
+    }
+    let column = one.column_differences(other).into_iter().next()?;
+    let setting = spelled_setting(&column.field);
+    let field = format!("{setting} of the {} {}", column.column, column.value);
+    Some((field, column.first, column.second))
 }
 
-/// The manifest of the run, without the numbers of its trials.
+/// Joins the manifests of the parts into the manifest of the run. Its trial counts are left to the caller.
 ///
 /// # Errors
 /// If there is no part.
 pub(super) fn joined_manifest(parts: &[StoredPart], coverage: &Coverage) -> Result<RunManifest> {
-    let manifests = parts.iter().map(|part| &part.manifest);
-    let first = manifests.clone().next();
-    let mut manifest = first.ok_or_else(no_part)?.clone();
+    let mut manifest = parts.first().ok_or_else(no_part)?.manifest.clone();
     manifest.shard = None;
     manifest.part = None;
     PartCost::forget(&mut manifest);
-    for other in manifests.clone() {
-        for (column, values) in &other.columns {
+    for part in parts {
+        for (column, values) in &part.manifest.columns {
             let all = manifest.columns.entry(column.clone()).or_default();
             all.extend(values.clone());
         }
     }
     manifest.enhancers = BTreeMap::new();
-    for (name, note) in manifests.clone().flat_map(|other| &other.enhancers) {
+    for (name, note) in parts.iter().flat_map(|part| &part.manifest.enhancers) {
         let earlier = manifest.enhancers.remove(name);
         let note = note.clone().after(earlier);
         manifest.enhancers.insert(name.clone(), note);
     }
     let mut inputs: Option<InputSummary> = None;
-    let once = manifests
-        .clone()
-        .zip(coverage.once())
-        .filter_map(|(other, is_taken)| other.inputs.as_ref().filter(|_| is_taken));
-    for other in once {
-        inputs.get_or_insert_default().join(other);
+    for (part, is_counted) in parts.iter().zip(coverage.once()) {
+        if is_counted && let Some(part_inputs) = &part.manifest.inputs {
+            inputs.get_or_insert_default().join(part_inputs);
+        }
     }
     manifest.inputs = inputs;
-    let created = manifests
-        .clone()
-        .map(|manifest| manifest.created.clone())
-        .min();
-    let updated = manifests
-        .clone()
-        .map(|manifest| manifest.updated.clone())
-        .max();
-    // The records of all shards are stored as they are; the first version has no name in a manifest.
-    let readings = manifests.clone().map(|manifest| &manifest.reply_reading);
-    manifest.reply_reading = readings.min().cloned().flatten();
-    manifest.created = created.unwrap_or_default();
-    manifest.updated = updated.unwrap_or_default();
+    // The records of the parts keep their readings, so the oldest version counts; `None` is the first version.
+    let reply_reading = parts.iter().map(|part| &part.manifest.reply_reading).min();
+    manifest.reply_reading = reply_reading.cloned().flatten();
+    let created = parts.iter().map(|part| &part.manifest.created).min();
+    manifest.created = created.cloned().unwrap_or_default();
+    let updated = parts.iter().map(|part| &part.manifest.updated).max();
+    manifest.updated = updated.cloned().unwrap_or_default();
     Ok(manifest)
 }

@@ -1,9 +1,10 @@
-//! [`FindingByReading`]: a finding about noise, tested under each light reading.
+//! Findings about noise, tested under each light reading: [`FindingByReading`].
 //!
-//! The paper's noise model can be interpreted in several ways. A conclusion that holds under one of them alone is a conclusion about that
-//! interpretation. So each finding is computed under every reading on the same items, by the same formula, and the results are reported
-//! next to each other. Only the levels of the paper, L1–L5, count. Holm's correction covers all claims of all models under all readings
-//! (Holm 1979, Scand. J. Stat. 6:65), so that a report without any effect names none with 95 % probability.
+//! The paper's noise model can be interpreted in several ways; each interpretation is a light reading. A conclusion that holds under
+//! only one reading is a conclusion about that reading. Each finding is therefore computed under every reading, on the same items and by
+//! the same formula, and the results are reported side by side. Only the paper's levels, L1–L5, are tested. Holm's correction covers all
+//! claims of all models under all readings (Holm 1979, Scand. J. Stat. 6:65): if there is no effect at all, the report names none with
+//! 95 % probability.
 
 use std::collections::BTreeSet;
 
@@ -20,23 +21,23 @@ use darkqa_ground::types::{
     AxisLevel, EnhancerName, Family, KindReading, LightGroup, ReadingName, View,
 };
 
-/// A statement about noise that may hold under one light reading and not under another.
+/// A claim about noise that may hold under one light reading and not under another.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum NoiseHypothesis {
-    /// With noise, accuracy is lower than by the exposure drop alone: L1–L5 together, or one level.
+    /// Accuracy is lower with noise than with the exposure drop alone, at one level; `None` for L1–L5 together.
     NoiseCompounds(Option<AxisLevel>),
-    /// Darkness with noise costs accuracy: L5 against L0.
+    /// Accuracy is lower at L5 with noise than at L0.
     DarknessCosts,
-    /// An enhancer harms where light is left, L1–L3.
+    /// An enhancer lowers accuracy where some light is left, at L1–L3.
     EnhancerHarms(EnhancerName),
-    /// An enhancer helps in the dark, L4–L5.
+    /// An enhancer raises accuracy in the dark, at L4–L5.
     EnhancerHelps(EnhancerName),
-    /// A family is answered worse with a noisy image of a level than without images.
+    /// Accuracy on a family is lower with noisy images of a level than without images.
     BelowBlind(Family, AxisLevel),
 }
 
 impl NoiseHypothesis {
-    /// The word in files.
+    /// Name of the claim in files.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -48,12 +49,12 @@ impl NoiseHypothesis {
         }
     }
 
-    /// Whether the claim is that the first side is better than the second; else that it is worse.
-    fn is_gain(&self) -> bool {
+    /// True if the claim is that the first side is better than the second, false if it is that it is worse.
+    fn expects_gain(&self) -> bool {
         matches!(self, Self::NoiseCompounds(_) | Self::EnhancerHelps(_))
     }
 
-    /// The family that the claim is about; `None` for all.
+    /// The family that the claim is about; `None` for all families.
     #[must_use]
     pub fn family(&self) -> Option<&Family> {
         match self {
@@ -62,7 +63,7 @@ impl NoiseHypothesis {
         }
     }
 
-    /// The enhancer that the claim is about.
+    /// The enhancer that the claim is about, if any.
     #[must_use]
     pub fn enhancer(&self) -> Option<&EnhancerName> {
         match self {
@@ -71,7 +72,7 @@ impl NoiseHypothesis {
         }
     }
 
-    /// The levels that the claim is about, as far as they were asked.
+    /// The levels that the claim covers, whether they were asked or not.
     fn levels(&self) -> Vec<AxisLevel> {
         let levels = paper_levels();
         match self {
@@ -84,7 +85,7 @@ impl NoiseHypothesis {
     }
 }
 
-/// L1 to L5.
+/// The paper's levels, L1 to L5.
 fn paper_levels() -> Vec<AxisLevel> {
     Kind::Sensor
         .ladder()
@@ -93,12 +94,12 @@ fn paper_levels() -> Vec<AxisLevel> {
         .collect()
 }
 
-/// Test result of a claim, after the correction over claims and readings.
+/// Test result of a claim, after Holm's correction over all claims and readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
-    /// The effect is detected on the side of the claim.
+    /// An effect in the direction of the claim is detected.
     Holds,
-    /// The effect is detected on the other side.
+    /// An effect in the opposite direction is detected.
     Opposite,
     /// No effect is detected.
     Open,
@@ -116,18 +117,18 @@ impl Support {
     }
 }
 
-/// A claim under all readings together.
+/// Summary of the test results of a claim under all readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Robustness {
-    /// It holds under every reading of the report.
+    /// The claim holds under every reading of the report.
     All,
-    /// It holds under some readings.
+    /// The claim holds under some readings, and the opposite is detected under none.
     Some,
-    /// It holds under one reading at least, and the opposite is detected under another.
+    /// The claim holds under at least one reading, and the opposite is detected under another.
     Reversed,
-    /// It holds under no reading, and the opposite is detected under at least one.
+    /// The claim holds under no reading, and the opposite is detected under at least one.
     None,
-    /// No reading decides it.
+    /// Neither the claim nor its opposite is detected under any reading.
     Open,
 }
 
@@ -145,60 +146,61 @@ impl Robustness {
     }
 }
 
-/// A claim under one reading.
+/// The effect of a claim under one reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectInReading {
     /// The light reading.
     pub reading: ReadingName,
-    /// First side less second, mean over the levels; `n` is the number of items. `None` if a side was not asked.
+    /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items. `None` if a side was
+    /// not asked.
     pub effect: Option<TestedEffect>,
 }
 
-/// An effect with its test.
+/// An effect and its significance test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TestedEffect {
-    /// The difference of accuracies with its 95 % interval by clusters.
+    /// The difference in accuracy with its clustered 95 % interval.
     pub difference: Estimate,
     /// Test result of the claim.
     pub standing: Support,
-    /// p-value of no difference.
+    /// The p-value of the null hypothesis of no difference.
     pub p: f64,
     /// The p-value after Holm's correction over all claims and readings.
     pub holm: f64,
 }
 
-/// A claim about one model under every light reading, on the same items.
+/// Test results of a claim about one model under every light reading, on the same items.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FindingByReading {
     /// The model.
     pub model: String,
-    /// The runs that show these images, in a report on runs that show different ones.
+    /// The runs that showed these images, if the runs of the report showed different ones.
     pub group: Option<LightGroup>,
     /// The claim that was tested.
     pub claim: NoiseHypothesis,
-    /// The levels that every reading was asked at.
+    /// The levels asked under every reading; a reading under which none was asked does not count.
     pub levels: Vec<AxisLevel>,
-    /// The model without images that the claim compares with, if it is another one.
+    /// The model asked without images that [`NoiseHypothesis::BelowBlind`] compares with, if it is not `model` itself.
     pub blind: Option<String>,
     /// The effect under each reading of the report, `paper` first.
     pub effects: Vec<EffectInReading>,
-    /// The claim under all readings together.
+    /// Summary over all readings.
     pub robustness: Robustness,
-    /// Number of items that were asked, but not answered on every side, level and reading.
+    /// Number of items left out because they were asked, but not answered on every side, level and reading.
     pub dropped: usize,
 }
 
-/// All claims of each model, if the grid has several light readings; else none.
+/// Tests all claims of each model under every light reading; empty if the grid has fewer than two readings.
 #[must_use]
 pub fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
-    let readings: BTreeSet<&ReadingName> = noisy(grid)
+    let readings: BTreeSet<&ReadingName> = noisy_subjects(grid)
         .filter_map(|subject| subject.variant.reading.as_ref())
         .collect();
     if readings.len() < 2 {
         return Vec::new();
     }
     let readings: Vec<&ReadingName> = readings.into_iter().collect();
-    let models: BTreeSet<(&str, Option<&LightGroup>)> = noisy(grid)
+    let models: BTreeSet<(&str, Option<&LightGroup>)> = noisy_subjects(grid)
         .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
         .collect();
     let mut models: Vec<(&str, Option<&LightGroup>)> = models.into_iter().collect();
@@ -211,83 +213,95 @@ pub fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
                 .map(move |claim| (model, group, claim))
         })
         .collect();
-    let found = jobs.into_par_iter().filter_map(|(model, group, claim)| {
-        let sides = Sides { grid, model, group };
-        finding(&sides, claim, &readings)
-    });
-    corrected(found.collect())
+    let findings: Vec<FindingByReading> = jobs
+        .into_par_iter()
+        .filter_map(|(model, group, claim)| {
+            let lookup = SideLookup { grid, model, group };
+            finding(&lookup, claim, &readings)
+        })
+        .collect();
+    with_holm_correction(findings)
 }
 
-/// The subjects with noisy images.
-fn noisy<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g Subject> {
+/// The subjects that see noisy images.
+fn noisy_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g Subject> {
     grid.subjects.iter().filter(|subject| {
         subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_readings)
     })
 }
 
-/// The claims that may be computed for a model, in the order of the table.
+/// The claims to test for a model, in the order of the table.
 fn claims(grid: &Grid<'_>, model: &str) -> Vec<NoiseHypothesis> {
-    let enhancers: BTreeSet<&EnhancerName> = noisy(grid)
+    let enhancers: BTreeSet<&EnhancerName> = noisy_subjects(grid)
         .filter(|subject| subject.model == model)
         .filter_map(|subject| subject.enhancer.as_ref())
         .collect();
     let levels = paper_levels();
     let mut claims = vec![NoiseHypothesis::NoiseCompounds(None)];
-    let by_level = levels.iter();
-    claims.extend(by_level.map(|level| NoiseHypothesis::NoiseCompounds(Some(*level))));
+    claims.extend(
+        levels
+            .iter()
+            .map(|level| NoiseHypothesis::NoiseCompounds(Some(*level))),
+    );
     claims.push(NoiseHypothesis::DarknessCosts);
     for name in enhancers {
         claims.push(NoiseHypothesis::EnhancerHarms(name.clone()));
         claims.push(NoiseHypothesis::EnhancerHelps(name.clone()));
     }
     for family in grid.families() {
-        let dark = levels[3..].iter().rev();
-        claims.extend(dark.map(|level| NoiseHypothesis::BelowBlind(family.clone(), *level)));
+        claims.extend(
+            levels[3..]
+                .iter()
+                .rev()
+                .map(|level| NoiseHypothesis::BelowBlind(family.clone(), *level)),
+        );
     }
     claims
 }
 
-/// Where the two sides of a claim are found in the grid.
-struct Sides<'g, 'a> {
+/// Lookup of the two subjects that a claim about one model compares, its sides.
+struct SideLookup<'g, 'a> {
     grid: &'g Grid<'a>,
     model: &'g str,
     group: Option<&'g LightGroup>,
 }
 
-impl Sides<'_, '_> {
-    /// The two subjects of a claim at a level under a reading, by their indices.
+impl SideLookup<'_, '_> {
+    /// Indices of the first and second subject of a claim at a level under a reading; `None` if the grid lacks one of them.
     fn find(
         &self,
         claim: &NoiseHypothesis,
         level: AxisLevel,
         reading: &ReadingName,
     ) -> Option<(usize, usize)> {
-        let light = |kind: Option<Kind>, reading: Option<&ReadingName>| KindReading {
+        let variant = |kind: Option<Kind>, reading: Option<&ReadingName>| KindReading {
             kind,
             reading: reading.cloned(),
             pair: None,
             group: self.group.cloned(),
         };
-        let noisy = light(Some(Kind::Sensor), Some(reading));
-        let seeing = |level, variant: &KindReading, enhancer| {
+        let noisy = variant(Some(Kind::Sensor), Some(reading));
+        let subject_index = |level, variant: &KindReading, enhancer| {
             let subject = Subject::seeing(self.model, level, variant, enhancer);
             self.grid.stand_in(&subject)
         };
-        let raw = seeing(level, &noisy, None);
+        let unenhanced = subject_index(level, &noisy, None);
         Some(match claim {
             NoiseHypothesis::NoiseCompounds(_) => (
-                seeing(level, &light(Kind::Sensor.base(), None), None)?,
-                raw?,
+                subject_index(level, &variant(Kind::Sensor.base(), None), None)?,
+                unenhanced?,
             ),
-            NoiseHypothesis::DarknessCosts => (raw?, seeing(AxisLevel::L0, &noisy, None)?),
-            NoiseHypothesis::EnhancerHarms(name) | NoiseHypothesis::EnhancerHelps(name) => {
-                (seeing(level, &noisy, Some(name))?, raw?)
+            NoiseHypothesis::DarknessCosts => {
+                (unenhanced?, subject_index(AxisLevel::L0, &noisy, None)?)
             }
-            NoiseHypothesis::BelowBlind(..) => (raw?, self.blind()?),
+            NoiseHypothesis::EnhancerHarms(name) | NoiseHypothesis::EnhancerHelps(name) => {
+                (subject_index(level, &noisy, Some(name))?, unenhanced?)
+            }
+            NoiseHypothesis::BelowBlind(..) => (unenhanced?, self.blind()?),
         })
     }
 
-    /// The model itself without images; else the only model that was asked so.
+    /// Index of the same model asked without images, or else of the only model asked without images.
     fn blind(&self) -> Option<usize> {
         let blind: Vec<(usize, &Subject)> = self
             .grid
@@ -304,55 +318,48 @@ impl Sides<'_, '_> {
     }
 }
 
-/// A claim under every reading; `None` if no reading was asked on both sides.
+/// Tests a claim under every reading; `None` if no reading has replies to compare.
 fn finding(
-    sides: &Sides<'_, '_>,
+    lookup: &SideLookup<'_, '_>,
     claim: NoiseHypothesis,
     readings: &[&ReadingName],
 ) -> Option<FindingByReading> {
-    let asked_at = |reading: &ReadingName| {
-        claim
-            .levels()
-            .into_iter()
-            .filter(|level| sides.find(&claim, *level, reading).is_some())
-            .collect::<BTreeSet<AxisLevel>>()
-    };
-    let levels: Vec<BTreeSet<AxisLevel>> = readings.iter().map(|name| asked_at(name)).collect();
-    let shared = levels
+    let levels: Vec<AxisLevel> = readings
         .iter()
+        .map(|reading| asked_levels(lookup, &claim, reading))
         .filter(|levels| !levels.is_empty())
-        .cloned()
-        .reduce(|all, more| &all & &more)?;
-    let levels: Vec<AxisLevel> = shared.into_iter().collect();
+        .reduce(|shared, levels| &shared & &levels)?
+        .into_iter()
+        .collect();
     let pairs: Vec<Vec<(usize, usize)>> = readings
         .iter()
         .map(|reading| {
             levels
                 .iter()
-                .map(|level| sides.find(&claim, *level, reading))
+                .map(|level| lookup.find(&claim, *level, reading))
                 .collect::<Option<_>>()
                 .unwrap_or_default()
         })
         .collect();
-    let (kept, dropped) = shared_items(sides.grid, &pairs, claim.family());
+    let (kept, dropped) = shared_items(lookup.grid, &pairs, claim.family());
     let effects: Vec<Option<TestedEffect>> = pairs
         .iter()
-        .map(|pairs| effect(sides.grid, pairs, &kept))
+        .map(|pairs| effect(lookup.grid, pairs, &kept))
         .collect();
     if effects.iter().all(Option::is_none) {
         return None;
     }
     let blind = matches!(claim, NoiseHypothesis::BelowBlind(..))
-        .then(|| sides.blind())
+        .then(|| lookup.blind())
         .flatten()
-        .map(|index| sides.grid.subjects[index].model.clone());
+        .map(|index| lookup.grid.subjects[index].model.clone());
     Some(FindingByReading {
-        model: sides.model.to_owned(),
-        group: sides.group.cloned(),
+        model: lookup.model.to_owned(),
+        group: lookup.group.cloned(),
         robustness: Robustness::Open,
         claim,
         levels,
-        blind: blind.filter(|name| name != sides.model),
+        blind: blind.filter(|name| name != lookup.model),
         effects: readings
             .iter()
             .zip(effects)
@@ -365,14 +372,26 @@ fn finding(
     })
 }
 
-/// The items of a family that were answered on both sides of all pairs, and the number of those that were asked there but not
-/// answered.
+/// The levels of a claim at which both sides were asked under a reading.
+fn asked_levels(
+    lookup: &SideLookup<'_, '_>,
+    claim: &NoiseHypothesis,
+    reading: &ReadingName,
+) -> BTreeSet<AxisLevel> {
+    claim
+        .levels()
+        .into_iter()
+        .filter(|level| lookup.find(claim, *level, reading).is_some())
+        .collect()
+}
+
+/// Indices of a family's items with a reply on both sides of all pairs, and the number of its other items that were asked on any side.
 fn shared_items(
     grid: &Grid<'_>,
     pairs: &[Vec<(usize, usize)>],
     family: Option<&Family>,
 ) -> (Vec<usize>, usize) {
-    let sides: BTreeSet<usize> = pairs
+    let subjects: BTreeSet<usize> = pairs
         .iter()
         .flatten()
         .flat_map(|(first, second)| [*first, *second])
@@ -384,25 +403,26 @@ fn shared_items(
         .filter(|(_, item)| item.is_of(family))
         .map(|(index, _)| index)
         .filter(|item| {
-            sides
+            subjects
                 .iter()
-                .any(|side| grid.result(*side, *item).is_asked())
+                .any(|subject| grid.result(*subject, *item).is_asked())
         })
         .partition(|item| {
-            sides
+            subjects
                 .iter()
-                .all(|side| grid.result(*side, *item).is_reply())
+                .all(|subject| grid.result(*subject, *item).is_reply())
         });
     (kept, dropped.len())
 }
 
-/// The mean over the pairs of the first side less the second, on the items of `kept`; `None` without pairs or items.
+/// Tests the accuracy of the first sides minus that of the second sides, averaged over the pairs, on the items of `kept`. `None` without
+/// pairs or items.
 fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<TestedEffect> {
     if pairs.is_empty() || kept.is_empty() {
         return None;
     }
     let mut clusters = vec![ClusterNet { net: 0, items: 0 }; grid.clusters];
-    let mut squares = 0;
+    let mut sum_of_squares = 0;
     for &index in kept {
         let item = &grid.items[index];
         let is_right = |subject: usize| {
@@ -416,10 +436,10 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
         let cluster = &mut clusters[item.cluster as usize];
         cluster.net += net;
         cluster.items += 1;
-        squares += net * net;
+        sum_of_squares += net * net;
     }
     clusters.retain(|cluster| cluster.items > 0);
-    let tested = PairedTest::new(&clusters, pairs.len() as f64, squares as f64);
+    let tested = PairedTest::new(&clusters, pairs.len() as f64, sum_of_squares as f64);
     Some(TestedEffect {
         standing: Support::Open,
         difference: tested.difference,
@@ -428,38 +448,43 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
     })
 }
 
-/// The findings with their test results, after Holm's correction over all of them and all readings.
-fn corrected(mut found: Vec<FindingByReading>) -> Vec<FindingByReading> {
-    let effects = found.iter().flat_map(|finding| &finding.effects);
-    let values = effects.filter_map(|effect| Some(effect.effect.as_ref()?.p));
-    let mut corrected = holm(&values.collect::<Vec<_>>()).into_iter();
-    for finding in &mut found {
-        let is_gain = finding.claim.is_gain();
+/// Fills in the corrected p-values, test results and summaries, with Holm's correction over all findings and readings.
+fn with_holm_correction(mut findings: Vec<FindingByReading>) -> Vec<FindingByReading> {
+    let p_values: Vec<f64> = findings
+        .iter()
+        .flat_map(|finding| &finding.effects)
+        .filter_map(|in_reading| in_reading.effect)
+        .map(|effect| effect.p)
+        .collect();
+    let mut corrected = holm(&p_values).into_iter();
+    for finding in &mut findings {
+        let expects_gain = finding.claim.expects_gain();
         for (effect, holm) in finding
             .effects
             .iter_mut()
-            .filter_map(|effect| effect.effect.as_mut())
+            .filter_map(|in_reading| in_reading.effect.as_mut())
             .zip(&mut corrected)
         {
             effect.holm = holm;
-            effect.standing = standing(effect, is_gain);
+            effect.standing = support(effect, expects_gain);
         }
         finding.robustness = robustness(&finding.effects);
     }
-    found
+    findings
 }
 
-fn standing(effect: &TestedEffect, is_gain: bool) -> Support {
+/// Test result of a claim with this effect, by its corrected p-value and the sign of the difference.
+fn support(effect: &TestedEffect, expects_gain: bool) -> Support {
     if effect.holm >= ALPHA {
         Support::Open
-    } else if (effect.difference.value > 0.0) == is_gain {
+    } else if (effect.difference.value > 0.0) == expects_gain {
         Support::Holds
     } else {
         Support::Opposite
     }
 }
 
-/// The claim under the readings. A reading that was not asked shows nothing, so that the claim cannot hold under all.
+/// Summarizes a claim over the readings. A reading that was not asked has no effect, so the claim then cannot hold under all.
 fn robustness(effects: &[EffectInReading]) -> Robustness {
     let count = |standing: Support| {
         effects

@@ -1,6 +1,6 @@
-//! Records as a table of every subject by every item: [`Grid`].
+//! Trial results as a table, subjects by items: [`Grid`].
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
@@ -12,14 +12,17 @@ use darkqa_ground::types::{
     TrialRef, Trials,
 };
 
+/// Marks a missing index.
+const NO_INDEX: u32 = u32::MAX;
+
 /// Result of one item for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TrialResult {
     /// The item was not asked.
     Absent,
-    /// The trial failed: there is no reply.
+    /// The trial failed, so no reply exists.
     Failed,
-    /// There is a reply. Each reading is the index of a choice, or `None` if no choice could be read.
+    /// The model replied. Each reading is the index of the choice read from the reply, or `None` if it is unreadable.
     Read {
         /// Choice in the strict reading.
         strict: Option<u8>,
@@ -29,19 +32,19 @@ pub enum TrialResult {
 }
 
 impl TrialResult {
-    /// Whether the item was asked, with or without a reply.
+    /// True if the item was asked, with or without a reply.
     #[must_use]
     pub fn is_asked(self) -> bool {
         self != Self::Absent
     }
 
-    /// Whether there is a reply, readable or not.
+    /// True if the model replied, readably or not.
     #[must_use]
     pub fn is_reply(self) -> bool {
         matches!(self, Self::Read { .. })
     }
 
-    /// The reading in one mode; `None` if there is no reply, `Some(None)` if no choice could be read.
+    /// The choice read in a mode: `None` without a reply, `Some(None)` for an unreadable reply.
     #[must_use]
     pub fn reading(self, mode: ReadingMode) -> Option<Option<u8>> {
         match (self, mode) {
@@ -52,7 +55,7 @@ impl TrialResult {
     }
 }
 
-/// One question in one order of its choices and one repeat.
+/// One repeat of a question with its choices in one order.
 #[derive(Debug, Clone, Copy)]
 pub struct GridItem<'a> {
     /// The question as asked.
@@ -62,13 +65,13 @@ pub struct GridItem<'a> {
 }
 
 impl GridItem<'_> {
-    /// Whether a reading is the true choice of the item; never if nobody knows that.
+    /// True if a reading is the true choice; always false if the true choice is unknown.
     #[must_use]
     pub fn is_right(&self, chosen: Option<u8>) -> bool {
         chosen.is_some_and(|chosen| self.asked.truth == Some(usize::from(chosen)))
     }
 
-    /// Whether the item belongs to a family; always true for `None`.
+    /// True if the item belongs to a family; always true for `None`.
     #[must_use]
     pub fn is_of(&self, family: Option<&Family>) -> bool {
         family.is_none_or(|family| *self.asked.family == *family)
@@ -78,32 +81,32 @@ impl GridItem<'_> {
 /// Results of every subject on every item.
 #[derive(Debug)]
 pub struct Grid<'a> {
-    /// Subjects (model and condition), the models in their order, else sorted.
+    /// Subjects (model and condition), in the order of the models in `listing`, then sorted.
     pub subjects: Vec<Subject>,
-    /// The order, groups and marks of the models.
+    /// Order, groups and labels of the models.
     pub listing: ModelListing,
-    /// Items, sorted by frame, question, repeat and order of choices.
+    /// Items, sorted by frame, question, repeat and choices.
     pub items: Vec<GridItem<'a>>,
-    /// Number of clusters of all items.
+    /// Number of clusters.
     pub clusters: usize,
-    /// Results, subject by subject.
+    /// Results of all items for the first subject, then for the next one, and so on.
     results: Vec<TrialResult>,
     /// Index of each subject.
     indices: BTreeMap<Subject, usize>,
     trials: &'a Trials<ChoiceDetail>,
-    /// Place of the trial behind each result; [`u32::MAX`] if there is none.
+    /// Index in `trials` of the trial of each result; [`NO_INDEX`] if the item was not asked.
     places: Vec<u32>,
 }
 
 impl<'a> Grid<'a> {
-    /// Table of trials whose true choice is known. Of two trials of the same subject and item, the later one counts. Trials of frames
-    /// without a cluster are ignored.
+    /// Table of all trials whose true choice is known. A later trial replaces an earlier one of the same subject and item. Trials whose
+    /// frame has no cluster are ignored.
     #[must_use]
     pub fn new(trials: &'a Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
         Self::for_models(trials, clusters, &ModelListing::default(), |_| true)
     }
 
-    /// Table of the trials of some models in their order, else as [`Grid::new`].
+    /// Like [`Grid::new`], but only with the models for which `is_shown` is true, in the order of `listing`.
     #[must_use]
     pub fn for_models(
         trials: &'a Trials<ChoiceDetail>,
@@ -111,13 +114,13 @@ impl<'a> Grid<'a> {
         listing: &ModelListing,
         is_shown: impl Fn(&str) -> bool,
     ) -> Self {
-        // A question whose true choice nobody knows is never scored.
+        // Questions without a known true choice are never scored.
         Self::build(trials, clusters, listing, |asked, model| {
             asked.truth.is_some() && is_shown(model)
         })
     }
 
-    /// Table of the answers to questions without a known true choice, for inspection only.
+    /// Table of trials whose true choice is unknown, for inspection only.
     #[must_use]
     pub fn without_truths(
         trials: &'a Trials<ChoiceDetail>,
@@ -133,57 +136,56 @@ impl<'a> Grid<'a> {
         listing: &ModelListing,
         is_shown: impl Fn(&AskedItem, &str) -> bool,
     ) -> Self {
-        let met = GridScope::new(trials, |item, model| {
+        let scope = GridScope::new(trials, |item, model| {
             let has_cluster = clusters.get(&item.frame, &item.question).is_some();
             has_cluster && is_shown(item, model)
         });
-        let asked = trials.asked();
-        let mut indices = BTreeMap::<Subject, usize>::new();
-        let mut subjects_of = Vec::with_capacity(asked.len());
-        for (asked, is_met) in asked.iter().zip(met.asked) {
-            let subject = asked
-                .filter(|_| is_met)
-                .map(|(model, condition)| Subject::new(model, condition));
-            subjects_of.push(subject.clone());
-            indices.extend(subject.map(|subject| (subject, 0)));
-        }
-        let mut subjects: Vec<Subject> = indices.keys().cloned().collect();
-        // Subjects of one model stay sorted: the sort is stable.
+        let subject_by_asked: Vec<Option<Subject>> = trials
+            .asked()
+            .into_iter()
+            .zip(scope.asked)
+            .map(|(asked, is_in_scope)| {
+                let (model, condition) = asked.filter(|_| is_in_scope)?;
+                Some(Subject::new(model, condition))
+            })
+            .collect();
+        let sorted: BTreeSet<&Subject> = subject_by_asked.iter().flatten().collect();
+        let mut subjects: Vec<Subject> = sorted.into_iter().cloned().collect();
+        // The sort is stable, so the subjects of a model stay sorted.
         subjects.sort_by_cached_key(|subject| listing.place(&subject.model));
-        for (number, subject) in subjects.iter().enumerate() {
-            indices.insert(subject.clone(), number);
-        }
-        let subject_of: Vec<Option<usize>> = subjects_of
+        let indices: BTreeMap<Subject, usize> = subjects.iter().cloned().zip(0..).collect();
+        let index_by_asked: Vec<Option<usize>> = subject_by_asked
             .iter()
             .map(|subject| indices.get(subject.as_ref()?).copied())
             .collect();
-        let mut keys = HashMap::<_, u32>::new();
-        let mut items: Vec<GridItem<'a>> = Vec::new();
-        for asked in met.items.iter().map(|number| trials.item(*number)) {
-            if let Some(cluster) = clusters.get(&asked.frame, &asked.question) {
-                keys.entry(asked.key()).or_insert_with(|| {
-                    items.push(GridItem { asked, cluster });
-                    0
-                });
-            }
-        }
+        let mut seen = HashSet::new();
+        let mut items: Vec<GridItem<'a>> = scope
+            .items
+            .iter()
+            .filter_map(|number| {
+                let asked = trials.item(*number);
+                let cluster = clusters.get(&asked.frame, &asked.question)?;
+                seen.insert(asked.key())
+                    .then_some(GridItem { asked, cluster })
+            })
+            .collect();
         items.sort_by(|a, b| sort_key(a.asked).cmp(&sort_key(b.asked)));
-        for (item, index) in items.iter().zip(0..) {
-            keys.insert(item.asked.key(), index);
-        }
-        let mut item_of = vec![u32::MAX; trials.item_count()];
-        for number in &met.items {
-            item_of[*number] = keys[&trials.item(*number).key()];
+        let index_by_key: HashMap<_, u32> =
+            items.iter().map(|item| item.asked.key()).zip(0..).collect();
+        let mut index_by_item = vec![NO_INDEX; trials.item_count()];
+        for number in &scope.items {
+            index_by_item[*number] = index_by_key[&trials.item(*number).key()];
         }
         let size = subjects.len() * items.len();
-        let (mut results, mut places) = (vec![TrialResult::Absent; size], vec![u32::MAX; size]);
+        let mut results = vec![TrialResult::Absent; size];
+        let mut places = vec![NO_INDEX; size];
         for (place, trial) in (0..).zip(trials.iter()) {
-            let item = item_of[trial.item_number()];
-            let subject = subject_of[trial.asked_number()].filter(|_| item != u32::MAX);
-            // An item may be met with one model, and not be shown of another.
+            let item = index_by_item[trial.item_number()];
+            let subject = index_by_asked[trial.asked_number()].filter(|_| item != NO_INDEX);
+            // An item can be in the table because of one model, and still not be shown for another model.
             if let Some(subject) = subject.filter(|_| is_shown(trial.item(), trial.model())) {
                 let cell = subject * items.len() + item as usize;
-                results[cell] = result(trial);
+                results[cell] = trial_result(trial);
                 places[cell] = place;
             }
         }
@@ -199,35 +201,40 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Result of an item for a subject, by their indices.
+    /// Result of an item for a subject, both by index.
     #[must_use]
     pub fn result(&self, subject: usize, item: usize) -> TrialResult {
         self.results[subject * self.items.len() + item]
     }
 
-    /// The trial behind a result; `None` if the item was not asked.
+    /// The trial of an item and a subject, both by index; `None` if the item was not asked.
     #[must_use]
     pub fn trial(&self, subject: usize, item: usize) -> Option<TrialRef<'a>> {
         let place = self.places[subject * self.items.len() + item];
         self.trials.get(place as usize)
     }
 
-    /// True if the two parsings of some reply of a subject differ.
+    /// True if the strict and the lenient reading of any reply of a subject differ.
     #[must_use]
     pub fn parsings_differ(&self, subject: usize) -> bool {
-        let results = &self.results[subject * self.items.len()..(subject + 1) * self.items.len()];
-        results.iter().any(
+        self.row(subject).iter().any(
             |result| matches!(result, TrialResult::Read { strict, lenient } if strict != lenient),
         )
     }
 
-    /// Index of a subject, if the grid has it.
+    /// Results of a subject for all items.
+    fn row(&self, subject: usize) -> &[TrialResult] {
+        let start = subject * self.items.len();
+        &self.results[start..start + self.items.len()]
+    }
+
+    /// Index of a subject; `None` if the grid does not contain it.
     #[must_use]
     pub fn find(&self, subject: &Subject) -> Option<usize> {
         self.indices.get(subject).copied()
     }
 
-    /// The variants that were asked, sorted: kinds of degradation in each light reading.
+    /// All variants of the subjects, sorted: each kind of degradation in each light reading.
     #[must_use]
     pub fn variants(&self) -> BTreeSet<&KindReading> {
         self.subjects
@@ -237,8 +244,8 @@ impl<'a> Grid<'a> {
             .collect()
     }
 
-    /// The variant where only one is shown: of the first kind that was asked and those that extend it the last, in its first light
-    /// reading. So noise stays the main one if other kinds are asked too.
+    /// The variant to show if only one can be shown. Among the first kind of degradation and the kinds that extend it, this is the last
+    /// kind, in its first light reading. Noise therefore remains the main variant if other kinds are asked as well.
     #[must_use]
     pub fn main_variant(&self) -> Option<KindReading> {
         let variants = self.variants();
@@ -254,8 +261,8 @@ impl<'a> Grid<'a> {
             .cloned()
     }
 
-    /// Index of the first subject that stands for another, if the grid has one: that subject itself, or one whose group of
-    /// runs meets its own.
+    /// Index of a subject or, if the grid does not contain it, of the first subject that differs only in its group of runs and whose
+    /// group overlaps. `None` if the grid contains neither.
     #[must_use]
     pub fn stand_in(&self, subject: &Subject) -> Option<usize> {
         self.find(subject).or_else(|| {
@@ -265,20 +272,19 @@ impl<'a> Grid<'a> {
         })
     }
 
-    /// Items of a family, each with its result for a subject.
+    /// Items of a family (of all families for `None`), each with its result for a subject.
     pub fn family_items<'s>(
         &'s self,
         subject: usize,
         family: Option<&'s Family>,
     ) -> impl Iterator<Item = (&'s GridItem<'a>, TrialResult)> + 's {
-        let results = &self.results[subject * self.items.len()..(subject + 1) * self.items.len()];
         self.items
             .iter()
-            .zip(results.iter().copied())
+            .zip(self.row(subject).iter().copied())
             .filter(move |(item, _)| item.is_of(family))
     }
 
-    /// Numbers of right replies and of replies of a subject, by cluster.
+    /// Number of replies and of right replies of a subject in each cluster.
     #[must_use]
     pub fn counts(
         &self,
@@ -297,25 +303,24 @@ impl<'a> Grid<'a> {
         counts
     }
 
-    /// The grid with some of its items; `kept` has a value for each item. Clusters keep their numbers.
+    /// A grid of the items for which `kept` is true; `kept` has one value per item. Cluster indices do not change.
     #[must_use]
     pub fn restricted(&self, kept: &[bool]) -> Self {
-        let cells = |subject: usize| {
-            kept.iter()
-                .enumerate()
-                .filter(|(_, kept)| **kept)
-                .map(move |(item, _)| subject * self.items.len() + item)
-        };
-        let cells: Vec<usize> = (0..self.subjects.len()).flat_map(cells).collect();
-        let items = self.items.iter().zip(kept);
+        let kept_items: Vec<usize> = kept
+            .iter()
+            .enumerate()
+            .filter(|(_, is_kept)| **is_kept)
+            .map(|(item, _)| item)
+            .collect();
+        let cells: Vec<usize> = (0..self.subjects.len())
+            .map(|subject| subject * self.items.len())
+            .flat_map(|start| kept_items.iter().map(move |item| start + item))
+            .collect();
         Self {
             subjects: self.subjects.clone(),
             listing: self.listing.clone(),
             indices: self.indices.clone(),
-            items: items
-                .filter(|(_, kept)| **kept)
-                .map(|(item, _)| *item)
-                .collect(),
+            items: kept_items.iter().map(|item| self.items[*item]).collect(),
             clusters: self.clusters,
             results: cells.iter().map(|cell| self.results[*cell]).collect(),
             trials: self.trials,
@@ -323,7 +328,7 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// The families of the items, sorted.
+    /// All families of the items, sorted.
     #[must_use]
     pub fn families(&self) -> Vec<&'a Family> {
         let families: BTreeSet<&Family> =
@@ -331,7 +336,7 @@ impl<'a> Grid<'a> {
         families.into_iter().collect()
     }
 
-    /// The groups that are counted separately: all families together (`None`), then each family.
+    /// Groups that are scored separately: all families together (`None`), then each family.
     #[must_use]
     pub fn groups(&self) -> Vec<Option<&'a Family>> {
         let families = self.families().into_iter().map(Some);
@@ -339,52 +344,54 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// The models in conditions and the items that a grid includes.
+/// The subjects and items to include in a grid: those of at least one shown trial.
 struct GridScope {
-    /// Whether a model in a condition is shown, by its number.
+    /// True for each included pair of model and condition, by its index in [`Trials::asked`].
     asked: Vec<bool>,
-    /// The numbers of the items, in the order of the first trials about them.
+    /// Indices of the included items in [`Trials::items`], in the order of their first shown trials.
     items: Vec<usize>,
 }
 
 impl GridScope {
     fn new(trials: &Trials<ChoiceDetail>, is_shown: impl Fn(&AskedItem, &str) -> bool) -> Self {
-        let mut met = Self {
+        let mut scope = Self {
             asked: vec![false; trials.asked().len()],
             items: Vec::new(),
         };
-        // Most trials are about an item and of a model that were met together with others.
-        let mut is_met = vec![false; trials.item_count()];
+        let mut is_included = vec![false; trials.item_count()];
         for trial in trials.iter() {
             let (item, asked) = (trial.item_number(), trial.asked_number());
-            if is_met[item] && met.asked[asked] || !is_shown(trial.item(), trial.model()) {
+            // Most trials add neither a subject nor an item; `is_shown` is not called for them.
+            let adds_nothing = is_included[item] && scope.asked[asked];
+            if adds_nothing || !is_shown(trial.item(), trial.model()) {
                 continue;
             }
-            met.asked[asked] = true;
-            if !is_met[item] {
-                is_met[item] = true;
-                met.items.push(item);
+            scope.asked[asked] = true;
+            if !is_included[item] {
+                is_included[item] = true;
+                scope.items.push(item);
             }
         }
-        met
+        scope
     }
 }
 
-/// Sort key of items.
 fn sort_key(asked: &AskedItem) -> impl Ord + '_ {
     (&asked.frame, &asked.question, asked.repeat, &asked.choices)
 }
 
-fn result(trial: TrialRef<'_>) -> TrialResult {
-    let chosen = |reading: AnswerReading| {
-        let index = reading.chosen?;
-        Some(index.min(usize::from(u8::MAX)) as u8)
-    };
+fn trial_result(trial: TrialRef<'_>) -> TrialResult {
     match (trial.outcome(), trial.strict()) {
         (TrialOutcome::Failed, _) | (_, None) => TrialResult::Failed,
         (_, Some(strict)) => TrialResult::Read {
-            strict: chosen(strict),
-            lenient: trial.lenient().and_then(chosen),
+            strict: chosen_index(strict),
+            lenient: trial.lenient().and_then(chosen_index),
         },
     }
+}
+
+/// Index of the choice in a reading, at most 255; `None` if no choice could be read.
+fn chosen_index(reading: AnswerReading) -> Option<u8> {
+    let index = reading.chosen?;
+    Some(index.min(usize::from(u8::MAX)) as u8)
 }

@@ -9,64 +9,68 @@ use darkqa_ground::types::{
     AxisLevel, Condition, Control, EnhancerName, KindReading, LightGroup, TrialRef, View,
 };
 
-/// The model name of the chance line.
+/// Model name of the chance line in results.
 pub const CHANCE: &str = "chance";
 
-/// A model name without the run behind it: where several runs are compared, `observer (one)` is the observer of the run `one`.
+/// Removes the name of the run from a model name. When several runs are compared, `observer (one)` is the observer of the run `one`.
 #[must_use]
 pub fn without_run(model: &str) -> &str {
     model.split_once(" (").map_or(model, |(name, _)| name)
 }
 
-/// Whether a model of this name is the built-in observer.
+/// True if the model is the built-in observer.
 #[must_use]
 pub fn is_observer(model: &str) -> bool {
     without_run(model) == OBSERVER
 }
 
-/// Whether a model of this name is a control of the observer.
+/// True if the model is a control of the observer.
 #[must_use]
 pub fn is_control(model: &str) -> bool {
     Control::from_model_name(model).is_some()
 }
 
-/// Whether a model of this name is built in and stands for comparison only: `random`, `observer` and its controls
-/// (`observer:…`). It is no model under test, so rankings and comparisons of models leave it out.
+/// True if the model is built in and serves only as a reference: `random`, `observer` and its controls (`observer:…`). References
+/// are not under test, so rankings and comparisons of models leave them out.
 #[must_use]
 pub fn is_reference(model: &str) -> bool {
     without_run(model) == "random" || is_observer(model) || is_control(model)
 }
 
-/// The models that results are about, sorted: references only if there are no others.
+/// Models under test, sorted. If only references ran, all of them.
 #[must_use]
 pub fn judged<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
     let all: BTreeSet<&str> = models.into_iter().collect();
-    let others: BTreeSet<&str> = all
+    let under_test: BTreeSet<&str> = all
         .iter()
         .copied()
         .filter(|model| !is_reference(model))
         .collect();
-    if others.is_empty() { all } else { others }
+    if under_test.is_empty() {
+        all
+    } else {
+        under_test
+    }
 }
 
-/// The models to pool, sorted: those that are [`judged`]. If only reference models ran, one of them alone, preferably the observer: a mean
-/// of the observer and `random` would be meaningless.
+/// Models to pool, sorted: the [`judged`] ones. If only references ran, one of them, preferably the observer, because a mean of the
+/// observer and `random` would be meaningless.
 #[must_use]
 pub fn pooled_models<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
-    let judged = judged(models);
-    if !judged.iter().all(|model| is_reference(model)) {
-        return judged;
+    let models = judged(models);
+    if !models.iter().all(|model| is_reference(model)) {
+        return models;
     }
-    judged
+    models
         .iter()
         .find(|model| is_observer(model))
-        .or(judged.first())
+        .or(models.first())
         .copied()
         .into_iter()
         .collect()
 }
 
-/// A model in a condition; every cell of a table belongs to one.
+/// A model in a condition. Every table cell belongs to one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Subject {
     /// Name of the model, or [`CHANCE`].
@@ -82,13 +86,13 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// The subject of a trial.
+    /// Model and condition of a trial.
     #[must_use]
     pub fn from_trial(trial: TrialRef<'_>) -> Self {
         Self::new(trial.model(), trial.condition())
     }
 
-    /// A model in a condition; without images if the condition is `None`.
+    /// A model in a condition, or without images if the condition is `None`.
     #[must_use]
     pub fn new(model: &str, condition: Option<&Condition>) -> Self {
         Self {
@@ -100,13 +104,13 @@ impl Subject {
         }
     }
 
-    /// Whether the model is built in and stands for comparison only: `random`, `observer` or one of its controls.
+    /// True if the model is a reference: `random`, `observer` or one of its controls.
     #[must_use]
     pub fn is_reference(&self) -> bool {
         is_reference(&self.model)
     }
 
-    /// The condition as text, for example `L3-noise+zerodce`; `blind` without images.
+    /// Condition as text, for example `L3-noise+zerodce`; `blind` without images.
     #[must_use]
     pub fn condition(&self) -> String {
         let Some(level) = self.level else {
@@ -117,23 +121,28 @@ impl Subject {
             (None, None) => level.to_string(),
             (None, Some(_)) => format!("{level}-{}", self.variant.kind_and_reading()),
         };
-        let enhancer = self.enhancer.as_ref().map(|name| format!("+{name}"));
+        let enhancer = self
+            .enhancer
+            .as_ref()
+            .map_or_else(String::new, |name| format!("+{name}"));
         let group = self.variant.group_suffix();
-        format!("{light}{}{group}", enhancer.unwrap_or_default())
+        format!("{light}{enhancer}{group}")
     }
 
     /// True if both are the same model in the same condition and their groups of runs overlap.
     #[must_use]
     pub fn matches_up_to_group(&self, other: &Self) -> bool {
-        let (one, two) = (&self.variant, &other.variant);
+        let (variant, other_variant) = (&self.variant, &other.variant);
         self.model == other.model
             && (self.view, self.level) == (other.view, other.level)
-            && (one.kind, &one.reading, &one.pair) == (two.kind, &two.reading, &two.pair)
+            && variant.kind == other_variant.kind
+            && variant.reading == other_variant.reading
+            && variant.pair == other_variant.pair
             && self.enhancer == other.enhancer
-            && LightGroup::meet(one.group.as_ref(), two.group.as_ref())
+            && LightGroup::meet(variant.group.as_ref(), other_variant.group.as_ref())
     }
 
-    /// The same model in the same condition, whichever runs show its images.
+    /// The same model in the same condition, for images from any group of runs.
     #[must_use]
     pub fn in_any_light(&self) -> Self {
         let mut subject = self.clone();
@@ -141,8 +150,8 @@ impl Subject {
         subject
     }
 
-    /// A model with images, at a level of a variant, raw or enhanced. L0 is the clean frame of every variant; it keeps the group
-    /// of runs, so that [`matches_up_to_group`](Self::matches_up_to_group) finds the clean frames of these runs.
+    /// A model with images at a level of a variant, raw or enhanced. Variants share the clean frame: at L0, only the group of runs
+    /// is kept of the variant, so that [`matches_up_to_group`](Self::matches_up_to_group) finds the clean frames of those runs.
     #[must_use]
     pub fn seeing(
         model: &str,

@@ -1,4 +1,4 @@
-//! Tables of text: TSV as VLMEvalKit writes it (`vlmeval/dataset/image_mcq.py`), and CSV.
+//! Reader for text tables: CSV, and TSV as written by VLMEvalKit (`vlmeval/dataset/image_mcq.py`).
 
 use std::fs::File;
 use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom};
@@ -11,97 +11,104 @@ use super::super::row::{RowPlace, Table};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// The ending decides the delimiter; a CSV file without a comma in its header has semicolons, as spreadsheets write it in many countries.
+/// Returns the delimiter of a table: a tab for the ending `tsv`; otherwise a comma, or a semicolon if the header has semicolons but no
+/// commas, as spreadsheets write it in many countries.
 pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     if ending == "tsv" {
         return Ok(b'\t');
     }
     let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut header = Vec::new();
-    let mut file = BufReader::new(file.take(LONGEST_RECORD));
+    let mut file = BufReader::new(file.take(MAX_RECORD_BYTES));
     file.read_until(b'\n', &mut header)
         .map_err(|e| Error::file(path, "read", e))?;
     let is_comma = header.contains(&b',') || !header.contains(&b';');
     Ok(if is_comma { b',' } else { b';' })
 }
 
-/// The maximum length of a record, in bytes: an image of 48 MB in base64.
-const LONGEST_RECORD: u64 = 64 << 20;
+/// Maximum length of a record, in bytes: enough for an image of 48 MB in base64.
+const MAX_RECORD_BYTES: u64 = 64 << 20;
 
-/// A file of which no record is longer than it may be.
-struct Bounded {
+/// A file that fails to read once a record exceeds [`MAX_RECORD_BYTES`].
+struct RecordLimited {
     file: File,
-    /// How many bytes may be read for the record.
-    left: u64,
+    /// Bytes that may still be read for the current record.
+    remaining: u64,
 }
 
-impl Bounded {
-    /// A record begins.
-    fn begin(&mut self) {
-        self.left = LONGEST_RECORD;
+impl RecordLimited {
+    /// Resets the limit for the next record.
+    fn start_record(&mut self) {
+        self.remaining = MAX_RECORD_BYTES;
     }
 }
 
-impl Read for Bounded {
+impl Read for RecordLimited {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.file.read(buffer)?;
-        self.left = self
-            .left
+        self.remaining = self
+            .remaining
             .checked_sub(count as u64)
             .ok_or_else(|| io::Error::other(TOO_LONG))?;
         Ok(count)
     }
 }
 
-impl Seek for Bounded {
+impl Seek for RecordLimited {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
         self.file.seek(to)
     }
 }
 
+/// Message for a record longer than [`MAX_RECORD_BYTES`].
 const TOO_LONG: &str = "more than 64 MB; is a quote missing before it or in it?";
 
-fn reader(path: &Path, delimiter: u8) -> Result<Reader<Bounded>> {
+fn open_reader(path: &Path, delimiter: u8) -> Result<Reader<RecordLimited>> {
     let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
-    let left = LONGEST_RECORD;
     Ok(ReaderBuilder::new()
         .delimiter(delimiter)
         .flexible(true)
-        .from_reader(Bounded { file, left }))
+        .from_reader(RecordLimited {
+            file,
+            remaining: MAX_RECORD_BYTES,
+        }))
 }
 
-/// Adds the rows of a file.
+/// Adds all rows of a file to a table.
 pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> {
-    let mut reader = reader(path, delimiter)?;
-    let wrong = |e: csv::Error| Error::data(path.display(), e);
-    let header = reader.byte_headers().map_err(wrong)?.clone();
+    let mut reader = open_reader(path, delimiter)?;
+    let header = reader
+        .byte_headers()
+        .map_err(|e| Error::data(path.display(), e))?
+        .clone();
     let mut columns = Vec::new();
     for name in &header {
-        let name = text(name).map_err(|problem| Error::line(path, 1, problem))?;
+        let name = decode(name).map_err(|problem| Error::line(path, 1, problem))?;
         let name = name.trim();
         if columns.iter().any(|(known, _)| known == name) && !name.is_empty() {
             let problem = format_args!("two columns are called {name:?}; rename one");
             return Err(Error::line(path, 1, problem));
         }
-        let at = table.column(name);
-        let at = at.map_err(|problem| Error::line(path, 1, problem))?;
-        columns.push((name.to_owned(), at));
+        let column = table
+            .column(name)
+            .map_err(|problem| Error::line(path, 1, problem))?;
+        columns.push((name.to_owned(), column));
     }
     let mut record = ByteRecord::new();
     let mut number = 0;
     loop {
         number += 1;
         let line = reader.position().line();
-        let begins = |e: csv::Error| {
+        reader.get_mut().start_record();
+        let has_record = reader.read_byte_record(&mut record).map_err(|e| {
             let place = format!("{}, record {number}, line {line}", path.display());
             Error::data(place, e)
-        };
-        reader.get_mut().begin();
-        if !reader.read_byte_record(&mut record).map_err(begins)? {
+        })?;
+        if !has_record {
             break;
         }
         let position = record.position().cloned().unwrap_or_else(Position::new);
-        let at = |problem: String| {
+        let row_error = |problem: String| {
             Error::data(
                 format_args!("{}, line {}", path.display(), position.line()),
                 problem,
@@ -118,38 +125,43 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
                 columns.len(),
                 String::from_utf8_lossy(stray)
             );
-            return Err(at(problem));
+            return Err(row_error(problem));
         }
         let mut cells = Vec::with_capacity(columns.len());
         for ((name, column), cell) in columns.iter().zip(&record) {
-            let text = text(cell).map_err(|problem| at(format!("column {name:?}: {problem}")))?;
+            let text =
+                decode(cell).map_err(|problem| row_error(format!("column {name:?}: {problem}")))?;
             if !text.is_empty() {
                 cells.push((*column, Cell::Text(text.to_owned())));
             }
         }
-        let pushed = table.push(RowPlace::Record(position.clone()), cells);
-        pushed.map_err(at)?;
+        table
+            .push(RowPlace::Record(position.clone()), cells)
+            .map_err(row_error)?;
     }
     Ok(())
 }
 
-/// The cell of a row in a column, whole.
+/// Reads one whole cell, given the position of its record and the name of its column.
 pub(super) fn cell(path: &Path, delimiter: u8, position: &Position, column: &str) -> Result<Cell> {
-    let wrong = |e: csv::Error| Error::data(path.display(), e);
-    let mut reader = reader(path, delimiter)?;
-    let header = reader.byte_headers().map_err(wrong)?;
-    let at = header
+    let file_error = |e: csv::Error| Error::data(path.display(), e);
+    let mut reader = open_reader(path, delimiter)?;
+    let index = reader
+        .byte_headers()
+        .map_err(file_error)?
         .iter()
         .position(|name| name.trim_ascii() == column.as_bytes());
     let mut record = ByteRecord::new();
-    reader.seek(position.clone()).map_err(wrong)?;
-    reader.read_byte_record(&mut record).map_err(wrong)?;
-    let cell = at.and_then(|at| record.get(at)).unwrap_or_default();
-    Ok(text(cell).map_or(Cell::Absent, |text| Cell::Text(text.to_owned())))
+    reader.seek(position.clone()).map_err(file_error)?;
+    reader.read_byte_record(&mut record).map_err(file_error)?;
+    let cell = index
+        .and_then(|index| record.get(index))
+        .unwrap_or_default();
+    Ok(decode(cell).map_or(Cell::Absent, |text| Cell::Text(text.to_owned())))
 }
 
-/// The text of a cell; the error names the first byte that is no UTF-8.
-fn text(cell: &[u8]) -> Result<&str, String> {
+/// Decodes a cell as UTF-8. The error names the first invalid byte, counted from 1.
+fn decode(cell: &[u8]) -> Result<&str, String> {
     std::str::from_utf8(cell).map_err(|e| {
         format!(
             "byte {} of the cell is not UTF-8; save the file as UTF-8",

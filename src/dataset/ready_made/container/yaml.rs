@@ -1,18 +1,21 @@
-//! The YAML in which the cards of data sets name their files: [`value`].
+//! Parser for the YAML in a data set's card, which lists the data files: [`value`].
 
 use saphyr_parser::{Event, Parser, ScalarStyle, StrInput};
 
-/// A value.
+/// A parsed YAML value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Yaml {
+    /// Null, or an empty document.
     Nothing,
+    /// Any other scalar, numbers included.
     Text(String),
     List(Vec<Yaml>),
+    /// A mapping, in file order.
     Fields(Vec<(String, Yaml)>),
 }
 
 impl Yaml {
-    /// The value of a field.
+    /// The value of the first field of this name; `None` if there is none or this is not a mapping.
     pub(super) fn field(&self, name: &str) -> Option<&Self> {
         let Self::Fields(fields) = self else {
             return None;
@@ -24,30 +27,31 @@ impl Yaml {
     }
 }
 
-/// Most levels of values in each other; chosen.
+/// Maximum nesting depth; chosen.
 const DEEPEST: usize = 20;
 
-/// The value of a text. Anchors, aliases and tags are refused, so that a value is no longer than its text.
+/// Parses a YAML text. Anchors, aliases and tags are rejected, so a value cannot be larger than its text.
 ///
 /// # Errors
-/// If it is not YAML, or holds something that is not read.
+/// If the text is not YAML, is nested too deeply, or has an anchor, an alias, a tag or a field name that is not a text.
 pub(super) fn value(text: &str) -> Result<Yaml, String> {
-    let mut reader = Reader(Parser::new_from_str(text));
+    let mut reader = EventReader(Parser::new_from_str(text));
     let mut value = Yaml::Nothing;
     loop {
-        match reader.next()? {
+        match reader.next_event()? {
             Event::StreamEnd => return Ok(value),
             Event::Nothing | Event::StreamStart | Event::DocumentStart(_) | Event::DocumentEnd => {}
-            event => value = reader.value(event, 0)?,
+            event => value = reader.parse_value(event, 0)?,
         }
     }
 }
 
-/// The events of a text.
-struct Reader<'a>(Parser<'a, StrInput<'a>>);
+/// Builds values from the events of the YAML parser.
+struct EventReader<'a>(Parser<'a, StrInput<'a>>);
 
-impl<'a> Reader<'a> {
-    fn next(&mut self) -> Result<Event<'a>, String> {
+impl<'a> EventReader<'a> {
+    /// The next event; [`Event::StreamEnd`] at the end of the text.
+    fn next_event(&mut self) -> Result<Event<'a>, String> {
         match self.0.next() {
             None => Ok(Event::StreamEnd),
             Some(Ok((event, _))) => Ok(event),
@@ -55,8 +59,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The value that an event begins.
-    fn value(&mut self, event: Event<'a>, depth: usize) -> Result<Yaml, String> {
+    /// Parses the value that starts with `event`. `depth` is 0 at the top level.
+    fn parse_value(&mut self, event: Event<'a>, depth: usize) -> Result<Yaml, String> {
         if depth > DEEPEST {
             return Err(format!("values are nested more than {DEEPEST} levels deep"));
         }
@@ -70,24 +74,24 @@ impl<'a> Reader<'a> {
             Event::SequenceStart(0, None) => {
                 let mut items = Vec::new();
                 loop {
-                    match self.next()? {
+                    match self.next_event()? {
                         Event::SequenceEnd => return Ok(Yaml::List(items)),
-                        event => items.push(self.value(event, depth + 1)?),
+                        event => items.push(self.parse_value(event, depth + 1)?),
                     }
                 }
             }
             Event::MappingStart(0, None) => {
                 let mut fields = Vec::new();
                 loop {
-                    let name = match self.next()? {
+                    let name = match self.next_event()? {
                         Event::MappingEnd => return Ok(Yaml::Fields(fields)),
-                        event => self.value(event, depth + 1)?,
+                        event => self.parse_value(event, depth + 1)?,
                     };
                     let Yaml::Text(name) = name else {
                         return Err("the name of a field is not a text".to_owned());
                     };
-                    let event = self.next()?;
-                    fields.push((name, self.value(event, depth + 1)?));
+                    let event = self.next_event()?;
+                    fields.push((name, self.parse_value(event, depth + 1)?));
                 }
             }
             _ => Err("anchors, aliases and tags are not read".to_owned()),
@@ -104,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_and_brackets_are_read() {
+    fn parses_block_and_flow_style() {
         let read = value("- name: 'it''s' # what\n  files:\n  - a: 1\n    b: [x, \"y, z\"]\n  - c\n- {d: e, f: [g]}\n-\n  - h\n").unwrap();
         let field = |name: &str, value| (name.to_owned(), value);
         let expected = Yaml::List(vec![
@@ -140,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_read_is_refused() {
+    fn rejects_invalid_and_unsupported_yaml() {
         for wrong in [
             "a: &b c",
             "a: [b",
@@ -155,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn deep_and_unfinished_texts_end_at_once() {
+    fn rejects_deep_nesting() {
         for deep in ["- ", "[", "{a: ", "? "] {
             for count in [3000, 300_000] {
                 assert!(value(&(deep.repeat(count) + "x")).is_err(), "{deep}");

@@ -1,4 +1,4 @@
-//! Properties of an enhancer that its probe and its examination read.
+//! Accessors of an enhancer for the probe and `enhance doctor`, and updates of its usage note.
 
 use std::path::{Path, PathBuf};
 
@@ -14,16 +14,17 @@ use darkqa_ground::error::Result;
 use darkqa_ground::types::enhancer_note::{ProbeNote, ProbeOutcome};
 use darkqa_ground::types::{Rgb, SizeLog};
 
-/// Largest mean, of 0..1, of an output of a white image that counts as a residual; chosen: models that give the image have more than 0.9.
-const MOST_RESIDUAL: f64 = 0.25;
+/// Maximum mean output for a white image, in 0..1, at which the output may be a residual. Chosen: models that return the image itself
+/// exceed 0.9.
+const MAX_RESIDUAL_MEAN: f64 = 0.25;
 
 impl Enhancer {
-    /// Path of the model's file; for an enhancer of the program, what messages call it.
+    /// Path of the model file; for a built-in enhancer, the name that messages show.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Path of the model's sidecar, which may not be there.
+    /// Path of the model's sidecar, whether or not the file exists.
     pub fn sidecar_path(&self) -> PathBuf {
         sidecar::path_for(&self.path)
     }
@@ -34,7 +35,7 @@ impl Enhancer {
         self.usage.clone()
     }
 
-    /// The same enhancer with another note, which it goes on with.
+    /// Replaces the usage note: from now on the enhancer writes into `usage`.
     pub(crate) fn with_usage(self, usage: Usage) -> Self {
         let enhancer = Self { usage, ..self };
         enhancer.note_convention();
@@ -45,12 +46,12 @@ impl Enhancer {
         &self.graph
     }
 
-    /// Statements of sidecar and preset.
+    /// Input and output convention from sidecar and preset.
     pub(crate) fn convention(&self) -> &ModelSidecar {
         &self.graph.convention
     }
 
-    /// The ranges in which it is fed and read now.
+    /// Value ranges in which the input is currently encoded and the output decoded.
     pub(crate) fn ranges(&self) -> RangePair {
         RangePair {
             input: ValueScale::Range(self.graph.feeding.range),
@@ -58,44 +59,40 @@ impl Enhancer {
         }
     }
 
-    /// The ranges of input and output that the sidecar, a preset or the element types state. A preset that states none stands for
-    /// 0..1, which all authors of presets use, and so does a sidecar with an expression, which is of values in 0..1.
+    /// Value ranges of input and output, as far as the sidecar, a preset or the element types state them. A preset without a range
+    /// means 0..1, which all authors of presets use. A sidecar with an expression also means 0..1, because expressions are defined
+    /// on values in 0..1.
     pub(crate) fn stated_ranges(&self) -> [Option<ValueRange>; 2] {
         let (signature, convention) = (&self.graph.signature, self.convention());
-        let of = |stated: Option<ValueRange>, element: &ElementType| {
-            let is_preset = self.description.preset.is_some();
-            let is_composed = convention.input.is_some() || convention.image.is_some();
-            let implied = (is_preset || is_composed).then_some(ValueRange::Unit);
-            stated.or(element.certain_range()).or(implied)
-        };
-        // A small mean and deviation are of values in 0..1, those of other libraries of 0..255.
-        let unit = |numbers: [Option<[f32; 3]>; 2]| {
-            let mut numbers = numbers.into_iter().flatten().flatten().peekable();
-            let is_stated = numbers.peek().is_some();
-            (is_stated && numbers.all(|number| number.abs() <= 2.0)).then_some(ValueRange::Unit)
-        };
-        let normalised_in = unit([convention.mean, convention.std]);
-        let normalised_out = unit([convention.mean_out, convention.std_out]);
-        let [input, output] = [
-            convention.range_in.or(normalised_in),
-            convention.range_out.or(normalised_out),
-        ];
+        let normalised_in = range_of_normalisation([convention.mean, convention.std]);
+        let normalised_out = range_of_normalisation([convention.mean_out, convention.std_out]);
+        let range_in = convention.range_in.or(normalised_in);
         // Authors who normalise the input and do not document the output return 0..1.
-        let output = output.or(normalised_in);
+        let range_out = convention.range_out.or(normalised_out).or(normalised_in);
+        let has_expression = convention.input.is_some() || convention.image.is_some();
+        let implied =
+            (self.description.preset.is_some() || has_expression).then_some(ValueRange::Unit);
+        let stated = |range: Option<ValueRange>, element: &ElementType| {
+            range.or(element.certain_range()).or(implied)
+        };
         [
-            of(input, &signature.input.port.element),
-            of(output, &signature.outputs[0].port.element),
+            stated(range_in, &signature.input.port.element),
+            stated(range_out, &signature.outputs[0].port.element),
         ]
     }
 
-    /// True if a preset defines input and output, and no sidecar overrides it.
+    /// True if a preset defines input and output, and the sidecar overrides neither a value range nor the channel order of
+    /// the output.
     pub(crate) fn follows_preset(&self) -> bool {
         let sidecar = &self.description.sidecar;
-        let is_stated = sidecar.range_in.is_some() || sidecar.range_out.is_some();
-        self.description.preset.is_some() && !is_stated && sidecar.color_out.is_none()
+        self.description.preset.is_some()
+            && sidecar.range_in.is_none()
+            && sidecar.range_out.is_none()
+            && sidecar.color_out.is_none()
     }
 
-    /// Whether the input may have a mean and a deviation that nothing states.
+    /// True if the model may expect an input normalised by a mean and a deviation: an RGB input, for which neither a range nor any
+    /// normalisation is stated.
     pub(crate) fn may_be_normalised(&self, range_in: Option<ValueRange>) -> bool {
         let convention = self.convention();
         let stated = [
@@ -109,55 +106,57 @@ impl Enhancer {
             && convention.channels.unwrap_or_default() == Channels::Rgb
     }
 
-    /// Adds what a reader of the results must know, as it follows the model's name.
-    pub(crate) fn remark(&mut self, words: &str) {
-        let words = sidecar::named(words, &self.path);
-        if !self.description.remarks.contains(&words) {
-            self.description.remarks.push(words);
+    /// Adds a caveat for readers of the results: a sentence that follows the model's name.
+    pub(crate) fn remark(&mut self, text: &str) {
+        let text = sidecar::named(text, &self.path);
+        if !self.description.remarks.contains(&text) {
+            self.description.remarks.push(text);
         }
         self.note_convention();
     }
 
-    /// Takes what an earlier trial found that a reader of the results must know.
+    /// Replaces the caveats for readers of the results by those of an earlier trial.
     pub(crate) fn set_remarks(&mut self, remarks: &[String]) {
         self.description.remarks = remarks.to_vec();
         self.note_convention();
     }
 
-    /// Prints what a reader of the results must know.
+    /// Logs the caveats for readers of the results as warnings.
     pub(crate) fn warn_of_remarks(&self) {
         for remark in &self.description.remarks {
             tracing::warn!("{}: {remark}", self.name);
         }
     }
 
-    /// Whether its output of a white image, in these ranges, is so dark that it seems to have to be added to the input.
+    /// True if the output may be a residual, to be added to the input: in these ranges, the output for a white image is nearly black.
     ///
     /// # Errors
     /// If the runtime fails.
     pub(crate) fn may_be_residual(&self, ranges: RangePair) -> Result<bool> {
         let convention = self.convention();
-        let (output, is_read) = (&self.graph.signature.outputs[0], convention.image.is_some());
-        if is_read || output.slice.is_some() || convention.channels == Some(Channels::Y) {
+        let output = &self.graph.signature.outputs[0];
+        let has_expression = convention.image.is_some();
+        if has_expression || output.slice.is_some() || convention.channels == Some(Channels::Y) {
             return Ok(false);
         }
         let convention = convention.clone().fed(ranges.input).read(ranges.output);
-        let graph = self.graph.with_convention(convention);
-        let graph = graph.map_err(|problem| self.fault(problem))?;
+        let graph = self
+            .graph
+            .with_convention(convention)
+            .map_err(|problem| self.fault(problem))?;
         let [height, width] = self.probe_size([96, 144]);
         let mut white = Rgb::black(height, width);
         white.samples_mut().fill(u8::MAX);
         graph.restart_clock();
-        Ok(match graph.planes(&Planes::from_rgb(&white))? {
-            RunResult::Output(planes) => {
-                let sum: f64 = planes.samples.iter().map(|sample| f64::from(*sample)).sum();
-                sum / planes.samples.len().max(1) as f64 <= MOST_RESIDUAL
-            }
-            _ => false,
-        })
+        let RunResult::Output(planes) = graph.planes(&Planes::from_rgb(&white))? else {
+            return Ok(false);
+        };
+        let sum: f64 = planes.samples.iter().map(|sample| f64::from(*sample)).sum();
+        let mean = sum / planes.samples.len().max(1) as f64;
+        Ok(mean <= MAX_RESIDUAL_MEAN)
     }
 
-    /// Height and width of a frame of the probe: the given ones, in the model's multiples, or those that it fixes.
+    /// Height and width of a probe frame: the given size, filled up to the model's multiple, or the size that the model fixes.
     pub(crate) fn probe_size(&self, size: [usize; 2]) -> [usize; 2] {
         let mut rule = self.rule(size);
         if let Some(TakenSizes::Multiple(multiple)) = self.search.found() {
@@ -173,12 +172,13 @@ impl Enhancer {
         self.usage.count_stored_anew();
     }
 
-    /// Sizes that were found by trial.
+    /// Sizes that the model accepts, if they were found by trial.
     pub(crate) fn found_sizes(&self) -> Option<TakenSizes> {
         self.search.found()
     }
 
-    /// Stores the result of the probe. The model is then used with the ranges that were tried, and no value counts as out of range.
+    /// Stores the result of the probe, and states the current value ranges in the convention. From then on no output value counts as
+    /// out of range.
     ///
     /// # Errors
     /// If the graph contradicts its own convention, which is a bug.
@@ -187,15 +187,17 @@ impl Enhancer {
         let ranges = self.ranges();
         let convention = self.convention().clone();
         let convention = convention.fed(ranges.input).read(ranges.output);
-        let graph = self.graph.with_convention(convention);
-        self.graph = graph.map_err(|problem| self.fault(problem))?;
+        self.graph = self
+            .graph
+            .with_convention(convention)
+            .map_err(|problem| self.fault(problem))?;
         self.description.assumed |= !is_stated && probe.outcome == ProbeOutcome::Plausible;
         self.usage.update(|note| note.probe = Some(probe));
         self.note_convention();
         Ok(())
     }
 
-    /// Notes how the model is fed and read, with the source of each value.
+    /// Writes the convention, with the source of each value, and the caveats into the usage note.
     pub(super) fn note_convention(&self) {
         let lines = self.description.lines(&self.graph, self.convention());
         let remarks = &self.description.remarks;
@@ -204,4 +206,12 @@ impl Enhancer {
             note.remarks.clone_from(remarks);
         });
     }
+}
+
+/// The value range that mean and deviation refer to: 0..1 if they are stated and no magnitude exceeds 2; otherwise unknown, because
+/// other libraries state them for 0..255.
+fn range_of_normalisation(mean_and_std: [Option<[f32; 3]>; 2]) -> Option<ValueRange> {
+    let mut numbers = mean_and_std.into_iter().flatten().flatten().peekable();
+    let is_stated = numbers.peek().is_some();
+    (is_stated && numbers.all(|number| number.abs() <= 2.0)).then_some(ValueRange::Unit)
 }

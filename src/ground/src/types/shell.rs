@@ -1,8 +1,10 @@
-//! Texts as words of a command that is printed: [`shell_word`].
+//! Shell quoting for printed commands: [`shell_word`].
 
 use std::borrow::Cow;
 
-/// A text as one word of a POSIX shell: in single quotes, if a shell would split it or find a meaning in it.
+/// Quotes a text as one word of a POSIX shell.
+///
+/// Single quotes are added to an empty text and to one with a character that is neither alphanumeric nor in `-_./:=,@%+`.
 pub fn shell_word(text: &str) -> Cow<'_, str> {
     if !text.is_empty()
         && text
@@ -19,7 +21,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_shell_would_change_stands_in_quotes() {
+    fn quotes_only_where_needed() {
         for plain in ["set/a-1.png", "C:/x", "options=A,B:index0", "été"] {
             assert_eq!(shell_word(plain), plain);
         }
@@ -38,12 +40,12 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_shell_reads_the_text_back() {
+    fn sh_reads_the_original_text_back() {
         for text in ["a b", "it's", "$(id) `id` \\ \"x\"", "a\nb", "*?[!]#&;|<>"] {
             let command = format!("printf %s {}", shell_word(text));
             let mut shell = std::process::Command::new("sh");
-            let said = shell.args(["-c", &command]).output().unwrap();
-            assert_eq!(said.stdout, text.as_bytes(), "{text:?}");
+            let output = shell.args(["-c", &command]).output().unwrap();
+            assert_eq!(output.stdout, text.as_bytes(), "{text:?}");
         }
     }
 }

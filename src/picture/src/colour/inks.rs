@@ -1,4 +1,4 @@
-//! Amounts of ink → sRGB codes: [`Inks`], for images of cyan, magenta, yellow and black (CMYK).
+//! Conversion of images in cyan, magenta, yellow and black (CMYK) to sRGB: [`Inks`].
 
 mod table;
 
@@ -11,77 +11,83 @@ use crate::reading_rule::ColourRule;
 use darkqa_ground::types::recent::Recent;
 use darkqa_ground::types::{ColourHandling, ColourNote, Digest};
 
-/// The name of inks whose file has no profile.
+/// Name of the colours of an image file without a profile, for its note.
 const WITHOUT_PROFILE: &str = "CMYK without a profile";
 
-/// The colours of the inks of an image.
+/// Conversion of an image from CMYK to sRGB.
 #[derive(Debug, Clone)]
 pub(crate) enum Inks {
-    /// By a formula: each ink takes its share of red, green or blue, and black its share of all.
+    /// Converts by a formula: each coloured ink absorbs its share of red, green or blue, and black absorbs its share of all three.
     Formula(ColourNote),
-    /// By the table of a profile.
-    Profile(Arc<InkColours>),
+    /// Converts by the table of an ICC profile.
+    Profile(Arc<CmykProfile>),
 }
 
-/// The table of a profile of inks, and the name and the digest of the profile.
+/// Table of a CMYK profile, with the profile's name and digest.
 #[derive(Debug)]
-pub(crate) struct InkColours {
+pub(crate) struct CmykProfile {
     table: InkTable,
     name: String,
-    profile: Digest,
+    digest: Digest,
 }
 
 impl Inks {
-    /// The colours of inks by the profile of their file.
+    /// Converts by the profile of the image file; by the formula if the file has none, or if the profile is ignored.
     ///
     /// # Errors
-    /// If the profile is not one of four inks, or is broken. The error names it, and the flag that leaves it aside.
+    /// If the profile is not for CMYK, or is broken. The message names the profile and the flag that ignores it.
     pub(crate) fn new(tag: &ColourTag, rule: ColourRule) -> Result<Self, String> {
-        let formula = |from: &str, handling| {
-            Self::Formula(ColourNote {
-                from: from.to_owned(),
-                profile: None,
-                handling,
-            })
-        };
         match (tag, rule) {
             (ColourTag::Profile(profile), ColourRule::Convert) => {
-                by_profile(profile).map(Self::Profile)
+                cached_profile(profile).map(Self::Profile)
             }
             (ColourTag::Profile(_), ColourRule::Ignore) => {
-                let from = "CMYK, whose profile is ignored";
-                Ok(formula(from, ColourHandling::Converted))
+                Ok(Self::formula("CMYK, whose profile is ignored"))
             }
-            _ => Ok(formula(WITHOUT_PROFILE, ColourHandling::Converted)),
+            _ => Ok(Self::formula(WITHOUT_PROFILE)),
         }
     }
 
-    /// The note of an image with these inks.
+    /// Converts by the formula. `from` is the name of the colours in the note.
+    fn formula(from: &str) -> Self {
+        Self::Formula(ColourNote {
+            from: from.to_owned(),
+            profile: None,
+            handling: ColourHandling::Converted,
+        })
+    }
+
+    /// Note about the conversion.
     pub(crate) fn note(&self) -> ColourNote {
         match self {
             Self::Formula(note) => note.clone(),
-            Self::Profile(colours) => ColourNote {
-                from: colours.name.clone(),
-                profile: Some(colours.profile),
+            Self::Profile(profile) => ColourNote {
+                from: profile.name.clone(),
+                profile: Some(profile.digest),
                 handling: ColourHandling::Converted,
             },
         }
     }
 
-    /// The sRGB codes of pixels, red, green and blue of each, from their amounts of ink, 0 for none and 255 for full.
+    /// Converts pixels of four ink amounts, from 0 (none) to 255 (full), to sRGB codes of red, green and blue.
     pub(crate) fn srgb(&self, inks: &[u8]) -> Vec<u8> {
         let (pixels, _) = inks.as_chunks::<4>();
         match self {
-            Self::Formula(_) => pixels.iter().flat_map(|inks| by_formula(*inks)).collect(),
-            Self::Profile(colours) => {
-                let mut last = ([0; 4], colours.table.srgb([0; 4]));
+            Self::Formula(_) => pixels
+                .iter()
+                .flat_map(|inks| srgb_by_formula(*inks))
+                .collect(),
+            Self::Profile(profile) => {
+                // Consecutive pixels with the same inks are converted once.
+                let (mut last_inks, mut last_srgb) = ([0; 4], profile.table.srgb([0; 4]));
                 pixels
                     .iter()
                     .flat_map(|inks| {
-                        if last.0 != *inks {
-                            last = (*inks, colours.table.srgb(*inks));
+                        if last_inks != *inks {
+                            last_inks = *inks;
+                            last_srgb = profile.table.srgb(*inks);
                         }
-                        last.1
+                        last_srgb
                     })
                     .collect()
             }
@@ -89,42 +95,44 @@ impl Inks {
     }
 }
 
-/// The codes of inks of no known colour (PostScript Language Reference, third edition, section 7.2.4, with products in place of sums,
-/// as libjpeg's users have it).
-fn by_formula([cyan, magenta, yellow, black]: [u8; 4]) -> [u8; 3] {
+/// Converts inks of unknown colour to sRGB codes (PostScript Language Reference, third edition, section 7.2.4, with products in place
+/// of sums, as in programs that use libjpeg).
+fn srgb_by_formula([cyan, magenta, yellow, black]: [u8; 4]) -> [u8; 3] {
     [cyan, magenta, yellow].map(|ink| {
-        let left = u32::from(255 - ink) * u32::from(255 - black);
-        ((left + 127) / 255) as u8
+        let light = u32::from(255 - ink) * u32::from(255 - black);
+        ((light + 127) / 255) as u8
     })
 }
 
-/// The colours of a profile. The last profiles are cached by their digests.
-fn by_profile(profile: &[u8]) -> Result<Arc<InkColours>, String> {
-    static KNOWN: LazyLock<Recent<Digest, Arc<InkColours>>> = LazyLock::new(|| Recent::new(CACHED));
+/// Reads a profile. The most recent [`CACHED`] profiles are cached by their digests.
+fn cached_profile(profile: &[u8]) -> Result<Arc<CmykProfile>, String> {
+    static CACHE: LazyLock<Recent<Digest, Arc<CmykProfile>>> =
+        LazyLock::new(|| Recent::new(CACHED));
     if profile.len() > MOST_PROFILE {
         return Err(too_large());
     }
     let digest = Digest::from_bytes(profile);
-    KNOWN.get(&digest, || {
-        let (name, table) = table(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
-        Ok(Arc::new(InkColours {
+    CACHE.get(&digest, || {
+        let (name, table) =
+            name_and_table(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
+        Ok(Arc::new(CmykProfile {
             table,
             name,
-            profile: digest,
+            digest,
         }))
     })
 }
 
-/// The name and the table of a profile.
-fn table(profile: &[u8]) -> Result<(String, InkTable), String> {
+/// Reads the name and the table of a profile.
+fn name_and_table(profile: &[u8]) -> Result<(String, InkTable), String> {
     let InkProfile { name, profile } = InkProfile::read(profile)?;
-    // White paper is white in both; most printers' profiles have the first.
-    let table = profile
+    // Both tables map white paper to white. Most printer profiles have the colorimetric one.
+    let lut = profile
         .lut_a_to_b_colorimetric
         .or(profile.lut_a_to_b_perceptual);
-    let problem = |problem: &str| format!("the ICC profile {name:?} cannot be used: {problem}");
-    let table = table.ok_or_else(|| problem("it has no table of colours (A2B)"))?;
-    let table = InkTable::new(&table, profile.pcs).map_err(|found| problem(&found))?;
+    let unusable = |reason: &str| format!("the ICC profile {name:?} cannot be used: {reason}");
+    let lut = lut.ok_or_else(|| unusable("it has no table of colours (A2B)"))?;
+    let table = InkTable::new(&lut, profile.pcs).map_err(|reason| unusable(&reason))?;
     Ok((name, table))
 }
 
@@ -133,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn inks_without_a_profile_take_their_share_of_light() {
+    fn inks_without_a_profile_are_converted_by_the_formula() {
         let inks = Inks::new(&ColourTag::None, ColourRule::Convert).unwrap();
         assert_eq!(inks.note().from, "CMYK without a profile");
         for (amounts, codes) in [
@@ -147,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn a_profile_of_other_colours_is_refused_and_can_be_ignored() {
+    fn an_rgb_profile_is_refused_and_can_be_ignored() {
         let mut profile = vec![0; 200];
         profile[16..20].copy_from_slice(b"RGB ");
         let tag = ColourTag::Profile(profile);

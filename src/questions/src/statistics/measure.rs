@@ -12,14 +12,14 @@ use crate::rules::Rules;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Digest, Frame, Labels};
 
-/// Measures a frame.
+/// Measures a frame. `key` is the digest of the measured files and the thresholds.
 ///
-/// Counts are whole pixels and lengths whole millimetres. Only the conversion of depth from the optical axis to the ray,
-/// `z · √(1 + ((x − cx) / fx)² + ((y − cy) / fy)²)`, uses floating-point numbers. IEEE 754 rounds these operations the same
+/// Counts are in whole pixels and lengths in whole millimetres. Only the conversion of depth from the optical axis to the ray,
+/// `z · √(1 + ((x − cx) / fx)² + ((y − cy) / fy)²)`, uses floating-point numbers; IEEE 754 rounds these operations the same
 /// way on every machine.
 ///
 /// # Errors
-/// [`darkqa_ground::error::Error::Data`] with the frame if it has no classes at all.
+/// [`darkqa_ground::error::Error::Data`], with the frame, if the frame has no classes at all.
 pub fn measure(
     frame: &Frame,
     labels: &Labels,
@@ -27,15 +27,17 @@ pub fn measure(
     palette: &Palette,
     key: Digest,
 ) -> Result<FrameStatistics> {
-    let rule = &rules.book().measure;
-    let scene = SceneMaps::new(frame, labels)?;
-    let size = scene.size;
-    let shapes = MaskShapes::measure(&scene, rule);
-    let (void, effective_void, lower_void) = scene.void(&shapes.joint, rule);
-    let mut cores = shapes.cores(frame, &scene, rule, palette);
+    let thresholds = &rules.book().measure;
     let coarse = &rules.book().coarse;
-    let samples = LightSamples::from_frame(frame, &scene, rule);
-    let (mut classes, mut loose, mut words) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
+    let scene = SceneMaps::new(frame, labels)?;
+    let shapes = MaskShapes::measure(&scene, thresholds);
+    let (void, effective_void, lower_void) = scene.void(&shapes.joint, thresholds);
+    let mut cores = shapes.cores(frame, &scene, thresholds, palette);
+    let samples = LightSamples::from_frame(frame, &scene, thresholds);
+
+    // Pixels by class: all, outside every segment, and without a word of their own.
+    let mut classes = BTreeMap::new();
+    let mut loose = BTreeMap::new();
     let mut unnamed = BTreeMap::new();
     for (&(mask, id), &count) in &shapes.joint {
         let Some(class) = scene.class(id) else {
@@ -49,26 +51,30 @@ pub fn measure(
             *loose.entry(class.to_owned()).or_insert(0) += count;
         }
     }
+
+    let mut words = BTreeMap::new();
     let mut segments = Vec::new();
-    for (mask, shape) in shapes.list.iter().enumerate() {
-        let Some(mut segment) = shapes.segment(frame, &scene, coarse, mask as u32 + 1, shape)
-        else {
+    for (index, shape) in shapes.list.iter().enumerate() {
+        // Mask 0 holds the pixels outside every segment.
+        let mask = index as u32 + 1;
+        let Some(mut segment) = shapes.segment(frame, &scene, coarse, mask, shape) else {
             continue;
         };
         if !segment.word.is_empty() {
             *words.entry(segment.word.clone()).or_insert(0) += segment.area;
         }
-        if let Some(core) = cores[mask].take() {
+        if let Some(core) = cores[index].take() {
             core.write_to(&mut segment);
-            segment.around = samples.around(mask as u32 + 1, segment.bbox);
+            segment.around = samples.around(mask, segment.bbox);
             segments.push(segment);
         }
     }
+
     Ok(FrameStatistics {
         frame: frame.id.clone(),
         key,
         scene: frame.scene.clone(),
-        size,
+        size: scene.size,
         luma: luma(frame),
         light: samples.light(),
         void,

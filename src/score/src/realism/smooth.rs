@@ -1,75 +1,83 @@
-//! Blocks of an image that are smooth without noise: [`SmoothBlocks`], and the spread of an image in them: [`SpreadCurve`].
+//! Noise of a low-light image in smooth blocks: [`SmoothBlocks`] and [`SpreadCurve`].
 //!
-//! The variation within such a block of the low-light image is noise, and a noise model must reproduce its spread as a function of the
-//! clean code. The spread about a plane is biased by demosaicing, rounding and texture; a comparison is not, because the real and the
-//! synthetic image pass through the same steps.
+//! Blocks are smooth if the image in normal light has little structure there. Variation in the same blocks of the low-light image is
+//! noise. A noise model must reproduce its spread as a function of the clean code, which is the green code that the exposure drop alone
+//! leaves. The spread about a fitted plane is biased by demosaicing, rounding and texture. Comparing a real with a synthetic image cancels
+//! this bias, because both pass through the same steps.
 
 use super::quantile::quantile;
 use darkqa_ground::types::Rgb;
 
 /// Side of a block in pixels (chosen).
 const SIDE: usize = 8;
-/// Number of bins of the clean code, equally filled (chosen).
+/// Number of bins of the clean code, with equally many blocks each (chosen).
 pub(super) const BINS: usize = 8;
-/// Share of the blocks of a bin that counts as smooth (chosen).
-const SMOOTH: f64 = 0.3;
-/// The number of blocks that a bin needs before, and after, the smooth ones are chosen (chosen).
-const LEAST: [usize; 2] = [20, 10];
-/// A block of the image in normal light with this code or more is near clipping, where noise is cut off (chosen).
-const BRIGHT: u8 = 250;
-/// Darkest clean code of a block after the exposure drop: below it, rounding leaves no spread (chosen).
-const DARKEST: f64 = 1.0;
-/// Least spread in codes; rounding destroys smaller ones (chosen).
-const LEAST_SPREAD: f64 = 0.05;
+/// Share of the blocks in a bin that count as smooth (chosen).
+const SMOOTH_SHARE: f64 = 0.3;
+/// Minimum number of blocks in a bin (chosen).
+const MIN_BLOCKS: usize = 20;
+/// Minimum number of smooth blocks in a bin (chosen).
+const MIN_SMOOTH_BLOCKS: usize = 10;
+/// A block is excluded if a green code in normal light is this high or higher: near clipping, noise is cut off (chosen).
+const CLIPPING_CODE: u8 = 250;
+/// Clean code that a block must exceed: below it, rounding leaves no spread (chosen).
+const MIN_CLEAN_CODE: f64 = 1.0;
+/// Lower bound of a spread, in codes: rounding destroys smaller ones (chosen).
+const MIN_SPREAD: f64 = 0.05;
 
-/// Blocks of 8 × 8 pixels that are smooth in the image in normal light, by their clean code after the exposure drop.
+/// Smooth blocks of 8 × 8 pixels in an image in normal light, in bins of their clean code after the exposure drop.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SmoothBlocks {
-    /// Indices of the smooth blocks of each bin, row by row over the image; empty for a bin with too few blocks.
+    /// Indices of the smooth blocks in each bin, counted row by row over the image; empty for a bin with too few blocks.
     bins: [Vec<usize>; BINS],
 }
 
-/// Spread of the green codes in the smooth blocks, bin by bin.
+/// Spread of the green codes in the smooth blocks of each bin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpreadCurve {
-    /// ln of the root mean square of the spreads in codes; `None` for a bin with too few blocks.
+    /// Natural logarithm of the root mean square of the blocks' spreads, in codes; `None` for a bin with too few blocks.
     pub(super) bins: [Option<f64>; BINS],
 }
 
-/// Properties of a block in normal light that decide whether it is used.
-struct BlockLight {
+/// A block of the image in normal light that is a candidate for a smooth block.
+struct Candidate {
     index: usize,
-    /// Mean code after the exposure drop.
-    code: f64,
+    /// Mean green code after the exposure drop.
+    clean_code: f64,
+    /// Spread in normal light, before the exposure drop.
     spread: f64,
 }
 
 impl SmoothBlocks {
-    /// Smooth blocks of an image in normal light whose partner is `drop_ev` EV darker.
+    /// Finds the smooth blocks of an image in normal light. Its low-light partner is `drop_ev` EV darker.
     #[must_use]
     pub fn new(normal: &Rgb, drop_ev: f64) -> Self {
-        let dropped = libm::exp2(-drop_ev / 2.2);
-        let blocks: Vec<BlockLight> = (0..count(normal))
+        let code_factor = libm::exp2(-drop_ev / 2.2);
+        let blocks: Vec<Candidate> = (0..block_count(normal))
             .filter_map(|index| {
                 let block = Block::new(normal, index);
-                let code = block.mean() * dropped;
-                let is_used = block.brightest() < f64::from(BRIGHT) && code > DARKEST;
-                is_used.then(|| BlockLight {
+                let clean_code = block.mean() * code_factor;
+                let is_used =
+                    block.brightest() < f64::from(CLIPPING_CODE) && clean_code > MIN_CLEAN_CODE;
+                is_used.then(|| Candidate {
                     index,
-                    code,
+                    clean_code,
                     spread: block.spread(),
                 })
             })
             .collect();
-        let mut codes: Vec<f64> = blocks.iter().map(|block| block.code).collect();
+        let mut codes: Vec<f64> = blocks.iter().map(|block| block.clean_code).collect();
         codes.sort_by(f64::total_cmp);
         let edges: Vec<f64> = (1..BINS)
             .filter_map(|edge| quantile(&codes, edge as f64 / BINS as f64))
             .collect();
-        let mut bins: [Vec<&BlockLight>; BINS] = Default::default();
+        let mut bins: [Vec<&Candidate>; BINS] = Default::default();
         for block in &blocks {
-            // A code on an edge belongs to the bin above it.
-            let bin = edges.iter().filter(|edge| **edge <= block.code).count();
+            // A code on the edge of two bins belongs to the upper bin.
+            let bin = edges
+                .iter()
+                .filter(|edge| **edge <= block.clean_code)
+                .count();
             bins[bin].push(block);
         }
         Self {
@@ -77,55 +85,55 @@ impl SmoothBlocks {
         }
     }
 
-    /// Spread of an image in these blocks. It has the size of the image that they were chosen in.
+    /// Measures the spread of an image in the smooth blocks. The image must have the size of the image in normal light.
     #[must_use]
     pub fn spread(&self, image: &Rgb) -> SpreadCurve {
         SpreadCurve {
             bins: self.bins.each_ref().map(|blocks| {
-                let mean = blocks
+                let mean_square = blocks
                     .iter()
                     .map(|index| Block::new(image, *index).spread().powi(2))
                     .sum::<f64>()
                     / blocks.len() as f64;
-                (!blocks.is_empty()).then(|| libm::log(mean.sqrt().max(LEAST_SPREAD)))
+                (!blocks.is_empty()).then(|| libm::log(mean_square.sqrt().max(MIN_SPREAD)))
             }),
         }
     }
 }
 
-/// Indices of the blocks with the least spread; none if there are too few.
-fn smoothest(blocks: &[&BlockLight]) -> Vec<usize> {
-    let [least, least_smooth] = LEAST;
-    if blocks.len() < least {
+/// Indices of the blocks of a bin with the smallest spreads; empty if the bin has too few blocks.
+fn smoothest(blocks: &[&Candidate]) -> Vec<usize> {
+    if blocks.len() < MIN_BLOCKS {
         return Vec::new();
     }
     let mut spreads: Vec<f64> = blocks.iter().map(|block| block.spread).collect();
     spreads.sort_by(f64::total_cmp);
-    let most = quantile(&spreads, SMOOTH).unwrap_or_default();
+    let max_spread = quantile(&spreads, SMOOTH_SHARE).unwrap_or_default();
     let smooth: Vec<usize> = blocks
         .iter()
-        .filter(|block| block.spread <= most)
+        .filter(|block| block.spread <= max_spread)
         .map(|block| block.index)
         .collect();
-    if smooth.len() < least_smooth {
+    if smooth.len() < MIN_SMOOTH_BLOCKS {
         return Vec::new();
     }
     smooth
 }
 
-/// Number of whole blocks of an image.
-fn count(image: &Rgb) -> usize {
+/// Number of whole blocks in an image.
+fn block_count(image: &Rgb) -> usize {
     (image.height() / SIDE) * (image.width() / SIDE)
 }
 
-/// Green codes of a block.
+/// Green codes of a block, row by row.
 struct Block([[f64; SIDE]; SIDE]);
 
 impl Block {
-    /// The block of an index below [`count`].
+    /// Block `index` of an image, counted row by row; `index` is below [`block_count`].
     fn new(image: &Rgb, index: usize) -> Self {
-        let across = image.width() / SIDE;
-        let [top, left] = [index / across, index % across].map(|block| block * SIDE);
+        let blocks_per_row = image.width() / SIDE;
+        let [top, left] =
+            [index / blocks_per_row, index % blocks_per_row].map(|block| block * SIDE);
         Self(std::array::from_fn(|row| {
             let line = ((top + row) * image.width() + left) * 3;
             std::array::from_fn(|column| f64::from(image.samples()[line + 3 * column + 1]))
@@ -144,27 +152,30 @@ impl Block {
         self.codes().copied().fold(0.0, f64::max)
     }
 
-    /// Standard deviation about the plane of least squares, in codes; the plane takes three degrees of freedom.
+    /// Standard deviation about the least-squares plane, in codes. The plane takes three degrees of freedom.
     fn spread(&self) -> f64 {
-        let at = |i: usize| i as f64 - (SIDE - 1) as f64 / 2.0;
-        // Σ t² over the block, t being the place in a row or in a column.
-        let places = SIDE as f64 * (0..SIDE).map(|i| at(i) * at(i)).sum::<f64>();
-        let (mut across, mut down) = (0.0, 0.0);
+        let centred = |i: usize| i as f64 - (SIDE - 1) as f64 / 2.0;
+        // Σ x² over the block, where x is the centred column; Σ y² over centred rows is the same.
+        let sum_of_squares = SIDE as f64 * (0..SIDE).map(|i| centred(i) * centred(i)).sum::<f64>();
+        let (mut sum_across, mut sum_down) = (0.0, 0.0);
         for (row, codes) in self.0.iter().enumerate() {
             for (column, code) in codes.iter().enumerate() {
-                across += code * at(column);
-                down += code * at(row);
+                sum_across += code * centred(column);
+                sum_down += code * centred(row);
             }
         }
-        let (mean, across, down) = (self.mean(), across / places, down / places);
-        let mut squares = 0.0;
+        let mean = self.mean();
+        let slope_across = sum_across / sum_of_squares;
+        let slope_down = sum_down / sum_of_squares;
+        let mut squared_residuals = 0.0;
         for (row, codes) in self.0.iter().enumerate() {
             for (column, code) in codes.iter().enumerate() {
-                let off = code - mean - across * at(column) - down * at(row);
-                squares += off * off;
+                let residual =
+                    code - mean - slope_across * centred(column) - slope_down * centred(row);
+                squared_residuals += residual * residual;
             }
         }
-        (squares / (SIDE * SIDE - 3) as f64).sqrt()
+        (squared_residuals / (SIDE * SIDE - 3) as f64).sqrt()
     }
 }
 
@@ -172,7 +183,7 @@ impl Block {
 mod tests {
     use super::*;
 
-    /// A grey ramp from left to right, with a chequered deviation of `texture(column)` codes.
+    /// A grey ramp from left to right plus a chequerboard of `texture(column)` codes.
     fn ramp(texture: impl Fn(usize) -> u8) -> Rgb {
         let (height, width) = (160, 240);
         let samples = (0..height * width).flat_map(|i| {
@@ -185,9 +196,9 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_has_no_spread_and_a_chequer_has_its_own() {
+    fn spread_ignores_a_plane_and_measures_a_chequerboard() {
         assert!(Block::new(&ramp(|_| 0), 7).spread() < 1e-12);
-        // ±2 about the mean: 4 · 64/61.
+        // ±2 about the mean: the variance is 4 · 64/61.
         let spread = Block::new(&ramp(|_| 4), 7).spread();
         assert!(
             (spread - f64::sqrt(4.0 * 64.0 / 61.0)).abs() < 0.02,
@@ -205,7 +216,7 @@ mod tests {
         assert!(kept.len() > 100);
         assert!(kept.iter().all(|index| index % across % 2 == 1));
         let curve = smooth.spread(&clean);
-        assert_eq!(curve.bins, [Some(libm::log(LEAST_SPREAD)); BINS]);
+        assert_eq!(curve.bins, [Some(libm::log(MIN_SPREAD)); BINS]);
         let noisy = smooth.spread(&ramp(|_| 4));
         assert!(
             noisy
@@ -216,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn dark_bright_and_few_blocks_are_left_out() {
+    fn images_without_usable_blocks_have_no_spread() {
         let white = Rgb::new(160, 240, vec![255; 160 * 240 * 3]).unwrap();
         let black = Rgb::black(160, 240);
         for image in [white, black, Rgb::black(7, 7)] {
