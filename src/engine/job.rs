@@ -102,10 +102,11 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// An estimate of the remaining requests and their cost. Sends nothing and writes no file.
     ///
     /// # Errors
-    /// If an enhancer cannot be opened, or an image cannot be made.
+    /// If the run has other settings, an enhancer cannot be opened, or an image cannot be made.
     pub(crate) fn forecast(self) -> Result<Forecast> {
         let experiment = self.experiment;
         let settings = experiment.settings();
+        self.check_same_run()?;
         let stored = store::read_trials(&self.folder)?;
         let mut answered = answered(&stored);
         answered.extend(lost_for_good(&stored, settings));
@@ -133,6 +134,22 @@ impl<'a, E: Experiment> Job<'a, E> {
             pipeline.probe(experiment.sources(), &plan.sources)?;
         }
         estimate::estimate(experiment, &plans, &measured, &stored, &mut pipeline)
+    }
+
+    /// Checks that the run in the folder, if there is one, could be gone on with.
+    ///
+    /// # Errors
+    /// If it has other settings.
+    fn check_same_run(&self) -> Result<()> {
+        if store::manifest_damage(&self.folder)?.is_some() {
+            return Ok(());
+        }
+        let Some(stored) = store::read_manifest(&self.folder, DetailOf::<E>::SCHEMA)? else {
+            return Ok(());
+        };
+        let requested = manifest::run_manifest(self.experiment, Some(stored.clone()))?;
+        let address_change = folder::address_change(&self.experiment.settings().place);
+        store::check_same_run(&self.folder, &stored, &requested, address_change)
     }
 
     /// Opens the run folder.

@@ -34,6 +34,7 @@ use crate::text::alert::Alert;
 use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
 use crate::types::Truths;
+use crate::types::keyed_flag::spelled_setting;
 use crate::types::manifest::RunManifest;
 use darkqa_score::confusion::Confusion;
 use darkqa_score::grid::Grid;
@@ -298,22 +299,47 @@ fn fact(name: &str, value: impl Into<String>) -> (String, String) {
 }
 
 fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
-    let texts = |map: &std::collections::BTreeMap<String, serde_json::Value>| {
-        map.iter()
-            .map(|(name, value)| match value {
-                serde_json::Value::String(text) => (name.clone(), text.clone()),
-                serde_json::Value::Null => (name.clone(), "not set".to_owned()),
-                other => (name.clone(), other.to_string()),
-            })
-            .collect::<Vec<_>>()
-    };
+    let known = manifest.identity.iter().chain(&manifest.settings);
     manifest
         .platform
         .iter()
         .map(|(name, value)| (name.clone(), value.clone()))
-        .chain(texts(&manifest.identity))
-        .chain(texts(&manifest.settings))
+        .chain(known.map(|(name, value)| (spelled_setting(name), setting_text(value))))
+        .chain(columns(manifest))
         .collect()
+}
+
+/// The settings of each model, enhancer, noise profile and variant, with the camera of a profile by its name.
+fn columns(manifest: &RunManifest) -> Vec<(String, String)> {
+    let mut rows = Vec::new();
+    for (column, values) in &manifest.columns {
+        let column = match column.as_str() {
+            "reading" => "noise profile",
+            other => other,
+        };
+        for (value, content) in values {
+            let fields = content.as_object().into_iter().flatten();
+            let set: Vec<String> = fields
+                .filter(|(_, value)| !value.is_null())
+                .map(|(name, value)| format!("{} {}", spelled_setting(name), setting_text(value)))
+                .collect();
+            rows.push(fact(&format!("{column} {value}"), set.join(", ")));
+        }
+    }
+    rows
+}
+
+/// The value of a setting: a text as it is, a thing with a name by its name.
+fn setting_text(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Null => "not set".to_owned(),
+        Value::Object(fields) => match fields.get("name") {
+            Some(Value::String(name)) => name.clone(),
+            _ => value.to_string(),
+        },
+        other => other.to_string(),
+    }
 }
 
 fn about(manifest: &RunManifest) -> Vec<(String, String)> {

@@ -323,7 +323,10 @@ pub fn restore_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
 
 /// Checks that a stored run is the requested one: the same identity, the same shard, and the same meaning of every column
 /// value that both have.
-pub(super) fn check_same_run(
+///
+/// # Errors
+/// [`Error::Run`], which names the setting that differs.
+pub fn check_same_run(
     folder: &Path,
     stored: &RunManifest,
     requested: &RunManifest,

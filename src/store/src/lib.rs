@@ -43,9 +43,7 @@ use darkqa_score::record::Detail;
 
 use changed_questions::ChangedQuestions;
 use damaged_file::{each_readable_line, lacks_notes, set_file_aside};
-use folder::{
-    FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_same_run, create_run, write, write_manifest,
-};
+use folder::{FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, create_run, write, write_manifest};
 use lines::{append, each_line, json_lines, lines, repair, set_aside};
 
 use own_files::check_own;
@@ -60,9 +58,9 @@ pub use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, e
 pub use stored_trial::StoredTrial;
 
 pub use folder::{
-    AddressChange, BATCH, BATCH_STATE, PLAN, each_placed_question, each_question, find, holds_run,
-    is_locked, manifest_damage, now, read_columns, read_fidelity, read_manifest, read_questions,
-    read_records, read_thumbnails, read_trials, restore_manifest, schema,
+    AddressChange, BATCH, BATCH_STATE, PLAN, check_same_run, each_placed_question, each_question,
+    find, holds_run, is_locked, manifest_damage, now, read_columns, read_fidelity, read_manifest,
+    read_questions, read_records, read_thumbnails, read_trials, restore_manifest, schema,
 };
 
 /// The trials that were sent in batches.

@@ -157,3 +157,21 @@ fn showing_a_complete_run_changes_nothing() {
         before
     );
 }
+
+#[test]
+fn a_dry_run_refuses_what_the_run_refuses() {
+    let bench = Bench::with_frames();
+    let line = "--model random --data frames --levels L0,L3 --out run";
+    bench.complete(&words(line));
+    for more in ["--seed 3", "--seed 3 --dry-run"] {
+        let called = bench.call(&words(&format!("{line} {more}")));
+        assert_eq!(called.code, Some(2), "{more}: {called:?}");
+        assert!(
+            called.stderr.contains("another --seed"),
+            "{more}: {called:?}"
+        );
+    }
+    let deeper = line.replace("L0,L3", "L0,L3,L5 --dry-run");
+    let more = bench.complete(&words(&deeper));
+    assert!(more.contains("are left to ask"), "{more}");
+}

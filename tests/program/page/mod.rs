@@ -102,6 +102,11 @@ fn first_screen(browser: &mut Browser) {
     );
     let wrong = browser.evaluate(&texts(".strip .answer.wrong"));
     assert_eq!(wrong, json!(["✗ red"]));
+    let facts = browser.evaluate("document.querySelector('#facts').textContent");
+    let facts = facts.as_str().unwrap();
+    for part in ["noise profile paper", "--noise camera", "--stop failures"] {
+        assert!(facts.contains(part), "{part}: {facts}");
+    }
 }
 
 fn count(browser: &mut Browser) -> Value {
