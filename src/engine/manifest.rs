@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::ask::Prices;
 use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::identity;
 use crate::engine::settings::JobSettings;
@@ -123,8 +122,6 @@ pub(crate) fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunMani
     manifest.status = Status::Started;
     manifest.updated = now();
     env!("CARGO_PKG_VERSION").clone_into(&mut manifest.version);
-    // A command without --prices has the built-in table.
-    manifest.settings.remove(Prices::SETTING);
     let settings = identity::settings(experiment.settings());
     manifest.settings.extend(settings);
 }

@@ -1,9 +1,11 @@
 //! Limits of cost and failures: [`MoneySettings`].
 
+use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde_json::Value;
 
 use crate::ask::Prices;
 use crate::error::Result;
@@ -47,16 +49,27 @@ pub(crate) struct MoneySettings {
 }
 
 impl MoneySettings {
-    /// The limits of these flags, with the prices read.
+    /// The limits of these flags, with the prices read: those of `--prices`, else those that the run keeps in its settings.
     ///
     /// # Errors
-    /// If the file of prices cannot be used.
-    pub(crate) fn resolve(args: &MoneyArgs, shard: Shard) -> Result<Self> {
+    /// If the file of prices, or the table in the settings, cannot be used.
+    pub(crate) fn resolve(
+        args: &MoneyArgs,
+        shard: Shard,
+        stored: &BTreeMap<String, Value>,
+    ) -> Result<Self> {
+        let prices = match &args.prices {
+            Some(path) => Prices::load(path)?,
+            None => Prices::from_settings(stored)?,
+        };
+        if args.prices.is_none() && args.max_cost.is_some() && prices.setting().is_some() {
+            // A folder may come from somebody else, and its prices decide when the run stops.
+            tracing::warn!(
+                "--max-cost counts with the prices that the run folder keeps; --prices FILE names others"
+            );
+        }
         Ok(Self {
-            prices: match &args.prices {
-                Some(path) => Prices::load(path)?,
-                None => Prices::built_in()?,
-            },
+            prices,
             max_cost: args.max_cost.map(|whole| shard.share_of_cost(whole)),
             max_failures: args.max_failures.map(NonZeroUsize::get),
             fail_fast: args.fail_fast,

@@ -1,12 +1,13 @@
 //! The settings that every experiment has: their flags ([`JobArgs`]) and the validated settings ([`JobSettings`]).
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::num::NonZeroU32;
 use std::path::{self, Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
+use serde_json::Value;
 
 use crate::ask::{AccessArgs, Bounds, Constrain, Parameters, RequestArgs, Sending};
 use crate::engine::models::{
@@ -286,7 +287,7 @@ impl JobArgs {
             format: self.images.image,
             max_side: experiment.max_side,
             concurrency: self.sending.concurrency,
-            money: MoneySettings::resolve(&self.money, shard)?,
+            money: MoneySettings::resolve(&self.money, shard, &place.for_shard(shard).settings())?,
             shard,
             grace: self.scale.grace,
             show_timings: self.scale.timings,
@@ -351,6 +352,16 @@ impl RunPlace {
                 store::read_columns(folder).unwrap_or_default()
             }
             Self::Automatic => Columns::default(),
+        }
+    }
+
+    /// The settings of the run in the folder that is named, as [`columns`](Self::columns).
+    fn settings(&self) -> BTreeMap<String, Value> {
+        match self {
+            Self::Named(folder) | Self::Resume(folder) => {
+                store::read_settings(folder).unwrap_or_default()
+            }
+            Self::Automatic => BTreeMap::new(),
         }
     }
 

@@ -539,4 +539,10 @@ fn the_report_has_the_prices_that_the_run_had() {
     std::fs::remove_file(bench.path("prices.toml")).unwrap();
     bench.complete(&words("report run"));
     assert_eq!(cost(), stated);
+    // The same run goes on with these prices, and says so where they are a limit.
+    let limited = bench.call(&args(&base, "--out run --max-cost 5"));
+    assert_eq!(limited.code, Some(0), "{limited:?}");
+    let note = "the prices that the run folder keeps";
+    assert!(limited.stderr.contains(note), "{limited:?}");
+    assert_eq!(cost(), stated);
 }

@@ -1,5 +1,6 @@
 //! The files of a run folder, and the check that a folder belongs to the requested run.
 
+use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs::{self, TryLockError};
 use std::io::ErrorKind;
@@ -12,6 +13,7 @@ use super::lines::{StoredLine, each_line, each_placed_line, lines};
 use super::pieces::{LinePlace, open_if_there};
 use super::stored_trial::StoredTrial;
 use jiff::Timestamp;
+use serde_json::Value;
 
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::folder_access::FolderAccess;
@@ -247,6 +249,11 @@ pub fn read_manifest(folder: &Path, schema: &str) -> Result<Option<RunManifest>>
 /// The columns in the manifest of a run of any kind; none without a manifest.
 pub fn read_columns(folder: &Path) -> Result<Columns> {
     Ok(any_manifest(folder)?.map_or_else(Columns::default, |manifest| manifest.columns))
+}
+
+/// The settings in the manifest of a run of any kind; none without a manifest.
+pub fn read_settings(folder: &Path) -> Result<BTreeMap<String, Value>> {
+    Ok(any_manifest(folder)?.map_or_else(BTreeMap::new, |manifest| manifest.settings))
 }
 
 /// The error text for a run with another schema than expected.

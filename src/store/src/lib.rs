@@ -60,7 +60,8 @@ pub use stored_trial::StoredTrial;
 pub use folder::{
     AddressChange, BATCH, BATCH_STATE, PLAN, check_same_run, each_placed_question, each_question,
     find, holds_run, is_locked, manifest_damage, now, read_columns, read_fidelity, read_manifest,
-    read_questions, read_records, read_thumbnails, read_trials, restore_manifest, schema,
+    read_questions, read_records, read_settings, read_thumbnails, read_trials, restore_manifest,
+    schema,
 };
 
 /// The trials that were sent in batches.
