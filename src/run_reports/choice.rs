@@ -69,8 +69,12 @@ pub(super) fn in_its_folder(
     if show.is_document() {
         return Ok(text);
     }
-    let page = folder.join(PAGE);
-    Ok(text + &format!("report: {}\n", page.display()))
+    let cost = match combined.runs.iter().find_map(|run| run.cost.as_ref()) {
+        Some(cost) => format!("cost: {cost}\n"),
+        None => String::new(),
+    };
+    let page = folder.join(PAGE).display().to_string();
+    Ok(text + &cost + &format!("report: {page}\n"))
 }
 
 /// The files of a report by name.

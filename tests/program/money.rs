@@ -529,7 +529,11 @@ fn the_report_has_the_prices_that_the_run_had() {
         let (before, _) = page.split_once(" of --prices").unwrap();
         before[before.len() - 40..].to_owned()
     };
-    bench.complete(&args(&base, "--out run --prices prices.toml"));
+    let printed = bench.complete(&args(&base, "--out run --prices prices.toml"));
+    assert!(
+        printed.contains("cost: $1.00 at the prices of 2026-01-01"),
+        "{printed}"
+    );
     let stated = cost();
     assert!(
         stated.ends_with("$1.00 at the prices of 2026-01-01"),
