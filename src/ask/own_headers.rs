@@ -127,9 +127,9 @@ impl OwnHeaders {
         for (name, value) in &self.map {
             if headers.insert(name, value.clone()).is_some() {
                 let problem = format_args!(
-                    "{name} is sent already, with the key or the account; --api-key-env none leaves the key out"
+                    "{name} is sent already, with the key or the account: leave it out of --header and --header-env, or the key with --api-key-env none"
                 );
-                return Err(Error::usage("--header-env", problem));
+                return Err(Error::usage("--header", problem));
             }
         }
         Ok(())
