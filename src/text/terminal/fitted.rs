@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
-use comfy_table::{CellAlignment, LineStyle};
+use comfy_table::{CellAlignment, ColumnConstraint, LineStyle, Width};
 use unicode_width::UnicodeWidthStr;
 
 use crate::text::table::ColumnKind;
@@ -41,6 +41,9 @@ pub(super) struct TextTable {
     pub(super) rows: Vec<TextRow>,
 }
 
+/// The width to which texts may be wrapped that name no row; chosen.
+const WRAPPED: usize = 24;
+
 impl TextTable {
     /// The table in lines of at most `most` columns, as far as its longest text allows. Where it is wider, names of models lose their
     /// middle, columns of zeros become a line below it, and at last its columns are printed in several parts, each with the texts that
@@ -61,7 +64,7 @@ impl TextTable {
             note = self.leave_out_zeros();
         }
         let parts = self.parts(most);
-        let printed: Vec<String> = parts.iter().map(|part| self.print(part)).collect();
+        let printed: Vec<String> = parts.iter().map(|part| self.print(part, most)).collect();
         printed.concat() + &note
     }
 
@@ -150,13 +153,13 @@ impl TextTable {
     }
 
     /// The columns of each part. The texts at the left, which name the rows, stand in every part; on a narrow terminal as many of them as
-    /// leave room for another column.
+    /// leave room for another column. Longer texts are wrapped.
     fn parts(&self, most: usize) -> Vec<Vec<usize>> {
         // The last cell has no gap behind it.
         let most = most + 1;
         let width_to = |end: usize| (0..end).map(|column| self.width_of(column)).sum::<usize>();
         let has_room = |names: usize| {
-            let widest = (names..self.columns.len()).map(|column| self.width_of(column));
+            let widest = (names..self.columns.len()).map(|column| self.least_width_of(column));
             width_to(names) + widest.max().unwrap_or(0) <= most
         };
         let texts = self
@@ -173,7 +176,10 @@ impl TextTable {
         let mut parts: Vec<Vec<usize>> = Vec::new();
         let mut width = 0;
         for column in names..self.columns.len() {
-            let own = self.width_of(column);
+            let least = self.least_width_of(column);
+            let own = self
+                .width_of(column)
+                .min(most.saturating_sub(named).max(least));
             match parts.last_mut() {
                 Some(part) if width + own <= most => part.push(column),
                 _ => {
@@ -186,7 +192,17 @@ impl TextTable {
         parts
     }
 
-    fn print(&self, columns: &[usize]) -> String {
+    /// The width that a column needs at least: a text may be wrapped.
+    fn least_width_of(&self, column: usize) -> usize {
+        let width = self.width_of(column);
+        match self.columns[column].kind {
+            ColumnKind::Text => width.min(WRAPPED + PADDING),
+            _ => width,
+        }
+    }
+
+    /// The columns as lines; where they are wider than `most`, the last text is wrapped.
+    fn print(&self, columns: &[usize], most: usize) -> String {
         let mut grid = comfy_table::Table::new();
         grid.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
         let heads = columns
@@ -213,6 +229,17 @@ impl TextTable {
             );
             if is_number {
                 place.set_cell_alignment(CellAlignment::Right);
+            }
+        }
+        let width: usize = columns.iter().map(|column| self.width_of(*column)).sum();
+        let last = columns.last().copied().unwrap_or_default();
+        // The last cell has no gap behind it, but a wrapped one has.
+        let over = width.saturating_sub(most);
+        if over > 1 && self.columns[last].kind == ColumnKind::Text {
+            let room = self.width_of(last).saturating_sub(over).max(WRAPPED);
+            let room = u16::try_from(room).unwrap_or(u16::MAX);
+            if let Some(column) = grid.column_mut(columns.len() - 1) {
+                column.set_constraint(ColumnConstraint::UpperBoundary(Width::Fixed(room)));
             }
         }
         format!("{grid}\n")
@@ -292,5 +319,32 @@ mod tests {
             "{text}"
         );
         assert!(!text.contains("unparsed 0"), "{text}");
+    }
+    #[test]
+    fn every_part_tells_its_rows_apart() {
+        let mut table = table();
+        table.columns.push(TextColumn {
+            head: "reason".to_owned(),
+            kind: ColumnKind::Text,
+        });
+        for (number, row) in table.rows.iter_mut().enumerate() {
+            if let TextRow::Cells(cells) = row {
+                cells[0] = "m".to_owned();
+                cells[1] = format!("with noise + enhancer {number}");
+                cells.push("a reason that takes a line of its own, which is 60 letters".to_owned());
+            }
+        }
+        let text = table.fitted(80);
+        let widest = text.lines().map(UnicodeWidthStr::width).max().unwrap();
+        assert!(widest <= 80, "{text}");
+        let reasons: Vec<&str> = text
+            .lines()
+            .filter(|line| line.contains("a reason"))
+            .collect();
+        assert_eq!(reasons.len(), 6, "{text}");
+        for (number, line) in (1..).zip(reasons) {
+            assert!(line.contains(&format!("enhancer {number}")), "{text}");
+        }
+        assert_eq!(text.matches("letters").count(), 6, "{text}");
     }
 }
