@@ -347,21 +347,18 @@ impl RunPlace {
     /// The columns of the run in the folder that is named. There are none if there is no run, or if its manifest cannot be read, which opening
     /// the folder reports.
     fn columns(&self) -> Columns {
-        match self {
-            Self::Named(folder) | Self::Resume(folder) => {
-                store::read_columns(folder).unwrap_or_default()
-            }
-            Self::Automatic => Columns::default(),
-        }
+        self.read(store::read_columns)
     }
 
     /// The settings of the run in the folder that is named, as [`columns`](Self::columns).
     fn settings(&self) -> BTreeMap<String, Value> {
+        self.read(store::read_settings)
+    }
+
+    fn read<T: Default>(&self, of_manifest: fn(&Path) -> Result<T>) -> T {
         match self {
-            Self::Named(folder) | Self::Resume(folder) => {
-                store::read_settings(folder).unwrap_or_default()
-            }
-            Self::Automatic => BTreeMap::new(),
+            Self::Named(folder) | Self::Resume(folder) => of_manifest(folder).unwrap_or_default(),
+            Self::Automatic => T::default(),
         }
     }
 
