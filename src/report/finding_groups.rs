@@ -149,29 +149,33 @@ impl<'a> FindingGroups<'a> {
             .filter(|clause| !clause.is_empty())
             .collect();
         match (&clauses[..], self.first().first()) {
-            ([], Some((_, first))) => capitalized(&first.text()) + ".",
+            ([], Some((_, first))) => self.sentence(&[first.text()]),
             ([], None) => String::new(),
-            _ => capitalized(&in_one_light(&clauses).join("; ")) + ".",
+            _ => self.sentence(&clauses),
         }
     }
-}
 
-/// The clauses of a sentence, the light of the first one named once.
-fn in_one_light(clauses: &[String]) -> Vec<&str> {
-    let light = clauses[0].split_once(": ").map_or("", |(light, _)| light);
-    let prefix = format!("{light}: ");
-    let rest = clauses[1..]
-        .iter()
-        .map(|clause| clause.strip_prefix(&prefix).unwrap_or(clause));
-    std::iter::once(&*clauses[0]).chain(rest).collect()
-}
-
-/// The text with a capital letter, unless it begins with a name.
-fn capitalized(text: &str) -> String {
-    match text.strip_prefix("with noise") {
-        Some(rest) => format!("With noise{rest}"),
-        None => text.to_owned(),
+    /// One sentence of some clauses; the light of the first one is named once, at its beginning.
+    fn sentence(&self, clauses: &[String]) -> String {
+        let findings = self.0.iter().flat_map(|group| &group.findings);
+        let prefix = findings
+            .filter_map(|finding| finding.shown().scope.light.as_ref())
+            .map(|light| format!("{light}: "))
+            .find(|prefix| clauses[0].starts_with(prefix))
+            .unwrap_or_default();
+        let bare = clauses
+            .iter()
+            .map(|clause| clause.strip_prefix(&prefix).unwrap_or(clause));
+        capitalized(&prefix) + &bare.collect::<Vec<_>>().join("; ") + "."
     }
+}
+
+/// A text with a capital at its beginning.
+fn capitalized(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 impl<'a> FindingGroup<'a> {
