@@ -56,7 +56,7 @@ impl ImageNames {
 }
 
 /// Whether a path is a file with the ending of an image that is read.
-pub(super) fn is_image(path: &Path) -> bool {
+pub(crate) fn is_image(path: &Path) -> bool {
     has(path, is_image_ending)
 }
 

@@ -1,7 +1,6 @@
 //! Images that were enhanced elsewhere, from the dark images of `synthesize`: [`EnhancedImages`], the folder of `--enhanced NAME=DIR`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -15,6 +14,7 @@ use crate::images::placed_image::{Sidecar, differing};
 use crate::images::source::SourceFrame;
 use crate::picture::image_file::format::FileFormat;
 use crate::picture::{ImageFile, ReadingRule};
+use crate::text::words::first_names;
 use crate::types::{Condition, DepthNote, Digest, EnhancerName, FrameId, Rgb};
 use darkqa_enhance::{EnhancedFolder, ImageUse, Implausible, Usage};
 
@@ -189,7 +189,11 @@ impl EnhancedImages {
         }
         if !faults.is_empty() {
             for (words, names) in &faults {
-                tracing::error!("{}: {words}: {}", self.folder.display(), first(names));
+                tracing::error!(
+                    "{}: {words}: {}",
+                    self.folder.display(),
+                    first_names(names, NAMED)
+                );
             }
             let count: usize = faults.values().map(Vec::len).sum();
             let problem = format_args!(
@@ -216,7 +220,7 @@ impl EnhancedImages {
                 self.folder.display(),
                 surplus.len(),
                 self.files.len(),
-                first(&surplus)
+                first_names(&surplus, NAMED)
             );
         }
         Ok(())
@@ -336,14 +340,4 @@ fn add_files(folder: &Path, below: &str, depth: usize, files: &mut Vec<String>) 
         }
     }
     Ok(())
-}
-
-/// The first of some names, and the number of the others.
-fn first(names: &[String]) -> String {
-    let shown = names.len().min(NAMED);
-    let mut text = names[..shown].join(", ");
-    if names.len() > shown {
-        let _ = write!(text, " and {} more", names.len() - shown);
-    }
-    text
 }

@@ -12,7 +12,7 @@ use crate::runs::stored::StoredRun;
 use crate::sentences::{against_baseline, no_verdict};
 use crate::tables::baseline;
 use crate::text::alert::{Alert, AlertKind};
-use crate::text::words::name;
+use crate::text::words::{first_names, name};
 use crate::types::{ChoiceDetail, TrialRef};
 use darkqa_score::baseline::{BaselineRow, baseline_rows};
 use darkqa_score::cluster::ClusterUnit;
@@ -153,36 +153,26 @@ impl Baseline {
             .filter(|subject| !rows.iter().any(|row| row.subject.model == subject.model))
             .map(|subject| subject.model.clone())
             .collect();
-        let baseline = Self {
+        Ok(Self {
             rows,
             old: name,
-            alerts: Vec::new(),
+            alerts,
             missing,
             added,
-        };
-        let gap = baseline
-            .gap()
-            .map(|text| Alert::new(AlertKind::Items, format!("{text}.")));
-        Ok(Self {
-            alerts: alerts.into_iter().chain(gap).collect(),
-            ..baseline
         })
     }
 
-    /// What of the old run is not compared, and why; `None` if all is.
+    /// The conditions of the old run that are not compared, with the reason; `None` if all are.
     fn gap(&self) -> Option<String> {
         let old = &self.old;
-        let (first, more) = self.missing.split_at(self.missing.len().min(MAX_NAMED));
-        let first: Vec<String> = first.iter().map(name).collect();
-        let conditions = match (&*first, more.len()) {
-            ([], _) => return None,
-            ([one], 0) => format!("{one} of {old} is not compared"),
-            (_, 0) => format!("{} of {old} are not compared", first.join(", ")),
-            (_, more) => format!(
-                "{} and {more} more of {old} are not compared",
-                first.join(", ")
-            ),
+        let missing: Vec<String> = self.missing.iter().map(name).collect();
+        let are = match missing.len() {
+            0 => return None,
+            1 => "is",
+            _ => "are",
         };
+        let named = first_names(&missing, MAX_NAMED);
+        let conditions = format!("{named} of {old} {are} not compared");
         let is_renamed = |subject: &Subject| {
             !self
                 .rows
@@ -214,7 +204,10 @@ impl Baseline {
         report.sentences.splice(..0, sentences);
         let place = report.tables.len().min(2);
         report.tables.insert(place, baseline(&rows, &self.old));
-        for alert in &self.alerts {
+        let gap = self
+            .gap()
+            .map(|text| Alert::new(AlertKind::Items, format!("{text}.")));
+        for alert in self.alerts.iter().chain(&gap) {
             if !report.alerts.contains(alert) {
                 report.alerts.push(alert.clone());
             }
@@ -237,20 +230,18 @@ impl Baseline {
             let problem = format!("{problem}; leave the flag out to see the report");
             Err(Error::usage(FAIL_IF_WORSE, problem))
         };
-        if models.is_empty() {
-            return none(self.gap().unwrap_or_else(|| {
-                format!(
-                    "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
-                     observer do not count)"
-                )
-            }));
-        }
         let mut verdicts = models.iter().map(|row| row.significance);
         if verdicts.any(|verdict| verdict == Significance::Worse) {
             return Ok(true);
         }
         if let Some(gap) = self.gap() {
             return none(gap);
+        }
+        if models.is_empty() {
+            return none(format!(
+                "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
+                 observer do not count)"
+            ));
         }
         if !models.iter().any(|row| row.significance.is_possible()) {
             return none(format!(

@@ -200,3 +200,12 @@ fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
         _ => format!("{value} [{low}, {high}]"),
     }
 }
+
+/// The first of some names, at most `most`, and the number of the others: `a, b and 3 more`.
+pub(crate) fn first_names(names: &[String], most: usize) -> String {
+    let (first, others) = names.split_at(names.len().min(most));
+    match others.len() {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
+    }
+}

@@ -233,6 +233,17 @@ fn a_json_file_vouches_for_the_bytes_of_its_image() {
         "{}",
         unvouched.stderr
     );
+    // Its image has a JSON file, though one that cannot vouch for it.
+    let counted = "not as they were written: 1; without a JSON file: 0";
+    assert!(unvouched.stdout.contains(counted), "{unvouched:?}");
+    fs::copy(&image, bench.path("out/foreign.png")).unwrap();
+    let foreign = bench.call(&words("synthesize --check out"));
+    assert!(
+        foreign.stdout.contains("without a JSON file: 1"),
+        "{foreign:?}"
+    );
+    assert!(foreign.stderr.contains("foreign.png"), "{foreign:?}");
+    fs::remove_file(bench.path("out/foreign.png")).unwrap();
     assert_eq!(call("").stdout, kept);
     assert_eq!(json_of(&json)["schema"], "darkqa.image/2");
     let checked = bench.call(&words("synthesize --check out"));

@@ -6,16 +6,15 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
+use crate::dataset::image_names::is_image;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::images::placed_image::OutputFile;
 use crate::runs::Outcome;
+use crate::text::words::first_names;
 
 /// The schemas of JSON files that vouch for an image. Other JSON files of the folder are left alone.
 const SCHEMAS: [&str; 3] = ["darkqa.image/1", "darkqa.image/2", "darkqa.sheet/1"];
-
-/// The ends of the names of images.
-const IMAGES: [&str; 4] = ["png", "jpg", "jpeg", "exr"];
 
 /// The most images without a JSON file that are named; chosen.
 const MAX_NAMED: usize = 3;
@@ -32,10 +31,13 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
     let (mut intact, mut wrong) = (0, 0);
     let mut unknown: BTreeSet<String> = files
         .iter()
-        .filter(|file| has_end(file, &IMAGES))
+        .filter(|file| is_image(file))
         .filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()))
         .collect();
-    for file in files.iter().filter(|file| has_end(file, &["json"])) {
+    for file in files
+        .iter()
+        .filter(|file| file.extension().is_some_and(|end| end == "json"))
+    {
         match vouched_image(file) {
             Ok(Some(output)) => {
                 unknown.remove(&output.file);
@@ -49,6 +51,8 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
             }
             Ok(None) => {}
             Err(e) => {
+                // Its image has a JSON file, which cannot vouch for it.
+                unknown.retain(|image| Path::new(image).file_stem() != file.file_stem());
                 tracing::error!("{e}");
                 wrong += 1;
             }
@@ -59,16 +63,11 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
         return Err(Error::data(folder.display(), problem));
     }
     if !unknown.is_empty() {
-        let first: Vec<&str> = unknown.iter().take(MAX_NAMED).map(String::as_str).collect();
-        let more = if unknown.len() > first.len() {
-            ", …"
-        } else {
-            ""
-        };
+        let unknown: Vec<String> = unknown.iter().cloned().collect();
         tracing::error!(
-            "{}: no JSON file says how they were made: {}{more}",
+            "{}: no JSON file says how they were made: {}",
             folder.display(),
-            first.join(", ")
+            first_names(&unknown, MAX_NAMED)
         );
     }
     Ok(Outcome::text(
@@ -79,12 +78,6 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
             unknown.len()
         ),
     ))
-}
-
-/// Whether a name has one of these ends, in capital letters or not.
-fn has_end(file: &Path, ends: &[&str]) -> bool {
-    let end = file.extension().unwrap_or_default();
-    ends.iter().any(|known| end.eq_ignore_ascii_case(known))
 }
 
 /// The part of a JSON file that is checked. All schemas share it.
