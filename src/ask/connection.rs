@@ -2,6 +2,8 @@
 
 use std::io::Write as _;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use reqwest::header::{CONTENT_TYPE, HeaderMap};
@@ -11,7 +13,7 @@ use tokio::time::Instant;
 use super::access::{Access, connect_limit, with_causes};
 use super::body::Parts;
 use super::bounded_json::parse;
-use super::connection_fault::{lacks_open_files, permanent_cause};
+use super::connection_fault::{UNKNOWN_HOST, is_unknown_host, lacks_open_files, permanent_cause};
 use super::failure::{Again, AskError, Reach};
 use super::parameters::Parameters;
 use super::secret::Scrub;
@@ -113,6 +115,8 @@ pub(super) struct Connection {
     pub(super) scrub: Scrub,
     client: Client,
     timeout: Duration,
+    /// True after the first response: an unknown host name is then an outage of the name server and no mistyped address.
+    has_answered: Arc<AtomicBool>,
 }
 
 /// The response to one request.
@@ -140,6 +144,7 @@ impl Connection {
             base: access.base.clone(),
             scrub,
             timeout,
+            has_answered: Arc::default(),
         })
     }
 
@@ -200,6 +205,7 @@ impl Connection {
     ) -> Result<HttpReply, AskError> {
         let started = Instant::now();
         let response = self.in_time(time, request.send()).await?;
+        self.has_answered.store(true, Ordering::Relaxed);
         let status = response.status();
         let headers = response.headers().clone();
         let body = match self.receive(response, time).await {
@@ -350,7 +356,9 @@ impl Connection {
                 ..AskError::new(FailureKind::Connection, message)
             };
         }
-        let Some(remedy) = permanent_cause(&text, self.base.is_plain()) else {
+        let is_mistyped = !self.has_answered.load(Ordering::Relaxed) && is_unknown_host(&text);
+        let unknown = is_mistyped.then_some(UNKNOWN_HOST);
+        let Some(remedy) = unknown.or_else(|| permanent_cause(&text, self.base.is_plain())) else {
             return AskError {
                 again: Again::Later,
                 may_have_effect,

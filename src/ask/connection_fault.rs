@@ -1,5 +1,5 @@
-//! The cause of a connection that cannot be made: [`permanent_cause`] from the words of the HTTP client, [`lacks_open_files`] from its
-//! error.
+//! The cause of a connection that cannot be made: [`permanent_cause`] and [`is_unknown_host`] from the words of the HTTP client,
+//! [`lacks_open_files`] from its error.
 
 use std::error::Error;
 use std::io;
@@ -62,6 +62,24 @@ pub(super) fn permanent_cause(text: &str, is_plain: bool) -> Option<&'static str
     found.map(|(_, remedy)| *remedy)
 }
 
+/// Remedy for a host name that no name server knows.
+pub(super) const UNKNOWN_HOST: &str =
+    "no name server knows this host; check --base-url and the proxy settings";
+
+/// Words of glibc, musl, macOS and Windows for a host name that does not exist. A name server that does not answer has others.
+const UNKNOWN_HOST_WORDS: [&str; 5] = [
+    "Name or service not known",
+    "No address associated with hostname",
+    "Name does not resolve",
+    "nodename nor servname provided",
+    "No such host is known",
+];
+
+/// True if the host name does not exist.
+pub(super) fn is_unknown_host(text: &str) -> bool {
+    UNKNOWN_HOST_WORDS.iter().any(|words| text.contains(words))
+}
+
 /// Errors of systems that allow no further open file, to this process or to all: EMFILE and ENFILE; on Windows WSAEMFILE.
 const NO_MORE_FILES: &[i32] = if cfg!(windows) { &[10_024] } else { &[24, 23] };
 
@@ -121,6 +139,17 @@ mod tests {
             assert_eq!(permanent_cause(text, false), None);
             assert_eq!(permanent_cause(text, true), None);
         }
+    }
+
+    #[test]
+    fn a_silent_name_server_is_no_unknown_host() {
+        let lookup = "dns error: failed to lookup address information: ";
+        assert!(is_unknown_host(&format!(
+            "{lookup}Name or service not known"
+        )));
+        assert!(!is_unknown_host(&format!(
+            "{lookup}Temporary failure in name resolution"
+        )));
     }
 
     #[cfg(unix)]

@@ -174,12 +174,14 @@ fn is_finite_and_not_negative(number: f64) -> bool {
     number.is_finite() && number >= 0.0
 }
 
-/// True if the suffix of a model name is a version: a date, `latest` or `preview`.
+/// True if the suffix of a model name is a version: a date, `latest` or `preview`, with or without a date. `preview-tts` is another
+/// model with another price.
 fn is_version(suffix: &str) -> bool {
     suffix.strip_prefix(['-', '@']).is_some_and(|version| {
+        let date = version.strip_prefix("preview").unwrap_or(version);
         version == "latest"
-            || version.starts_with("preview")
-            || (version.len() >= 4 && version.chars().all(|c| c.is_ascii_digit() || c == '-'))
+            || version == "preview"
+            || (date.len() >= 4 && date.chars().all(|c| c.is_ascii_digit() || c == '-'))
     })
 }
 
@@ -204,7 +206,17 @@ mod tests {
         assert_eq!(input("gpt-4-1106-preview"), Some(10.0));
         assert_eq!(input("openai/gpt-4o-mini-2024-07-18"), Some(0.15));
         assert_eq!(input("claude-haiku-4-5-20251001"), Some(1.0));
-        for unknown in ["gpt-4o-audio", "gpt-3", "my-model", "gpt-4o-"] {
+        assert_eq!(
+            input("gemini-2.5-flash-preview-04-17"),
+            input("gemini-2.5-flash")
+        );
+        for unknown in [
+            "gpt-4o-audio",
+            "gpt-3",
+            "my-model",
+            "gpt-4o-",
+            "gemini-2.5-flash-preview-tts",
+        ] {
             assert_eq!(input(unknown), None, "{unknown}");
         }
         let price = prices.find("gpt-4o").unwrap();

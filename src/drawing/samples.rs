@@ -40,25 +40,20 @@ const MAX_FRAMES: usize = 3;
 /// The first frames by level, with a row for each variant and enhancer: a page for each axis. Empty without thumbnails.
 pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SamplePage> {
     let axis = |thumbnail: &Thumbnail| thumbnail.condition.level().axis();
-    let axes: Vec<Axis> = Axis::ALL
-        .into_iter()
-        .filter(|other| thumbnails.iter().any(|of| axis(of) == Some(*other)))
-        .collect();
-    // The clean frames are on every axis; alone, on that of light.
-    let axes = if axes.is_empty() {
-        vec![Axis::LIGHT]
-    } else {
-        axes
-    };
-    axes.into_iter()
-        .filter_map(|on| {
-            let all: Vec<&Thumbnail> = thumbnails
-                .iter()
-                .filter(|of| of.condition.level().is_shown_on(on))
-                .collect();
-            axis_page(&all, on)
-        })
-        .collect()
+    Axis::present(|on| {
+        thumbnails
+            .iter()
+            .any(|thumbnail| axis(thumbnail) == Some(on))
+    })
+    .into_iter()
+    .filter_map(|on| {
+        let all: Vec<&Thumbnail> = thumbnails
+            .iter()
+            .filter(|of| of.condition.level().is_shown_on(on))
+            .collect();
+        axis_page(&all, on)
+    })
+    .collect()
 }
 
 /// The page of the thumbnails of one axis; `None` without any.

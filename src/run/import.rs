@@ -28,7 +28,7 @@ use crate::import::{
 use crate::picture::ImageFile;
 use crate::picture::png;
 use crate::runs::Outcome;
-use crate::text::words::counted;
+use crate::text::words::{counted, first_names};
 use crate::types::manifest::Status;
 use crate::types::{Decides, FrameId, InputNote, Rgb, shell_word};
 
@@ -415,17 +415,10 @@ fn words(unlisted: &BTreeMap<String, usize>) -> String {
     list.sort_by_key(|(word, count)| (std::cmp::Reverse(**count), *word));
     let named: Vec<String> = list
         .iter()
-        .take(NAMED)
         .map(|(word, count)| format!("{word:?} {count}"))
         .collect();
-    let more = list.len().saturating_sub(NAMED);
-    let more = if more == 0 {
-        String::new()
-    } else {
-        format!(" and {more} more")
-    };
     format!(
-        "without a class of mpcat40, taken as misc: {}{more}\n",
-        named.join(", ")
+        "without a class of mpcat40, taken as misc: {}\n",
+        first_names(&named, NAMED)
     )
 }

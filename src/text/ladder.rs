@@ -163,16 +163,8 @@ impl<'a, C> Ladder<'a, C> {
     /// The ladder of each axis, light first. Series and cells without an axis are in each of them.
     pub(crate) fn by_axis(&self) -> Vec<(Axis, Self)> {
         let is_on = |series: &Series<'_>, axis| series.axis() == Some(axis);
-        let axes: Vec<Axis> = Axis::ALL
+        Axis::present(|axis| self.series.keys().any(|series| is_on(series, axis)))
             .into_iter()
-            .filter(|axis| self.series.keys().any(|series| is_on(series, *axis)))
-            .collect();
-        let axes = if axes.is_empty() {
-            vec![Axis::LIGHT]
-        } else {
-            axes
-        };
-        axes.into_iter()
             .map(|axis| {
                 let series = self.series.iter();
                 let series = series.filter(|(series, _)| series.axis().is_none_or(|on| on == axis));

@@ -202,10 +202,15 @@ fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
 }
 
 /// The first of some names, at most `most`, and the number of the others: `a, b and 3 more`.
-pub(crate) fn first_names(names: &[String], most: usize) -> String {
+pub(crate) fn first_names<S: AsRef<str>>(names: &[S], most: usize) -> String {
     let (first, others) = names.split_at(names.len().min(most));
+    let first = first
+        .iter()
+        .map(AsRef::as_ref)
+        .collect::<Vec<_>>()
+        .join(", ");
     match others.len() {
-        0 => first.join(", "),
-        more => format!("{} and {more} more", first.join(", ")),
+        0 => first,
+        more => format!("{first} and {more} more"),
     }
 }

@@ -11,14 +11,13 @@ const WAIT_PHRASES: [&str; 4] = ["try again", "retry", "wait", "available"];
 /// Matches “in”, “after” or “for” and the duration that follows, such as `1h2m3.5s`, `250ms`, `6 seconds` or
 /// `1 minute and 3 seconds`. Group 1 is the duration.
 static DURATION: LazyLock<Regex> = LazyLock::new(|| {
-    let pattern = r"(?i)\b(?:in|after|for)\s+(?:about\s+)?((?:\d+(?:\.\d+)?\s*(?:milliseconds?|ms|minutes?|mins?|hours?|seconds?|secs?|h|m|s)[,\s]*(?:and\s+)?)+)";
+    let pattern = r"(?i)\b(?:in|after|for)\s+(?:about\s+)?((?:\d+(?:\.\d+)?\s*(?:milliseconds?|ms|minutes?|mins?|hours?|days?|seconds?|secs?|d|h|m|s)[,\s]*(?:and\s+)?)+)";
     Regex::new(pattern).unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
 });
 
 /// Matches one number and its unit. Group 1 is the number, group 2 the unit.
 static NUMBER_AND_UNIT: LazyLock<Regex> = LazyLock::new(|| {
-    let pattern =
-        r"(?i)(\d+(?:\.\d+)?)\s*(milliseconds?|ms|minutes?|mins?|hours?|seconds?|secs?|h|m|s)";
+    let pattern = r"(?i)(\d+(?:\.\d+)?)\s*(milliseconds?|ms|minutes?|mins?|hours?|days?|seconds?|secs?|d|h|m|s)";
     Regex::new(pattern).unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
 });
 
@@ -70,6 +69,7 @@ fn parse_duration(text: &str) -> Option<Duration> {
 fn seconds_per(unit: &str) -> f64 {
     match unit {
         "ms" | "millisecond" | "milliseconds" => 1e-3,
+        unit if unit.starts_with('d') => 86_400.0,
         unit if unit.starts_with('h') => 3600.0,
         unit if unit.starts_with('m') => 60.0,
         _ => 1.0,
@@ -96,6 +96,7 @@ mod tests {
             ("Please wait for 1 minute and 3 seconds", 63.0),
             ("The model will be available in 20 secs", 20.0),
             ("RETRY AFTER 250 ms", 0.25),
+            ("Please try again in 1 day and 2 hours.", 93_600.0),
             ("Retry in 5s. Retry in 9s.", 9.0),
         ] {
             let found = wait_in_words(text).map(|wait| wait.as_secs_f64());

@@ -96,9 +96,6 @@ impl ImageUse {
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        if implausible == Implausible::NotLookedFor {
-            return Ok(());
-        }
         let judged = usage.judge(&self.seen, place, implausible);
         judged.map_err(|problem| {
             let remedy = "check that each has the name of its own dark image; --allow bad-enhancer uses them as they are";
@@ -119,9 +116,6 @@ impl Seen {
         place: [&dyn ToString; 2],
         implausible: Implausible,
     ) -> Result<()> {
-        if implausible == Implausible::NotLookedFor {
-            return Ok(());
-        }
         let judged = usage.judge(self, place, implausible);
         judged.map_err(|problem| Error::EnhancerEnded {
             path: model.to_owned(),
@@ -211,6 +205,9 @@ impl Usage {
         let &Seen::Dark(verdict) = seen else {
             return Ok(());
         };
+        if implausible == Implausible::NotLookedFor {
+            return Ok(());
+        }
         let place = [frame, condition].map(ToString::to_string);
         let key = Digest::from_parts(place.iter().map(String::as_bytes));
         if !self.with(|state| state.judged.insert(key)) {

@@ -7,12 +7,13 @@ use std::sync::Arc;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::questions::some;
+use super::questions::MAX_NAMED;
 use super::record::detail;
 use super::settings::AnswersFile;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::text::words::first_names;
 use crate::types::degradation::Kind;
 use crate::types::{
     Condition, Degradation, Digest, KindSet, OpenDetail, Record, Step, TrialKey, Via,
@@ -99,7 +100,7 @@ fn warn_of_unknown(path: &Path, unknown: &[&str], all: usize) {
             "{}: {} of {all} answers are to questions that are not asked: {}",
             path.display(),
             unknown.len(),
-            some(unknown)
+            first_names(unknown, MAX_NAMED)
         );
     }
 }

@@ -9,7 +9,11 @@ use clap::Args;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
 use crate::files::reading;
+use crate::text::words::first_names;
 use crate::types::Decides;
+
+/// Number of names that a message lists.
+pub(super) const MAX_NAMED: usize = 3;
 
 /// The flags that select questions.
 #[derive(Debug, Clone, Default, Args)]
@@ -53,7 +57,7 @@ pub(super) fn select(
                 path.display(),
                 unknown.len(),
                 subset.len(),
-                some(&unknown)
+                first_names(&unknown, MAX_NAMED)
             );
         }
     }
@@ -107,19 +111,4 @@ fn ids(path: &Path) -> Result<BTreeSet<String>> {
         let problem = format!("{e}; a JSON array of question ids expected");
         Error::data(path.display(), problem)
     })
-}
-
-/// The first entries of a list as text, with the number of the others.
-pub(super) fn some(list: &[&str]) -> String {
-    const FEW: usize = 3;
-    let shown = list
-        .iter()
-        .take(FEW)
-        .copied()
-        .collect::<Vec<_>>()
-        .join(", ");
-    match list.len().saturating_sub(FEW) {
-        0 => shown,
-        more => format!("{shown} and {more} more"),
-    }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::answers_file;
 use super::judge::Judge;
-use super::questions::{select, some};
+use super::questions::{MAX_NAMED, select};
 use super::settings::{OpenEqa, OpenTask};
 use crate::ask::Parameters;
 use crate::dataset::openeqa::{self, OpenQuestion};
@@ -17,7 +17,7 @@ use crate::images::recipe::Recipe;
 use crate::images::source::Source;
 use crate::images::walk::WalkFolder;
 use crate::runs::part::part;
-use crate::text::words::counted;
+use crate::text::words::{counted, first_names};
 use crate::types::manifest::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 use darkqa_enhance::ModelFile;
@@ -201,7 +201,7 @@ fn warn_of_unseen(sources: &[Source], questions: &[OpenQuestion]) -> Result<()> 
         "{} of {} walks cannot be shown ({}); unanswered questions: {}; the first problem: {problem}",
         walks.len(),
         sources.len(),
-        some(&walks),
+        first_names(&walks, MAX_NAMED),
         unanswered.count()
     );
     Ok(())

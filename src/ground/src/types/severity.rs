@@ -40,6 +40,20 @@ impl Axis {
 
     /// All axes, in the order of tables.
     pub const ALL: [Self; 2] = [Self::LIGHT, Self::MOTION];
+
+    /// The axes that `is_present` accepts, in the order of tables; the axis of light if it accepts none, for clean frames alone.
+    #[must_use]
+    pub fn present(is_present: impl Fn(Self) -> bool) -> Vec<Self> {
+        let axes: Vec<Self> = Self::ALL
+            .into_iter()
+            .filter(|axis| is_present(*axis))
+            .collect();
+        if axes.is_empty() {
+            vec![Self::LIGHT]
+        } else {
+            axes
+        }
+    }
 }
 
 /// The strength of a degradation in hundredths of its kind's unit, so that equality and order are exact.

@@ -3,13 +3,16 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::findings::{Findings, Mark};
-use crate::text::words::counted;
+use crate::text::words::{counted, first_names};
 use crate::types::Question;
 use crate::types::question::letter;
 use crate::types::shown_text::excerpt;
 
 /// The share of one answer or letter from which on a model that always says it scores well.
 const COMMON: f64 = 0.6;
+
+/// Number of families that are listed.
+const MAX_FAMILIES: usize = 12;
 
 /// Looks at the questions: families, numbers of choices, chance, and what gives answers away.
 pub(super) fn questions(questions: &[Question], findings: &mut Findings) {
@@ -32,16 +35,14 @@ pub(super) fn questions(questions: &[Question], findings: &mut Findings) {
     ));
     let mut families: Vec<(&str, usize)> = families.into_iter().collect();
     families.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    let shown: Vec<String> = families
+    let families: Vec<String> = families
         .iter()
-        .take(12)
         .map(|(family, count)| format!("{} {count}", excerpt(family, 30)))
         .collect();
-    let more = match families.len() {
-        count @ 13.. => format!(" and {} more", count - 12),
-        _ => String::new(),
-    };
-    findings.ok(format!("families: {}{more}", shown.join(", ")));
+    findings.ok(format!(
+        "families: {}",
+        first_names(&families, MAX_FAMILIES)
+    ));
     commonest(questions, findings);
     repeats(questions, findings);
     given_away(questions, findings);
