@@ -53,7 +53,7 @@ class Examples(unittest.TestCase):
         page = PAGE.read_text(encoding="utf-8")
         for name in ["torch_dataset.py", "albumentations_transform.py", "datasets_map.py"]:
             code = (EXAMPLES / name).read_text(encoding="utf-8")
-            body = code.split('"""\n', 2)[1].split("\n\ndef main", 1)[0].strip()
+            body = code.split('"""\n', 1)[1].split("\n\ndef main", 1)[0].strip()
             self.assertIn(body, page, f"{name} is not on the page as it runs")
 
 

@@ -2,7 +2,7 @@
 //!
 //! The rules find outputs that are decoded in the wrong way: another range, the wrong output, swapped colours or dimensions. They do not
 //! judge the quality of an enhancement. Their thresholds were set on 9 trained models and 25 dark images each, so that none of these models
-//! is flagged; `src/docs/enhancers.md` lists the faults that they find and miss.
+//! is flagged; `src/docs/enhance.md` lists the faults that they find and miss.
 
 use std::fmt;
 
