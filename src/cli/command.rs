@@ -58,6 +58,30 @@ const ON_EVALUATIONS: [&str; 4] = ["check", "plan", "batch", "openeqa"];
 const TAKES_FLAGS_OF_EVALUATION: &str = "\
 It takes the flags of an evaluation, such as --model, --data and --levels: see darkqa-eval -h, or --help here for all.";
 
+/// Flags of `openeqa` that its `-h` leaves out: they are rarely set. Its `--help` and its manual page list them.
+pub(super) const RARE_OPENEQA_FLAGS: [&str; 20] = [
+    "splits",
+    "categories",
+    "subset",
+    "degrade",
+    "sensor",
+    "sampling-seed",
+    "judge-api-key-env",
+    "judge-api-key-file",
+    "judge-temperature",
+    "judge-max-tokens",
+    "poll",
+    "keep-files",
+    "no-scout",
+    "enqueued-tokens",
+    "window",
+    "give-up",
+    "purpose",
+    "file-size",
+    "file-requests",
+    "url",
+];
+
 /// The heading of the flags that `--help` lists first.
 const FIRST_HEADING: &str = "Model";
 
@@ -282,7 +306,25 @@ pub(super) fn command() -> clap::Command {
     let root = ON_EVALUATIONS.into_iter().fold(root, |root, name| {
         root.mut_subcommand(name, |command| on_evaluation(command, &shared))
     });
-    first_heading_first(root)
+    first_heading_first(with_rare_openeqa_flags_hidden(root, true))
+}
+
+/// The command line for manual pages, which leave out what `-h` leaves out: they list the rare flags of `openeqa`.
+pub(super) fn command_for_manual() -> clap::Command {
+    with_rare_openeqa_flags_hidden(command(), false)
+}
+
+fn with_rare_openeqa_flags_hidden(root: clap::Command, is_hidden: bool) -> clap::Command {
+    root.mut_subcommand("openeqa", |command| {
+        command.mut_args(|arg| {
+            let long = arg.get_long().unwrap_or_default();
+            if RARE_OPENEQA_FLAGS.contains(&long) {
+                arg.hide_short_help(is_hidden)
+            } else {
+                arg
+            }
+        })
+    })
 }
 
 /// The command and those in it, with the short form and the second name of each flag that has one.

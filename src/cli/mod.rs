@@ -222,7 +222,7 @@ fn completions(shell: Shell) -> Outcome {
 
 fn manual(folder: &Path) -> Result<Outcome> {
     std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
-    let command = command::command().disable_help_subcommand(true);
+    let command = command::command_for_manual().disable_help_subcommand(true);
     clap_mangen::generate_to(command, folder).map_err(|e| Error::file(folder, "write", e))?;
     Ok(Outcome::wrote(
         folder,
