@@ -8,6 +8,7 @@ mod video;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::io::{ErrorKind, Read as _};
 use std::path::{Component, Path, PathBuf};
 
 use clap::{Args, Subcommand};
@@ -18,6 +19,7 @@ use serde_json::{Map, Value, json};
 use crate::dataset::FolderArgs;
 use crate::dataset::frame_folder::{self, FramePaths};
 use crate::error::{Error, Result};
+use crate::files::reading::open;
 use crate::images::input_tally::InputTally;
 use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
@@ -117,7 +119,7 @@ pub(crate) fn import(command: &ImportCommand, progress: &Progress) -> Result<Out
     match (&command.form, &command.import) {
         (Some(ImportForm::Script { kind }), _) => script(*kind),
         (Some(ImportForm::Mcap(args)), _) => recording::import(args, progress),
-        (Some(ImportForm::Rosbag { file }), _) => Err(rosbag(file)),
+        (Some(ImportForm::Rosbag { file }), _) => Err(rosbag(file)?),
         (Some(ImportForm::Video(args)), _) => video::import(args, progress),
         (None, Some(args)) => import_frames(args, progress),
         (None, None) => Err(Error::usage("KIND", "a kind of data set is missing")),
@@ -133,13 +135,26 @@ fn script(kind: DataSetKind) -> Result<Outcome> {
 }
 
 /// The conversion of a bag of ROS 1. The crate rosbag (0.6.3) maps whole files into memory, and needs bzip2 and lz4 in C.
-fn rosbag(file: &Path) -> Error {
+///
+/// # Errors
+/// If the file cannot be read.
+fn rosbag(file: &Path) -> Result<Error> {
+    let mut start = [0; 7];
+    let read = open(file).and_then(|mut file| file.read_exact(&mut start));
+    match read {
+        Err(e) if e.kind() != ErrorKind::UnexpectedEof => return Err(Error::file(file, "read", e)),
+        _ if start != *b"#ROSBAG" => {
+            let problem = "not a bag of ROS 1; recordings in MCAP: darkqa-eval import mcap FILE";
+            return Ok(Error::data(file.display(), problem));
+        }
+        _ => {}
+    }
     let new = file.with_extension("");
     let [old, new] = [file, &*new].map(|path| shell_word(&path.to_string_lossy()).into_owned());
     let problem = format_args!(
         "bags of ROS 1 are not read; convert it, which changes no image:\n  pip install rosbags\n  rosbags-convert --src {old} --dst {new} --dst-storage mcap\n  darkqa-eval import mcap {new}"
     );
-    Error::data(file.display(), problem)
+    Ok(Error::data(file.display(), problem))
 }
 
 /// If one frame fails, the error is logged and counted, and the others continue.

@@ -227,7 +227,7 @@ fn time_that_goes_back_starts_a_scene_and_is_reported() {
     assert!(
         called
             .stderr
-            .contains("time goes back 1 time, first /c at -95.000 s, 97.000 s before"),
+            .contains("time goes back 1 time, first /c at 30.000 s, 97.000 s before"),
         "{called:?}"
     );
     assert_eq!(
@@ -239,6 +239,68 @@ fn time_that_goes_back_starts_a_scene_and_is_reported() {
             "drive-0001/000005"
         ]
     );
+}
+
+#[test]
+fn topics_with_other_clocks_are_sampled_alike() {
+    let mut records = Records::default();
+    records.topic(1, "/front", "sensor_msgs/msg/Image", "cdr", "");
+    records.topic(2, "/rear", "sensor_msgs/msg/Image", "cdr", "");
+    for second in 0..40 {
+        let at = f64::from(second);
+        records.message(1, at, &image(at, "mono8", [2, 2], &[9; 4], 0));
+        records.message(2, at, &image(at - 2.0, "mono8", [2, 2], &[9; 4], 0));
+    }
+    let bench = with_recording(records.file());
+    let called = import(&bench, "--topic /front --topic /rear --every 10 --out out").ended(0);
+    assert!(called.stdout.contains("8 frames of 2 scenes"), "{called:?}");
+}
+
+#[test]
+fn a_topic_without_messages_keeps_the_frames_of_others() {
+    let bench = with_recording(drive(4, Compression::None));
+    let called = import(&bench, "--topic /front/image_raw --topic /fornt --out out").ended(1);
+    assert!(
+        called
+            .stderr
+            .contains("no messages of /fornt; topics with images: /front/image_raw, /rear/"),
+        "{called:?}"
+    );
+    assert_eq!(frames(&bench).len(), 2);
+}
+
+#[test]
+fn long_texts_of_a_recording_are_cut() {
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
+    records.message(1, 0.0, &compressed(0.0, &"x\n".repeat(40_000), b"x"));
+    let bench = with_recording(records.file());
+    for line in ["", "--topic /c --out out"] {
+        let called = import(&bench, line).ended(2);
+        assert!(called.stderr.len() < 800, "{}", called.stderr.len());
+    }
+}
+
+#[test]
+fn mosaics_and_depth_in_image_files_are_refused() {
+    let mut png = std::io::Cursor::new(Vec::new());
+    picture(0, SIZE)
+        .write_to(&mut png, image::ImageFormat::Png)
+        .unwrap();
+    for (format, expected) in [
+        (
+            "bayer_rggb8; png compressed ",
+            "is a mosaic in an image file",
+        ),
+        ("16UC1; png compressed ", "is depth"),
+    ] {
+        let mut records = Records::default();
+        records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
+        records.message(1, 0.0, &compressed(0.0, format, png.get_ref()));
+        let bench = with_recording(records.file());
+        let called = import(&bench, "--out out").ended(2);
+        assert!(called.stderr.contains(expected), "{called:?}");
+    }
 }
 
 #[test]
@@ -361,10 +423,31 @@ fn a_bag_folder_is_read_in_the_order_of_its_files() {
 }
 
 #[test]
+fn a_broken_file_of_a_bag_keeps_the_others() {
+    let bench = Bench::new();
+    let mut records = Records::default();
+    records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
+    records.message(1, 0.0, &image(0.0, "mono8", [2, 2], &[9; 4], 0));
+    bench.file("bag/bag_0.mcap", records.file());
+    bench.file("bag/bag_1.mcap", b"");
+    let called = bench
+        .call(&["import", "mcap", "bag", "--out", "out"])
+        .ended(1);
+    assert!(
+        called.stderr.contains("bag_1.mcap: the file is empty"),
+        "{called:?}"
+    );
+    assert_eq!(frames(&bench).len(), 1);
+    bench.file("other/bag.db3", b"SQLite format 3\0");
+    let called = bench.call(&["import", "mcap", "other"]).ended(2);
+    assert!(called.stderr.contains("rosbags-convert"), "{called:?}");
+}
+
+#[test]
 fn a_bag_of_ros_1_gets_its_conversion() {
-    let called = Bench::new()
-        .call(&["import", "rosbag", "my drive.bag"])
-        .ended(2);
+    let bench = Bench::new();
+    bench.file("my drive.bag", b"#ROSBAG V2.0\n");
+    let called = bench.call(&["import", "rosbag", "my drive.bag"]).ended(2);
     let expected = "rosbags-convert --src 'my drive.bag' --dst 'my drive' --dst-storage mcap";
     assert!(called.stderr.contains(expected), "{called:?}");
 }
@@ -447,6 +530,22 @@ fn a_broken_video_gives_its_frames() {
         called
             .stderr
             .contains("moov atom not found; frames up to there are kept"),
+        "{called:?}"
+    );
+    assert_eq!(frames(&bench).len(), 4);
+}
+
+#[cfg(unix)]
+#[test]
+fn damage_that_ffmpeg_reports_is_named() {
+    let bench = Bench::new();
+    bench.file("drive.mp4", b"x");
+    with_ffmpeg(&bench, "echo 'error while decoding MB 3 5' >&2; exit 0");
+    let called = import_video(&bench, "--every 0 --out out", &bench.path("bin")).ended(1);
+    assert!(
+        called
+            .stderr
+            .contains("ffmpeg reports a problem: error while decoding MB 3 5"),
         "{called:?}"
     );
     assert_eq!(frames(&bench).len(), 4);

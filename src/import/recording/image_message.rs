@@ -11,6 +11,7 @@ use super::encoding::Encoding;
 use super::fields::FieldReader;
 use super::protobuf::fields;
 use crate::picture::raw_image::RawImage;
+use crate::types::shown_text::excerpt;
 
 /// An image with the facts of its message.
 #[derive(Debug)]
@@ -47,10 +48,8 @@ impl<'a> ImageMessage<'a> {
             Encoding::Protobuf => Self::from_protobuf(schema, bytes),
             Encoding::Json => Self::from_json(schema, bytes),
         }?;
-        if let MessageImage::File { format, .. } = &message.image
-            && format.contains("compressedDepth")
-        {
-            return Err(format!("format {format:?} is depth, not an image"));
+        if let MessageImage::File { format, .. } = &message.image {
+            check_format(format)?;
         }
         Ok(message)
     }
@@ -173,6 +172,28 @@ impl<'a> ImageMessage<'a> {
             image,
         })
     }
+}
+
+/// Refuses a file whose format states samples that are no colours: `compressed_image_transport` writes `bayer_rggb8; png compressed ` for
+/// a mosaic that it did not convert, and `16UC1; png compressed ` for depth.
+fn check_format(format: &str) -> Result<(), String> {
+    let (source, target) = format.split_once(';').unwrap_or((format, ""));
+    let kind = match source.trim() {
+        _ if format.contains("compressedDepth") => "depth",
+        source if source.starts_with("16UC1") || source.starts_with("32FC1") => "depth",
+        source
+            if source.starts_with("bayer")
+                && !target.contains("bgr")
+                && !target.contains("rgb") =>
+        {
+            "a mosaic in an image file; take its topic that is not compressed"
+        }
+        _ => return Ok(()),
+    };
+    Err(format!(
+        "format {:?} is {kind}, not an image",
+        excerpt(format, 60)
+    ))
 }
 
 /// A `foxglove.RawImage` or `foxglove.CompressedImage` in JSON.

@@ -139,6 +139,9 @@ impl<R: Read + Seek> McapReader<R> {
             .and_then(|length| file.rewind().map(|()| length))
             .map_err(|e| e.to_string())?;
         let mut file = BufReader::with_capacity(BUFFER, file);
+        if length == 0 {
+            return Err("the file is empty, as a recorder leaves it that is killed".to_owned());
+        }
         let mut magic = [0; MAGIC.len()];
         let read = file.read_exact(&mut magic);
         if read.is_err() || magic != MAGIC {

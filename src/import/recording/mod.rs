@@ -33,7 +33,7 @@ pub(crate) use image_message::{ImageMessage, MessageImage, stamp};
 pub(crate) use mcap::{Event, LARGEST_MESSAGE, McapReader, Message};
 pub(crate) use overview::{Overview, TopicOverview};
 pub(crate) use sampling::{Sampler, SamplingArgs};
-pub(crate) use stretches::{Place, Stretches};
+pub(crate) use stretches::{Place, Stretches, TopicClock};
 pub(crate) use thumbnail::Thumbnail;
 
 /// A time in nanoseconds, usually since 1970.

@@ -7,6 +7,10 @@ use super::channel::Content;
 use super::image_message::{ImageMessage, MessageImage};
 use super::mcap::{Event, LARGEST_MESSAGE, McapReader, Message};
 use super::{Nanoseconds, seconds};
+use crate::types::shown_text::excerpt;
+
+/// Maximum number of characters of a form: names of encodings and formats are from the recording.
+const MAX_FORM: usize = 100;
 
 /// Start of the form of images that cannot be read; the reason follows.
 const UNREAD: &str = "not read: ";
@@ -17,6 +21,8 @@ pub(crate) struct Overview {
     pub(crate) topics: BTreeMap<String, TopicOverview>,
     /// Damage, with its place.
     pub(crate) problems: Vec<String>,
+    /// The recorder's time of the first message.
+    start: Option<Nanoseconds>,
 }
 
 /// One topic of a recording.
@@ -69,22 +75,40 @@ impl Overview {
                     }
                 }
                 Event::ChunkRead => {}
-                Event::ChunkDamaged { problem, .. } => {
-                    self.problems
-                        .push(format!("{place}: a damaged chunk: {problem}"));
+                Event::ChunkDamaged { times, problem } => {
+                    let [from, to] = times.map(|time| self.since_start(time));
+                    self.problems.push(format!(
+                        "{place}: a damaged chunk, {from:.3} s to {to:.3} s: {problem}"
+                    ));
                 }
                 Event::Cut(problem) => {
-                    self.problems
-                        .push(format!("{place}: the recording is cut off: {problem}"));
+                    self.problems.push(format!(
+                        "{place}: the recording is cut off{}: {problem}",
+                        self.last_place()
+                    ));
                 }
             }
         }
+    }
+
+    /// Seconds from the first message.
+    fn since_start(&self, time: Nanoseconds) -> f64 {
+        seconds(time.saturating_sub(self.start.unwrap_or(time)))
+    }
+
+    /// The place of the latest message, to follow a problem.
+    fn last_place(&self) -> String {
+        let last = self.topics.iter().max_by_key(|(_, topic)| topic.times[1]);
+        last.map_or(String::new(), |(name, topic)| {
+            format!(" after {name} at {:.3} s", self.since_start(topic.times[1]))
+        })
     }
 
     /// Counts a message; `true` if it is the first one of its topic.
     fn count(&mut self, message: &Message) -> bool {
         let channel = &message.channel;
         let time = message.log_time;
+        self.start.get_or_insert(time);
         if let Some(topic) = self.topics.get_mut(&channel.topic) {
             topic.count += 1;
             topic.times = [topic.times[0].min(time), topic.times[1].max(time)];
@@ -137,4 +161,5 @@ fn form<R: Read + Seek>(
         }
     });
     Some(form.unwrap_or_else(|problem| format!("{UNREAD}{problem}")))
+        .map(|form| excerpt(form.trim(), MAX_FORM))
 }

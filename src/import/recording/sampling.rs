@@ -67,7 +67,6 @@ impl SamplingArgs {
             passed: 0,
             most,
             taken: 0,
-            start: None,
             next: 0,
             changed: self.changed,
             last: None,
@@ -110,9 +109,7 @@ pub(crate) struct Sampler {
     passed: usize,
     most: usize,
     taken: usize,
-    /// Start of the clock of the frames seen last.
-    start: Option<Nanoseconds>,
-    /// Time from the start at which the next frame is due.
+    /// Time from the first frame of the drive at which the next frame is due.
     next: Nanoseconds,
     changed: Option<f64>,
     last: Option<Thumbnail>,
@@ -121,7 +118,7 @@ pub(crate) struct Sampler {
 impl Sampler {
     /// Whether a frame is chosen by its time. If [`Self::compares`], its pixels decide then.
     pub(crate) fn is_due(&mut self, place: Place) -> bool {
-        let since = place.time.saturating_sub(place.start);
+        let since = place.since;
         if self.taken >= self.most {
             return false;
         }
@@ -132,13 +129,9 @@ impl Sampler {
             self.taken += usize::from(is_due);
             return is_due;
         }
-        if self.start.replace(place.start) != Some(place.start) {
-            self.next = 0;
-        }
-        // A frame may be a little earlier than the start, if its clock is not the recorder's.
-        let is_due = self.interval == 0 || since.max(0) >= self.next;
+        let is_due = self.interval == 0 || since >= self.next;
         if is_due && self.interval > 0 {
-            self.next = (since.max(0) / self.interval + 1).saturating_mul(self.interval);
+            self.next = (since / self.interval + 1).saturating_mul(self.interval);
         }
         self.taken += usize::from(is_due);
         is_due
@@ -184,8 +177,8 @@ mod tests {
         let mut sampler = args.sampler(duration);
         let mut due = |time: f64| {
             sampler.is_due(Place {
-                start: nanoseconds(times[0]),
                 time: nanoseconds(time),
+                since: nanoseconds(time - times[0]),
                 stretch: 0,
             })
         };
@@ -238,8 +231,8 @@ mod tests {
         let grey = |code: u8| Thumbnail::new(&crate::types::Rgb::new(1, 1, vec![code; 3]).unwrap());
         let mut takes = |i: i64, code: u8| {
             let place = Place {
-                start: 0,
                 time: i,
+                since: i,
                 stretch: 0,
             };
             sampler.is_due(place) && sampler.has_changed(grey(code))

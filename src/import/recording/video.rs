@@ -11,6 +11,7 @@ use super::Nanoseconds;
 use crate::error::{Error, Result};
 use crate::picture::reading_rule::MOST_PIXELS;
 use crate::types::Rgb;
+use crate::types::shown_text::excerpt;
 
 /// The most lines of ffmpeg that are kept for a message.
 const LAST_LINES: usize = 2;
@@ -42,8 +43,33 @@ pub(crate) struct VideoFrames {
     child: Child,
     output: BufReader<ChildStdout>,
     times: Receiver<Nanoseconds>,
-    /// Gives the last lines that ffmpeg wrote.
-    log: Option<JoinHandle<Vec<String>>>,
+    log: Option<JoinHandle<FfmpegLog>>,
+}
+
+/// Lines that ffmpeg wrote while it decoded.
+#[derive(Debug, Default)]
+struct FfmpegLog {
+    /// The last lines, without those about frames.
+    last: Vec<String>,
+    /// The first line about damage, and the number of such lines.
+    first_damage: Option<String>,
+    damages: usize,
+}
+
+/// Parts of the words of ffmpeg's lines about damage.
+const DAMAGE_WORDS: [&str; 4] = ["rror", "nvalid", "orrupt", "runcat"];
+
+impl FfmpegLog {
+    fn add(&mut self, line: &str) {
+        if DAMAGE_WORDS.iter().any(|word| line.contains(word)) {
+            self.damages += 1;
+            self.first_damage.get_or_insert_with(|| line.to_owned());
+        }
+        self.last.push(line.to_owned());
+        if self.last.len() > LAST_LINES {
+            self.last.remove(0);
+        }
+    }
 }
 
 impl Video {
@@ -105,7 +131,7 @@ impl Video {
         };
         let (sender, times) = channel();
         let log = thread::spawn(move || {
-            let mut last = Vec::new();
+            let mut kept = FfmpegLog::default();
             let mut base = None;
             let mut lines = BufReader::new(log);
             let mut line = Vec::new();
@@ -120,14 +146,11 @@ impl Video {
                     // The receiver is gone if the rest of the video is not wanted.
                     Some(time) => drop(sender.send(time)),
                     None if text.contains("showinfo") => {}
-                    None => last.push(text.trim().to_owned()),
-                }
-                if last.len() > LAST_LINES {
-                    last.remove(0);
+                    None => kept.add(text.trim()),
                 }
                 line.clear();
             }
-            last
+            kept
         });
         Ok(VideoFrames {
             path: self.path.clone(),
@@ -275,17 +298,28 @@ impl VideoFrames {
         }
     }
 
+    /// The damage that ffmpeg reported in a video that it decoded to the end; `None` if it reported none.
+    pub(crate) fn damage(mut self) -> Option<String> {
+        let log = self.log.take()?.join().ok()?;
+        let first = log.first_damage?;
+        let count = match log.damages {
+            1 => "a problem".to_owned(),
+            count => format!("{count} problems, first"),
+        };
+        Some(format!("ffmpeg reports {count}: {}", excerpt(&first, 150)))
+    }
+
     /// The error for a failure of ffmpeg, with its last lines.
     fn failed(&mut self, problem: &str) -> Error {
         // Both may fail only because it has ended.
         drop(self.child.kill());
         drop(self.child.wait());
-        let lines = self
+        let log = self
             .log
             .take()
             .and_then(|log| log.join().ok())
             .unwrap_or_default();
-        let problem = format!("ffmpeg: {problem}; {}", last_lines(&lines));
+        let problem = format!("ffmpeg: {problem}; {}", last_lines(&log.last));
         Error::data(self.path.display(), problem)
     }
 }

@@ -18,6 +18,7 @@ use crate::picture::ImageFile;
 use crate::picture::raw_image::RawPixels;
 use crate::picture::reading_rule::ReadingRule;
 use crate::text::words::counted;
+use crate::types::shown_text::excerpt;
 use crate::types::{FrameId, Labels, Rgb};
 
 /// The most bytes of frames that wait to be written (chosen). Writing takes two to three times as many.
@@ -26,8 +27,11 @@ const MOST_WAITING: usize = 32 << 20;
 /// Frames that wait for each thread (chosen).
 const WAITING_PER_THREAD: usize = 4;
 
+/// Maximum number of characters of a problem: it may repeat texts of the recording.
+const MAX_PROBLEM: usize = 300;
+
 /// Image files that are copied from messages, by the endings of their names.
-const COPIED: [&str; 3] = ["jpg", "png", "webp"];
+pub(super) const COPIED: [&str; 3] = ["jpg", "png", "webp"];
 
 /// A frame that was chosen.
 pub(super) struct ChosenFrame {
@@ -59,7 +63,7 @@ impl ChosenFrame {
 
     /// The topic and time, for messages.
     fn words(&self) -> String {
-        let since = seconds(self.place.time.saturating_sub(self.place.start));
+        let since = seconds(self.place.since);
         format!("{} at {since:.3} s", self.topic)
     }
 }
@@ -168,7 +172,7 @@ impl<'a> FrameWriter<'a> {
         let count = self.failed.entry(topic.to_owned()).or_default();
         *count += 1;
         if *count == 1 {
-            tracing::error!("{}: {problem}", self.drive);
+            tracing::error!("{}: {}", self.drive, excerpt(problem.trim(), MAX_PROBLEM));
         }
     }
 
@@ -248,7 +252,8 @@ impl<'a> FrameWriter<'a> {
                 let ending = file.ending();
                 if !COPIED.contains(&ending) {
                     return Err(format!(
-                        "format {format:?}; a JPEG, PNG or WebP file expected"
+                        "format {:?}; a JPEG, PNG or WebP file expected",
+                        excerpt(&format, 60)
                     ));
                 }
                 // The message of the file names its place, which the caller does, too.

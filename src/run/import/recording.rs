@@ -11,7 +11,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::camera_facts::{Cameras, Exposures};
-use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
+use super::frame_writer::{COPIED, ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
 use super::topic_list::{listing, no_images};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, open};
@@ -19,15 +19,18 @@ use crate::images::progress::{Progress, StepBar};
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::recording::{
     CameraInfo, Content, Encoding, Event, ImageMessage, LARGEST_MESSAGE, McapReader, Message,
-    Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicOverview, camera_of, seconds,
-    stamp,
+    Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview, camera_of,
+    seconds, stamp,
 };
 use crate::picture::ImageFile;
 use crate::picture::reading_rule::ReadingRule;
 use crate::runs::Outcome;
-use crate::text::words::counted;
+use crate::text::words::{counted, first_names};
 use crate::types::Decides;
 use crate::types::flag::positive;
+
+/// Number of topics that a message names.
+const MAX_NAMED: usize = 3;
 
 /// Bytes at the start of a message that hold its time.
 const STAMP: u64 = 64;
@@ -75,6 +78,12 @@ pub(super) struct WrittenArgs {
 impl WrittenArgs {
     /// Refuses a folder that holds frames already.
     pub(super) fn check(&self, out: &Path) -> Result<()> {
+        if out.is_file() {
+            return Err(Error::data(
+                out.display(),
+                "a file; a folder for frames expected",
+            ));
+        }
         let list = out.join("frames.jsonl");
         if self.force || !list.exists() {
             return Ok(());
@@ -121,22 +130,23 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
         .then(|| overview(&files, progress))
         .transpose()?;
     let Some(out) = &args.out else {
-        return listing(&overview.unwrap_or_default());
+        return listing(&files[0], &overview.unwrap_or_default());
     };
-    let topics = topics(args, overview.as_ref())?;
+    let topics = topics(args, &files[0], overview.as_ref())?;
     let drive = drive_name(&files[0]);
     let mut import = Import::new(args, out, &drive, &topics, overview.as_ref())?;
     let mut problems = Vec::new();
     let bar = progress.bar("MB", bytes(&files) as usize >> 20);
     for file in &files {
-        import.read(file, &bar, &mut problems)?;
+        match reader(file) {
+            Ok(reader) => import.read(file, reader, &bar, &mut problems),
+            Err(e) if files.len() == 1 => return Err(e),
+            Err(e) => problems.push(e.to_string()),
+        }
     }
     drop(bar);
-    for problem in &problems {
-        tracing::warn!("{problem}");
-    }
     let info = args.written.info("mcap", &drive);
-    import.finish(args, out, info, &files[0], problems.is_empty())
+    import.finish(args, out, info, &files[0], problems)
 }
 
 /// The MCAP files that paths stand for: a folder for the files in it, in the order of their numbers.
@@ -150,7 +160,7 @@ fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
         let mut inside = entries(path)?;
         inside.retain(|file| file.extension().is_some_and(|ending| ending == "mcap"));
         if inside.is_empty() {
-            return Err(Error::data(path.display(), "no .mcap file in this folder"));
+            return Err(Error::data(path.display(), no_mcap_inside(path)?));
         }
         inside.sort_by_cached_key(|file| {
             let stem = file
@@ -167,6 +177,23 @@ fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
         files.extend(inside);
     }
     Ok(files)
+}
+
+/// The problem of a folder without MCAP files.
+fn no_mcap_inside(folder: &Path) -> Result<&'static str> {
+    let files = entries(folder)?;
+    let has = |ending: &str| {
+        files
+            .iter()
+            .any(|file| file.extension().is_some_and(|own| own == ending))
+    };
+    Ok(if has("db3") {
+        "a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap"
+    } else if has("zstd") || has("zst") {
+        "its files are compressed as a whole; unpack them first: zstd -d FILE"
+    } else {
+        "no .mcap file in this folder"
+    })
 }
 
 /// Bytes of the files.
@@ -188,24 +215,36 @@ fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overview> {
     let bar = progress.bar("files", files.len());
     let mut overview = Overview::default();
     for file in files {
-        overview.add(&file.display().to_string(), reader(file)?, |bytes| {
-            let file = ImageFile::new(
-                bytes.to_vec(),
-                "the first image".to_owned(),
-                ReadingRule::default(),
-            );
-            file.check().map_err(|e| e.to_string())
-        });
         bar.inc();
+        let reader = match reader(file) {
+            Ok(reader) => reader,
+            Err(e) if files.len() == 1 => return Err(e),
+            Err(e) => {
+                overview.problems.push(e.to_string());
+                continue;
+            }
+        };
+        overview.add(&file.display().to_string(), reader, image_size);
     }
     Ok(overview)
 }
 
+/// Width and height of an image file of a message.
+fn image_size(bytes: &[u8]) -> Result<(u32, u32), String> {
+    let name = "the first image".to_owned();
+    let file = ImageFile::new(bytes.to_vec(), name, ReadingRule::default());
+    let ending = file.ending();
+    if !COPIED.contains(&ending) {
+        return Err(format!("a file .{ending}; JPEG, PNG or WebP expected"));
+    }
+    file.check().map_err(|e| e.to_string())
+}
+
 /// The topics whose images are taken: those that are named, or the only one.
-fn topics(args: &McapArgs, overview: Option<&Overview>) -> Result<Vec<String>> {
+fn topics(args: &McapArgs, file: &Path, overview: Option<&Overview>) -> Result<BTreeSet<String>> {
     let known = overview.map(Overview::image_topics);
     let topics = match (known, overview) {
-        (Some(known), Some(overview)) if known.is_empty() => return Err(no_images(overview)),
+        (Some(known), Some(overview)) if known.is_empty() => return Err(no_images(file, overview)),
         (Some(known), _) if args.topic.is_empty() && known.len() > 1 => {
             let problem = format_args!(
                 "several topics have images; choose one or more of {}",
@@ -213,10 +252,10 @@ fn topics(args: &McapArgs, overview: Option<&Overview>) -> Result<Vec<String>> {
             );
             return Err(Error::usage("--topic", problem));
         }
-        (Some(known), _) if args.topic.is_empty() => vec![known[0].to_owned()],
-        _ => args.topic.clone(),
+        (Some(known), _) if args.topic.is_empty() => BTreeSet::from([known[0].to_owned()]),
+        _ => args.topic.iter().cloned().collect(),
     };
-    let slugs: BTreeSet<String> = topics.iter().map(|topic| slug(topic)).collect();
+    let slugs: BTreeSet<String> = topics.iter().map(|topic: &String| slug(topic)).collect();
     if slugs.len() < topics.len() {
         let problem =
             "two of the topics give their frames the same names; import them into two folders";
@@ -257,6 +296,7 @@ struct TakenTopic {
     prefix: String,
     /// Messages so far.
     seen: usize,
+    clock: TopicClock,
     /// Time of the last frame.
     latest: Option<Nanoseconds>,
 }
@@ -269,6 +309,8 @@ struct Import<'a> {
     white: u16,
     cameras: Cameras,
     exposures: Exposures,
+    /// Topics with images in the recording.
+    with_images: BTreeSet<String>,
     /// Frames whose message has no time.
     without_stamp: usize,
     /// Number of frames that were earlier than the one before of their topic, and the first of them in words.
@@ -281,7 +323,7 @@ impl<'a> Import<'a> {
         args: &McapArgs,
         out: &'a Path,
         drive: &str,
-        topics: &[String],
+        topics: &BTreeSet<String>,
         overview: Option<&Overview>,
     ) -> Result<Self> {
         let white = args.white.map_or(u16::MAX, NonZeroU16::get);
@@ -298,6 +340,7 @@ impl<'a> Import<'a> {
                 String::new()
             },
             seen: 0,
+            clock: TopicClock::default(),
             latest: None,
         };
         Ok(Self {
@@ -315,6 +358,7 @@ impl<'a> Import<'a> {
             white,
             cameras: Cameras::default(),
             exposures: Exposures::default(),
+            with_images: BTreeSet::new(),
             without_stamp: 0,
             backwards: 0,
             first_backwards: None,
@@ -322,8 +366,13 @@ impl<'a> Import<'a> {
     }
 
     /// Takes the frames of one file. Damage is added to `problems`; frames before it are kept.
-    fn read(&mut self, path: &Path, bar: &StepBar, problems: &mut Vec<String>) -> Result<()> {
-        let mut reader = reader(path)?;
+    fn read(
+        &mut self,
+        path: &Path,
+        mut reader: McapReader<File>,
+        bar: &StepBar,
+        problems: &mut Vec<String>,
+    ) {
         let place = path.display();
         let mut megabytes = 0;
         let mut last = None;
@@ -366,19 +415,22 @@ impl<'a> Import<'a> {
             ));
         }
         self.writer.write_waiting();
-        Ok(())
     }
 
-    /// Seconds from the first frame.
-    fn since_start(&self, time: Nanoseconds) -> f64 {
-        seconds(time.saturating_sub(self.stretches.start().unwrap_or(time)))
+    /// Seconds from the first frame, at a time of the recorder.
+    fn since_start(&self, log_time: Nanoseconds) -> f64 {
+        seconds(log_time.saturating_sub(self.stretches.log_start().unwrap_or(log_time)))
     }
 
     /// Takes what is needed of a message.
     fn take(&mut self, reader: &mut McapReader<File>, message: &Message) {
         let channel = &message.channel;
+        let has_images = matches!(channel.content, Content::Image(_));
+        if has_images && !self.with_images.contains(&channel.topic) {
+            self.with_images.insert(channel.topic.clone());
+        }
         if let Some(taken) = self.topics.get_mut(&channel.topic)
-            && !matches!(channel.content, Content::Image(_))
+            && !has_images
         {
             taken.seen += 1;
             let problem = match &channel.content {
@@ -437,11 +489,20 @@ impl<'a> Import<'a> {
         let stated = stated.filter(|stamp| *stamp != 0);
         self.without_stamp += usize::from(stated.is_none());
         let time = stated.unwrap_or(message.log_time);
-        self.note_backwards(&topic, time);
-        let place = self.stretches.place(time);
         let Some(taken) = self.topics.get_mut(&topic) else {
             return;
         };
+        let place = self
+            .stretches
+            .place(&mut taken.clock, time, message.log_time);
+        if let Some(latest) = taken.latest.replace(time).filter(|latest| time < *latest) {
+            let since = seconds(place.since);
+            let back = seconds(latest.saturating_sub(time));
+            self.backwards += 1;
+            self.first_backwards.get_or_insert_with(|| {
+                format!("{topic} at {since:.3} s, {back:.3} s before the frame in front of it")
+            });
+        }
         let number = taken.seen;
         taken.seen += 1;
         if !taken.sampler.is_due(place) || reader.body().is_none() {
@@ -471,31 +532,30 @@ impl<'a> Import<'a> {
         self.writer.push(frame, !message.is_in_chunk);
     }
 
-    /// Counts a frame that is earlier than the one before of its topic.
-    fn note_backwards(&mut self, topic: &str, time: Nanoseconds) {
-        let taken = self.topics.get_mut(topic);
-        let Some(latest) = taken.and_then(|taken| taken.latest.replace(time)) else {
-            return;
+    /// Adds the topics without messages to the problems, and warns of times without a frame.
+    ///
+    /// # Errors
+    /// If no topic has messages.
+    fn check_topics(&self, place: &str, problems: &mut Vec<String>) -> Result<()> {
+        let known: Vec<&String> = self.with_images.iter().collect();
+        let known = match known.as_slice() {
+            [] => "no topic has images".to_owned(),
+            known => format!("topics with images: {}", first_names(known, MAX_NAMED)),
         };
-        if time < latest {
-            let back = seconds(latest.saturating_sub(time));
-            self.backwards += 1;
-            let since = self.since_start(time);
-            let first =
-                || format!("{topic} at {since:.3} s, {back:.3} s before the frame in front of it");
-            self.first_backwards.get_or_insert_with(first);
-        }
-    }
-
-    /// Refuses a topic without messages, and warns of times without a frame.
-    fn check_topics(&self, place: &str) -> Result<()> {
-        for (topic, taken) in &self.topics {
-            if taken.seen == 0 {
-                let problem = format_args!(
-                    "no messages of {topic}; without --topic and --out, its topics are listed"
-                );
-                return Err(Error::data(place, problem));
+        let absent = self.topics.iter().filter(|(_, taken)| taken.seen == 0);
+        let absent: Vec<String> = absent
+            .map(|(topic, _)| format!("no messages of {topic}; {known}"))
+            .collect();
+        if let Some(first) = absent.first()
+            && absent.len() == self.topics.len()
+        {
+            for problem in problems.iter() {
+                tracing::warn!("{problem}");
             }
+            return Err(Error::data(place, first));
+        }
+        problems.extend(absent.iter().map(|problem| format!("{place}: {problem}")));
+        for (topic, taken) in self.topics.iter().filter(|(_, taken)| taken.seen > 0) {
             warn_of_missed(&taken.sampler, topic);
         }
         Ok(())
@@ -530,10 +590,13 @@ impl<'a> Import<'a> {
         out: &Path,
         mut info: Value,
         first_file: &Path,
-        is_whole: bool,
+        mut problems: Vec<String>,
     ) -> Result<Outcome> {
         let place = first_file.display().to_string();
-        self.check_topics(&place)?;
+        self.check_topics(&place, &mut problems)?;
+        for problem in &problems {
+            tracing::warn!("{problem}");
+        }
         self.writer.write_waiting();
         let [with_intrinsics, with_exposure] = self.add_camera_facts();
         let names: Vec<String> = self.topics.keys().cloned().collect();
@@ -569,7 +632,7 @@ impl<'a> Import<'a> {
         }
         Ok(Outcome::wrote(
             out,
-            Outcome::complete_if(failed == 0 && is_whole),
+            Outcome::complete_if(failed == 0 && problems.is_empty()),
             output,
         ))
     }

@@ -1,16 +1,20 @@
 //! The topics of a recording in words: [`listing`].
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::import::recording::{Overview, TopicOverview};
 use crate::runs::Outcome;
-use crate::text::words::counted;
+use crate::text::words::{counted, first_names};
+
+/// Number of topics that a message names.
+const MAX_NAMED: usize = 3;
 
 /// The list of the topics with images.
-pub(super) fn listing(overview: &Overview) -> Result<Outcome> {
+pub(super) fn listing(file: &Path, overview: &Overview) -> Result<Outcome> {
     if overview.image_topics().is_empty() {
-        return Err(no_images(overview));
+        return Err(no_images(file, overview));
     }
     for problem in &overview.problems {
         tracing::warn!("{problem}");
@@ -59,8 +63,8 @@ fn lines(overview: &Overview) -> String {
     lines
 }
 
-/// The error for a recording without images, with the topics that it has.
-pub(super) fn no_images(overview: &Overview) -> Error {
+/// The error for a recording without images, whose first file is `file`, with the topics that it has.
+pub(super) fn no_images(file: &Path, overview: &Overview) -> Error {
     let unread = overview
         .topics
         .iter()
@@ -68,7 +72,6 @@ pub(super) fn no_images(overview: &Overview) -> Error {
     let topics: Vec<String> = overview
         .topics
         .iter()
-        .take(8)
         .map(|(name, topic)| format!("{name} ({})", topic.schema))
         .collect();
     let problem = match (unread, topics.is_empty()) {
@@ -78,10 +81,10 @@ pub(super) fn no_images(overview: &Overview) -> Error {
             .first()
             .cloned()
             .unwrap_or_else(|| "it has no messages".to_owned()),
-        (None, false) => format!("its topics are {}", topics.join(", ")),
+        (None, false) => format!("its topics are {}", first_names(&topics, MAX_NAMED)),
     };
     Error::data(
-        "the recording",
+        file.display(),
         format_args!("no topic with images: {problem}"),
     )
 }

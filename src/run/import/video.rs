@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::pool;
 use crate::import::recording::video::Video;
-use crate::import::recording::{SamplingArgs, Stretches, Thumbnail, seconds};
+use crate::import::recording::{SamplingArgs, Stretches, Thumbnail, TopicClock, seconds};
 use crate::runs::Outcome;
 use crate::types::Decides;
 
@@ -61,6 +61,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     let drive = drive_name(&args.file);
     let mut sampler = args.sampling.sampler(duration);
     let mut stretches = Stretches::new(args.written.stretch);
+    let mut clock = TopicClock::default();
     let mut writer = FrameWriter::new(
         out,
         drive.clone(),
@@ -70,6 +71,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     let bar = progress.bar("seconds", duration as usize);
     let mut frames = video.frames(args.sampling.interval())?;
     let (mut seen, mut passed, mut problem) = (0, 0, None);
+    let mut last = 0.0_f64;
     loop {
         let frame = match frames.next() {
             Ok(Some(frame)) => frame,
@@ -79,9 +81,10 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
                 break;
             }
         };
-        let at = stretches.place(frame.time);
+        let at = stretches.place(&mut clock, frame.time, frame.time);
         let name = format!("{seen:06}");
         seen += 1;
+        last = last.max(seconds(frame.time));
         let now = seconds(frame.time).max(0.0) as usize;
         bar.advance(now.saturating_sub(passed));
         passed = passed.max(now);
@@ -100,9 +103,16 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     }
     drop(bar);
     warn_of_missed(&sampler, &place);
+    let problem = match problem {
+        Some(problem) => Some(format!("{problem}; frames up to there are kept")),
+        None => frames
+            .damage()
+            .or_else(|| early_end(&video, last, args.sampling.interval()))
+            .map(|problem| format!("{place}: {problem}; its frames are kept")),
+    };
     let is_whole = problem.is_none();
     if let Some(problem) = problem {
-        tracing::warn!("{problem}; frames up to there are kept");
+        tracing::warn!("{problem}");
     }
     let info = args.written.info("video", &drive);
     let scenes = writer.finish(&place, &info)?;
@@ -121,4 +131,15 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         Outcome::complete_if(failed == 0 && is_whole),
         output,
     ))
+}
+
+/// Seconds at the end of a video that may have no frame (chosen): its sound may be longer.
+const END: f64 = 2.0;
+
+/// The problem of a video whose frames, one every `interval` seconds, end long before the duration that it states.
+fn early_end(video: &Video, last: f64, interval: f64) -> Option<String> {
+    let duration = video.duration?;
+    (duration - last > interval + END).then(|| {
+        format!("the frames end at {last:.1} s of {duration:.1} s, as in a file that is cut off")
+    })
 }
