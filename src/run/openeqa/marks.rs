@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::record::OpenItem;
 use super::setup::OpenSetup;
-use crate::ask::openeqa::judge_prompt;
+use crate::ask::prompts::openeqa::judge_prompt;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::engine::models::ModelUnderTest;
 use crate::error::Result;

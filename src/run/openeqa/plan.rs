@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::record::OpenItem;
 use super::setup::OpenSetup;
 use crate::ask::ImagePlaces;
-use crate::ask::openeqa::{blind, vision};
+use crate::ask::prompts::openeqa::{blind, vision};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::engine::key_facts::KeyFacts;
 use crate::engine::models::asked_in;
