@@ -29,8 +29,8 @@ use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
 use crate::run_reports::report;
 use crate::runs::Outcome;
-use crate::types::manifest::Status;
-use crate::types::shown_text::{shown, shown_in_colours};
+use crate::types::manifests::Status;
+use crate::types::text::{shown, shown_in_colours};
 
 use command::{BatchCommand, Colours, Command, NAME, ReportCommand, ReportForm, StudyCommand};
 use layers::one_line;

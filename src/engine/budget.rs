@@ -12,7 +12,7 @@ use crate::images::trial::{Item, Prompt, Trial};
 use crate::picture::Scaling;
 use crate::run_reports;
 use crate::store::StoredTrial;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{ImageFacts, Unstated, Usage, Via};
 
 /// Characters of English text per token, by the rule of thumb of every provider.

@@ -13,8 +13,7 @@ use crate::report::power::PowerForecast;
 use crate::runs::outcome::{Outcome, StdoutFormat};
 use crate::runs::stored::StoredRun;
 use crate::store::Store;
-use crate::types::manifest::PartPlace;
-use crate::types::manifest::{Columns, Identity};
+use crate::types::manifests::{Columns, Identity, PartPlace};
 use crate::types::{Record, RunQuestion};
 
 /// Record type of an experiment's trials.

@@ -22,7 +22,7 @@ use crate::images::timings::Timings;
 use crate::report::forecast::{Forecast, json, render};
 use crate::runs::outcome::Outcome;
 use crate::store::{self, Store};
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::manifests::{RunManifest, Status};
 use crate::types::{StoredDetail as _, TrialKey};
 use darkqa_enhance::ModelFile;
 

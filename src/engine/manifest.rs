@@ -12,7 +12,7 @@ use crate::images::image_words::ImageWords;
 use crate::images::source::input_summary;
 use crate::runs::renamed::{self, OtherSettings};
 use crate::store::now;
-use crate::types::manifest::{Counts, RunManifest, RunPart, Status};
+use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
 use crate::types::{InputSummary, ListedModel, StoredDetail as _};
 use darkqa_score::record::Detail as _;
 

@@ -11,7 +11,7 @@ use crate::ask::Prices;
 use crate::error::Result;
 use crate::runs::shard::Shard;
 use crate::types::Decides;
-use crate::types::flag::positive;
+use crate::types::flags::positive;
 
 /// Flags of cost and of the limits that end a run.
 #[derive(Debug, Clone, Default, Args)]

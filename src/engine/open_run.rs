@@ -41,7 +41,7 @@ use crate::runs::stored::StoredRun;
 use crate::store::now;
 use crate::store::{self, Store, StoredTrial};
 use crate::text::words::{counted, plural};
-use crate::types::manifest::{Counts, RunManifest};
+use crate::types::manifests::{Counts, RunManifest};
 use crate::types::{EnhancerName, TrialKey, View};
 use darkqa_enhance::{Enhancer, Usage};
 use darkqa_score::image_dependence::FEWEST;

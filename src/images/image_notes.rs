@@ -7,7 +7,7 @@ use crate::images::stored_images::Similarity;
 use crate::images::thumbnail::MissingThumbnails;
 use crate::picture::Payload;
 use crate::store::Store;
-use crate::types::outlines::PixelBox;
+use crate::types::questions::PixelBox;
 use crate::types::{Condition, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
 use darkqa_score::realism::{psnr, ssim::ssim};
 use darkqa_score::record::Detail;

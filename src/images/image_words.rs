@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::images::walk::Walk;
 use crate::picture::ImageArgs;
 use crate::types::Decides;
-use crate::types::keyed_flag::spelled;
+use crate::types::flags::spelled;
 use darkqa_enhance::{EnhancedFolder, SizeArgs};
 use darkqa_light::{CameraArgs, SensorArgs};
 

@@ -1,6 +1,6 @@
 //! A photograph of a frame's scene in the dark, and how dark it is: [`SourcePhotograph`].
 
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{
     Degradation, Digest, InputNote, PairFacts, PhotoName, ReadingName, Rgb, Severity,
 };

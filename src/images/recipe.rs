@@ -12,7 +12,7 @@ use crate::images::source::{Source, SourceFrame};
 use crate::images::walk::{CameraOf, DegradedAt, Walk};
 use crate::picture::PayloadFormat;
 use crate::picture::Scaling;
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{
     Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity,
 };

@@ -8,7 +8,7 @@ use crate::dataset::{Dataset, Picture};
 use crate::error::{Error, Result};
 use crate::images::photograph::{SourcePhotograph, matched};
 use crate::images::progress::Progress;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 use crate::types::{
     Condition, Degradation, Digest, FrameId, InputNote, InputSummary, PairDark, PhotoName, Question,
 };

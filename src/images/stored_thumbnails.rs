@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown};
 use crate::images::thumbnail::{self, ShownObjects};
-use crate::types::outlines::PixelBox;
+use crate::types::questions::PixelBox;
 use crate::types::{Condition, Digest, FrameId, Thumbnail};
 
 /// The place of the small copy of an image in a store.

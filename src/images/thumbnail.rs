@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::error::{Error, Result};
 use crate::images::montage::{columns, montage};
 use crate::picture::{Payload, PayloadFormat, Scaling};
-use crate::types::outlines::PixelBox;
+use crate::types::questions::PixelBox;
 use crate::types::{Condition, Digest, FrameId, ObjectCrop, Rgb, RunQuestion, Thumbnail};
 
 /// Version of the thumbnails. Raise it whenever a byte of one changes, so that older thumbnails in an image store are not reused.

@@ -29,7 +29,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::types::flag::flag_words;
+use crate::types::flags::flag_words;
 
 pub(crate) use adapter::{Adapter, FrameMaps, ListedFrame, StatedArgs};
 pub(crate) use left_over::LeftOver;

@@ -21,7 +21,7 @@ use crate::text::light_readings::LightReadings;
 use crate::text::terminal::render;
 use crate::text::words::{counted, percent, reach_of};
 use crate::text::wrapped::{WIDTH, wrapped};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{Axis, AxisLevel};
 use darkqa_score::accuracy::AccuracyCell;
 use darkqa_score::choice::ReadingMode;

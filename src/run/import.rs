@@ -29,7 +29,7 @@ use crate::picture::ImageFile;
 use crate::picture::png;
 use crate::runs::Outcome;
 use crate::text::words::counted;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{Decides, FrameId, InputNote, Rgb, shell_word};
 
 /// Plausible median depths of a frame in millimetres (chosen). Outside this range the scale is wrong, or it shows a wall.

@@ -15,8 +15,8 @@ use crate::picture::ReadingRule;
 use crate::picture::png;
 use crate::runs::Outcome;
 use crate::text::words::counted;
-use crate::types::manifest::Status;
-use crate::types::question::letter;
+use crate::types::manifests::Status;
+use crate::types::questions::letter;
 use crate::types::{Choices, Decides, FrameId, Question, shell_word};
 use darkqa_questions::rules::Rules;
 

@@ -10,7 +10,7 @@ use super::listing::listing;
 use crate::error::{Error, Result};
 use crate::report::page::{self, PageInputs};
 use crate::runs::stored::StoredRun;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{
     ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word,
 };

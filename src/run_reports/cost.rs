@@ -8,7 +8,7 @@ use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
 use crate::text::words;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{TrialRef, Via};
 use darkqa_score::record::Detail;
 

@@ -8,7 +8,7 @@ use super::lights::Lights;
 use super::models::Names;
 use crate::error::Result;
 use crate::runs::stored::{RunLayout, RunTexts, StoredRun};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{
     Condition, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail, TrialKey,
     TrialRef, Trials,

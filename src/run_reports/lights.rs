@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{self, some};
 use crate::runs::stored::StoredRun;
-use crate::types::degradation::Kind;
-use crate::types::manifest::RunManifest;
+use crate::types::degradations::Kind;
+use crate::types::manifests::RunManifest;
 use crate::types::{Condition, Digest, EnhancerName, KindReading, LightGroup, TrialRef};
 use darkqa_score::record::Detail;
 use darkqa_score::subject::is_control;

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::runs::stored::RunLayout;
 use crate::store::{AddressChange, Store};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use darkqa_score::record::Detail;
 
 /// The folder that the report of one run is written into.

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::runs::placed_trials::{append, trials_of};
 use crate::store::{self, Store};
-use crate::types::keyed_flag::spelled_setting;
-use crate::types::manifest::{RunManifest, differences};
+use crate::types::flags::spelled_setting;
+use crate::types::manifests::{RunManifest, differences};
 use crate::types::{FrameId, TextPlace, TrialKey};
 use darkqa_score::record::Detail;
 

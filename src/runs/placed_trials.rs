@@ -7,8 +7,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::runs::renamed::rename;
 use crate::store::{RecordLog, Store, each_record};
-use crate::types::manifest::RunManifest;
-use crate::types::recorded_names::RecordedNames;
+use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{Record, TextPlace, TrialKey, Trials};
 use darkqa_score::record::Detail;
 

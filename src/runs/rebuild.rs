@@ -19,7 +19,7 @@ use crate::images::timings::Timings;
 use crate::images::walk::{Walk, WalkFolder};
 use crate::images::workers::ThreadArgs;
 use crate::picture::Payload;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{Condition, Decides, FrameId};
 use darkqa_enhance::{EnhancedFolder, Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use darkqa_light::KindSettings;

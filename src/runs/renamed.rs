@@ -8,10 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use crate::error::Result;
-use crate::types::control::OBSERVER;
-use crate::types::manifest::RunManifest;
-use crate::types::model_views::{Fit, StoredViews, Views};
-use crate::types::recorded_names::RecordedNames;
+use crate::types::manifests::{Fit, RecordedNames, RunManifest, StoredViews, Views};
+use crate::types::replies::OBSERVER;
 use crate::types::{Control, Digest, Record, Trials};
 use darkqa_score::record::Detail;
 

@@ -6,7 +6,7 @@ use super::pooled::{detail, mean_levels, reserved, runs, with_verdict};
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{KindReading, LightGroup};
 use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;

@@ -4,7 +4,7 @@ use super::sample::is_impossible;
 use super::sentence::Sentence;
 use crate::text::words::light;
 use crate::types::KindReading;
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use darkqa_score::findings::Findings;
 use darkqa_score::pooled::PooledFinding;
 use darkqa_score::pooled_kind::PooledKind;

@@ -4,7 +4,7 @@ use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family;
 use crate::types::KindReading;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use darkqa_score::best::{BestInTheDark, Crossing};
 use darkqa_score::claim::Claim;
 use darkqa_score::findings::Findings;

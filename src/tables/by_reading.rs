@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::text::table::ColumnKind::{Count, Number, P, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::text::words::{self, ends_in_points, points, reach, stops};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, ReadingName};
 use darkqa_score::by_reading::{
     EffectInReading, FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use crate::text::words::light;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{
     AxisLevel, EnhancerName, KindReading, LightGroup, ModelListing, SetLight, View,
 };

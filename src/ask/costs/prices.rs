@@ -10,7 +10,7 @@ use super::token_bound::TokenBound;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::Usage;
-use crate::types::toml_fault::TomlFault;
+use crate::types::text::TomlFault;
 
 /// The price of a model, in dollars per million tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

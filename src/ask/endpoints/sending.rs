@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::ask::pace::{Bounds, Quota};
 use crate::types::Decides;
-use crate::types::flag::{positive, seconds};
+use crate::types::flags::{positive, seconds};
 
 /// The settings for sending and retrying requests.
 #[derive(Debug, Clone, Copy, PartialEq, Args)]

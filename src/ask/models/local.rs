@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::random::Random;
 use crate::ask::failures::AskError;
 use crate::ask::requests::Call;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 use crate::types::{Digest, FailureKind, Finish, Observed, Question, Reply};
 
 /// Reason for the end of a reply that is a guess.

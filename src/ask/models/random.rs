@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::ask::requests::Call;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 use crate::types::{Digest, Question};
 
 /// A model that answers with the letter of a random choice; all choices are equally likely. The guess depends only on the seed,

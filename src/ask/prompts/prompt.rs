@@ -7,7 +7,7 @@ use minijinja::{AutoEscape, Environment, UndefinedBehavior, Value, context};
 
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId, View};
 
 const CHOICE: &str = "choice.txt";

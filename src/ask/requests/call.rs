@@ -6,7 +6,7 @@ use crate::ask::failures::{AskError, Reach};
 use serde::Serialize;
 
 use crate::picture::Payload;
-use crate::types::image_mark::{MarkedPiece, pieces};
+use crate::types::text::image_mark::{MarkedPiece, pieces};
 use crate::types::{Condition, FailureKind, Question, QuestionId};
 
 /// A question to a model, with choices or open.

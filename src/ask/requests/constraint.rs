@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::parameters::Constrain;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 
 /// The name of the only field in a reply with `--request constrain=json`.
 pub(in crate::ask) const ANSWER: &str = "answer";

@@ -14,8 +14,8 @@ use super::token_field::TokenField;
 use crate::ask::wire_kind::WireSetting;
 use crate::error::{Error, Result};
 use crate::types::Decides;
-use crate::types::flag::flag_words;
-use crate::types::words::written_as_text;
+use crate::types::flags::flag_words;
+use crate::types::text::words::written_as_text;
 
 /// The name of a model and the settings of its replies; a setting that is `None` is left out of the request.
 ///

@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 
 use crate::ask::endpoints::BaseUrl;
 use crate::error::{Error, Result};
-use crate::types::flag::flag_words;
+use crate::types::flags::flag_words;
 
 /// The table that comes with the program.
 static TABLE: LazyLock<Table> = LazyLock::new(|| {

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use crate::types::flag::flag_words;
+use crate::types::flags::flag_words;
 
 /// The field in which a token limit is sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use crate::types::flag::flag_words;
+use crate::types::flags::flag_words;
 
 /// The header that carries a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]

@@ -8,7 +8,7 @@ use super::vendor::Vendor;
 use crate::ask::secrets::looks_like_key;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::toml_fault::TomlFault;
+use crate::types::text::TomlFault;
 
 /// The vendors of a file, above those of the built-in table. The default has none.
 #[derive(Debug, Clone, Copy, Default)]

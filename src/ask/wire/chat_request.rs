@@ -9,7 +9,7 @@ use crate::ask::requests::{
     constraint, images,
 };
 use crate::ask::wire_kind::Wire;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 
 /// The body of a request without its messages, which stand at its end.
 #[derive(Serialize)]

@@ -11,7 +11,7 @@ use crate::ask::requests::{
     AdaptableField, Constrain, FieldState, ImageDetail, Message, MessagePart, Parameters, Parts,
     RequestField, RequestFields, SentFields, Temperature, TokenField, constraint, images,
 };
-use crate::types::question::letter;
+use crate::types::questions::letter;
 
 /// The body of a request without its input, which stands at its end.
 #[derive(Serialize)]

@@ -7,7 +7,7 @@ use super::clean;
 use super::plain::{fold, plain};
 use super::tokens::tokens;
 use super::words::Role;
-use darkqa_ground::types::question::Choices;
+use darkqa_ground::types::questions::Choices;
 
 /// Kind of thing that a choice names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

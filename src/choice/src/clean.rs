@@ -6,7 +6,7 @@ use regex::Regex;
 use serde::Deserialize;
 use unicode_normalization::UnicodeNormalization;
 
-use darkqa_ground::types::question::UnreadReason;
+use darkqa_ground::types::questions::UnreadReason;
 
 /// The marks of one family of models, a table of `reasoning.toml`.
 #[derive(Debug, Deserialize)]

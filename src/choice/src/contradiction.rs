@@ -4,7 +4,7 @@ use super::clauses::Boundary;
 use super::names::{Delimiting, Name};
 use super::view::ReplyView;
 use super::words::Role;
-use darkqa_ground::types::question::{Answer, UnreadReason};
+use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// A letter with the text of another choice: "B. bathroom", "kitchen (C)", "I choose D, the kitchen".
 pub(super) fn contradiction(view: &ReplyView<'_>) -> Option<Answer> {

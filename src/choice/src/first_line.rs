@@ -4,7 +4,7 @@ use super::names::{Delimiting, Name, NameState};
 use super::strict;
 use super::view::ReplyView;
 use super::words::Role;
-use darkqa_ground::types::question::{Answer, UnreadReason};
+use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// The first line, if it parses strictly. It is ambiguous if another line parses strictly as another choice, or if another choice follows a
 /// retraction ("On reflection, it is C").

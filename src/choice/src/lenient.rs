@@ -24,7 +24,7 @@ use super::structured::{boxed, json};
 use super::ticks::{ticked, without_unknown};
 use super::view::ReplyView;
 use super::yes_no::yes_or_no;
-use darkqa_ground::types::question::{Answer, Choices, UnreadReason};
+use darkqa_ground::types::questions::{Answer, Choices, UnreadReason};
 
 /// The lenient reading of a reply without its reasoning.
 pub(super) fn read(text: &str, choices: &Choices) -> Answer {

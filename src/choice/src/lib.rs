@@ -50,8 +50,8 @@ mod yes_no;
 
 use serde::Serialize;
 
-use darkqa_ground::types::question::{Answer, Choices, UnreadReason};
-use darkqa_ground::types::reply::{Finish, Reply};
+use darkqa_ground::types::questions::{Answer, Choices, UnreadReason};
+use darkqa_ground::types::replies::{Finish, Reply};
 
 /// The version of the lenient reading, raised whenever any reply may read differently. Records of another version are read again by
 /// `report --rescore`. The strict reading changed with `lenient/4` alone: marks of reasoning, and full-width signs around letters.

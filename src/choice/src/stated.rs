@@ -7,7 +7,7 @@ use super::names::{Delimiting, Name, NameState, continues_word, index_of};
 use super::plain::fold;
 use super::view::ReplyView;
 use super::words::Role;
-use darkqa_ground::types::question::{Answer, UnreadReason};
+use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// A statement about a choice at one place in a reply.
 #[derive(Debug, Clone, Copy)]

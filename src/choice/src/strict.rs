@@ -1,7 +1,7 @@
 //! The strict reading: a choice's text, its letter, or its letter with its text.
 
 use super::names::index_of;
-use darkqa_ground::types::question::{Answer, UnreadReason};
+use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// The answer of a reply that is exactly one of the strict forms; otherwise `None`.
 ///

@@ -9,7 +9,7 @@ use super::choice_views::ChoiceViews;
 use super::clean::compiled;
 use super::lenient;
 
-use darkqa_ground::types::question::{Answer, UnreadReason};
+use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// JSON keys whose value is the answer, in lower case without spaces and punctuation.
 const KEYS: [&str; 24] = [

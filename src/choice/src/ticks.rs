@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use regex::Regex;
 
 use super::clean::compiled;
-use darkqa_ground::types::question::{Answer, UnreadReason};
+use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// One mark: yes, or no.
 static MARK: LazyLock<Regex> =

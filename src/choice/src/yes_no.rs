@@ -2,7 +2,7 @@
 
 use super::names::Delimiting;
 use super::view::ReplyView;
-use darkqa_ground::types::question::{Answer, UnreadReason};
+use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// The leading word, if yes and no are among the choices: "Yes, there is no lamp". A leading "no" counts only if it is an
 /// answer and not a determiner; the other word must not be said as well.

@@ -9,7 +9,7 @@ use super::names::Role;
 use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Table;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 
 /// The choice that a column names in each row; `None` where it names none that can be read.
 type Said = Vec<Option<usize>>;

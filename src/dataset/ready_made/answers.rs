@@ -2,7 +2,7 @@
 
 use super::offered::{Offered, Origin, one_line};
 use crate::types::Choices;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 
 /// How an answer identifies a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::text_list::list;
 use crate::picture::image_file::format::FileFormat;
 use crate::types::Digest;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 
 /// The maximum length of a text that may be a path or the id of a row. A longer one of the base64 alphabet is a file (the rule of
 /// VLMEvalKit, `vlmeval/dataset/image_base.py`).

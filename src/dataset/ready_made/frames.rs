@@ -17,7 +17,7 @@ use super::truths::Answered;
 use crate::dataset::Root;
 use crate::dataset::image_source::ImageSource;
 use crate::error::{Error, Result};
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 use crate::types::{Digest, FrameId};
 
 /// The image of a question, found.

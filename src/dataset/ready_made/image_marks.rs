@@ -4,8 +4,8 @@ use std::sync::LazyLock;
 
 use regex::{Captures, Regex};
 
-use crate::types::image_mark::mark;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
+use crate::types::text::image_mark::mark;
 
 /// A mark with the space behind it: `<image>`, `<image 2>` or `<image2>`.
 static MARK: LazyLock<Option<Regex>> =

@@ -12,7 +12,7 @@ use super::roles::{Asked, Column, InQuestion, Roles};
 use super::row::{Row, Table};
 use super::settings::{SetArgs, SeveralImages};
 use super::turns::Turns;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -6,8 +6,8 @@ use regex::Regex;
 
 use super::names::without_endings;
 use crate::types::Choices;
-use crate::types::question::letter;
-use crate::types::shown_text::excerpt;
+use crate::types::questions::letter;
+use crate::types::text::excerpt;
 
 /// A letter of an option in a text: `(A)`, `A.`, `A)` or `A:`.
 struct Mark {

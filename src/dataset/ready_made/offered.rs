@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 
 /// The options of a row.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]

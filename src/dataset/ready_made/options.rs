@@ -8,9 +8,9 @@ use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Row;
 use super::text_list::{dict, list};
-use crate::types::question::letter;
+use crate::types::questions::letter;
 use crate::types::shell_word;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 
 /// The options in the columns of a row.
 #[derive(Debug, PartialEq, Eq)]

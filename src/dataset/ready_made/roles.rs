@@ -10,8 +10,8 @@ use super::row::Table;
 use super::template::Template;
 use super::turns::Turns;
 use crate::types::Choices;
-use crate::types::question::letter;
-use crate::types::shown_text::excerpt;
+use crate::types::questions::letter;
+use crate::types::text::excerpt;
 
 /// The columns by role.
 #[derive(Debug)]

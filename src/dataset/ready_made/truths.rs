@@ -15,7 +15,7 @@ use super::offered::Offered;
 use super::roles::{Column, Roles};
 use super::row::Table;
 use crate::types::Choices;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 
 /// A question with its choices.
 #[derive(Debug)]

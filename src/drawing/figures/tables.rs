@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{Names, Overview};
 use crate::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
 use crate::text::words::family as family_name;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::estimate::Estimate;

@@ -6,7 +6,7 @@ use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
 use crate::drawing::figures::Drawing;
 use crate::text::words::light;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::fidelity::ConditionFidelity;

@@ -21,7 +21,7 @@ use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::store::Store;
 use crate::types::TrialKey;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use darkqa_score::record::Detail;
 
 /// Maximum wait between two checks of the batches, as a multiple of `--poll`; chosen: 5 minutes with the default of 10 s.

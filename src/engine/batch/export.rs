@@ -17,7 +17,7 @@ use crate::images::timings::Timings;
 use crate::images::trial::Item;
 use crate::images::workers::pool;
 use crate::runs::outcome::Outcome;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// How input files are written.
 pub(super) struct Target<'a, I: Item> {

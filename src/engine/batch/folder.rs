@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::unstarted;
 use crate::store::Store;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use darkqa_score::record::Detail;
 
 /// The task for the batches of a folder.

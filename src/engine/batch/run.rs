@@ -30,7 +30,7 @@ use crate::report::forecast::money;
 use crate::runs::outcome::Outcome;
 use crate::store::StoredTrial;
 use crate::types::TrialKey;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// How often what a batch did not answer is asked again in another one; chosen.
 const MOST_REPEATS: usize = 3;

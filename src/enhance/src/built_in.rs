@@ -5,7 +5,7 @@ use std::path::Path;
 use darkqa_models::{BUILT_IN, BuiltIn};
 
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::near_name::nearest;
+use darkqa_ground::types::text::near_name::nearest;
 
 /// The built-in enhancer of this name; `None` if the word is the path of a file, that is, has an extension or a folder. A file named `lift`
 /// is therefore never confused with the enhancer.

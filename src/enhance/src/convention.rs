@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use darkqa_ground::types::words::{as_text, words};
+use darkqa_ground::types::text::words::{as_text, words};
 
 /// Order of a tensor's dimensions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

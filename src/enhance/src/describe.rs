@@ -9,7 +9,7 @@ use super::preset::Preset;
 use super::sidecar::ModelSidecar;
 use super::size_plan::SizeRule;
 use super::size_search::MULTIPLES;
-use darkqa_ground::types::enhancer_note::{ConventionLine, TRAINED_ON};
+use darkqa_ground::types::manifests::{ConventionLine, TRAINED_ON};
 
 /// Source of ranges that nothing states.
 const ASSUMED: &str = "assumed";

@@ -11,7 +11,7 @@ use std::str::FromStr;
 use super::parser;
 use super::planes::Planes;
 use super::term::{Sample, Term};
-use darkqa_ground::types::words::as_text;
+use darkqa_ground::types::text::words::as_text;
 
 /// A function of images, pixel by pixel.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,7 +9,7 @@ use super::size_search::TakenSizes;
 use super::usage::{Implausible, Usage};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::EnhancerName;
-use darkqa_ground::types::enhancer_note::{ConventionLine, ProbeNote, ProbeOutcome};
+use darkqa_ground::types::manifests::{ConventionLine, ProbeNote, ProbeOutcome};
 
 /// Results of opening an enhancer and trying it on dark frames: the content of its note before the first image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use super::extra::{ExtraValue, Number};
 use super::port::{Port, list};
 use super::sidecar::{ModelSidecar, OutputChoice};
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::near_name::suggestion;
+use darkqa_ground::types::text::near_name::suggestion;
 
 /// TOML file of all presets.
 const PRESETS: &str = include_str!("presets.toml");

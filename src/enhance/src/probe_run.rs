@@ -11,7 +11,7 @@ use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
 use super::sidecar::{self, ModelSidecar};
 use super::usage::{ImageUse, Implausible, Seen};
 use darkqa_ground::error::Result;
-use darkqa_ground::types::enhancer_note::{ProbeNote, ProbeOutcome};
+use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
 use darkqa_ground::types::{EnhancerName, Rgb};
 
 /// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.

@@ -16,7 +16,7 @@ use super::expression::Expression;
 use super::extra::ExtraValue;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::reading;
-use darkqa_ground::types::toml_fault::TomlFault;
+use darkqa_ground::types::text::TomlFault;
 
 /// Statements of a sidecar. Every key may be missing; an unknown key is an error.
 #[derive(Debug, Default, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
-use darkqa_ground::types::flag::seconds;
+use darkqa_ground::types::flags::seconds;
 
 /// Longest time that one image may take (`--llie-options timeout`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::enhancer_note::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
+use darkqa_ground::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
 use darkqa_ground::types::{Digest, Rgb, SizeLog};
 
 /// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.

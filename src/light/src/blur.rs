@@ -11,7 +11,7 @@ use super::codes::{encode, shown_light};
 use super::curve;
 use super::lanes::{LANES, Lanes};
 use super::streak::{Streak, Tap};
-use darkqa_ground::types::isa::{Isa, Kernel};
+use darkqa_ground::types::images::{Isa, Kernel};
 use darkqa_ground::types::{Light, Rgb};
 
 /// Version of motion blur, raised whenever a pixel changes.

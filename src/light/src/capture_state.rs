@@ -1,7 +1,7 @@
 //! Every number that decides an image besides its frame and its noise key: [`CaptureState`], which can be written and replayed.
 
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::isa::Isa;
+use darkqa_ground::types::images::Isa;
 use darkqa_ground::types::{Image, Light, Rgb, Severity};
 use serde::{Deserialize, Serialize};
 

@@ -11,7 +11,7 @@ use super::noise::{Noise, Term};
 use super::random::NoiseKey;
 use super::reading::{Amplify, Tone};
 use super::unprocess::unprocess_up_to;
-use darkqa_ground::types::isa::Isa;
+use darkqa_ground::types::images::Isa;
 
 /// Noise-free RAW image of a frame, by one camera.
 ///

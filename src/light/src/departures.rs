@@ -13,7 +13,7 @@ use super::noise::{self, Term};
 use super::random::{Component, NoiseKey};
 use super::reading::{Amplify, Tone};
 use super::unprocess::unprocess;
-use darkqa_ground::types::isa::Isa;
+use darkqa_ground::types::images::Isa;
 use darkqa_ground::types::{FrameId, Rgb, Severity};
 
 const SIZE: usize = 512;

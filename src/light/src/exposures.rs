@@ -9,7 +9,7 @@ use super::exposure::expose;
 use super::negative::{Negative, develop_by};
 use super::random::NoiseKey;
 use super::streak::Streak;
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Light, ReadingName, Rgb};
 
 /// The degraded images of one frame, with a cache of one [`Negative`] for each light reading, and of the blurred light.

@@ -16,7 +16,7 @@ use super::curve;
 use super::lanes::{LANES, Lanes};
 use super::piecewise::Piecewise;
 use super::reading::Tone;
-use darkqa_ground::types::isa::{Isa, Kernel};
+use darkqa_ground::types::images::{Isa, Kernel};
 
 /// Gamma compression of light from 2⁻³¹ up; light below 10⁻⁸ is treated as 10⁻⁸.
 static GAMMA: LazyLock<Piecewise> = LazyLock::new(|| Piecewise::new(-31, curve::gamma_compress));

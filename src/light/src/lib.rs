@@ -30,7 +30,7 @@
 //! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. Random numbers are
 //! addressed by where they are used (see [`random`]). Powers and logarithms come from `libm` and are tabulated (see
 //! [`piecewise`]). All else is IEEE sums, products, quotients and square roots in a fixed order. The camera's state is
-//! computed in double precision, samples in single precision, many at once (see [`lanes`] and [`isa`](darkqa_ground::types::isa)).
+//! computed in double precision, samples in single precision, many at once (see [`lanes`] and [`Isa`](darkqa_ground::types::images::Isa)).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 #![expect(

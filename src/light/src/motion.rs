@@ -9,7 +9,7 @@ use serde::{Serialize, Serializer};
 use super::random::{Component, NoiseKey, Site};
 use super::streak::Streak;
 use darkqa_ground::error::Result;
-use darkqa_ground::types::key_values::{number, pairs};
+use darkqa_ground::types::flags::key_values::{number, pairs};
 
 /// The turn of a camera (`--motion`).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

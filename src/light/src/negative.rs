@@ -10,8 +10,7 @@ use super::noise::{Noise, Term};
 use super::random::NoiseKey;
 use super::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
 use super::unprocess::Unprocess;
-use darkqa_ground::types::image::Sample;
-use darkqa_ground::types::isa::Isa;
+use darkqa_ground::types::images::{Isa, Sample};
 use darkqa_ground::types::{Image, Rgb, Severity};
 
 /// Rows of a band, which is processed from RAW to codes within a core's cache; chosen.

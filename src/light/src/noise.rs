@@ -16,7 +16,7 @@ use super::poisson;
 use super::quantile::Quantile;
 use super::random::{Component, NoiseKey, Site, Stream};
 use super::reading::Amplify;
-use darkqa_ground::types::isa::{Isa, Kernel};
+use darkqa_ground::types::images::{Isa, Kernel};
 
 /// One term of the noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

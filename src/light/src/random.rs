@@ -12,7 +12,7 @@ use rand::rand_core::utils::{fill_bytes_via_next_word, next_u64_via_u32};
 use rand_distr::{Distribution as _, Open01};
 
 use super::lanes::{LANES, Lanes};
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Digest, FrameId, Severity};
 
 /// Key of a frame's random numbers, made from the run's seed and the frame's name.

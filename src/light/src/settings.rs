@@ -12,7 +12,7 @@ use super::random::NoiseKey;
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{CameraModel, Sampling};
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
     AxisLevel, Decides, Degradation, KindSet, PairDark, ReadingName, SetLight,
 };

@@ -4,7 +4,7 @@ use super::camera::tests::median;
 use super::negative::ladder;
 use super::noise::Term;
 use super::*;
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Digest, FrameId, Severity};
 
 fn key(seed: u64, frame: &str) -> NoiseKey {
@@ -392,7 +392,7 @@ fn a_state_is_serialised_with_all_its_numbers() {
 
 #[test]
 fn every_kind_of_degradation_is_made_described_and_tested() {
-    use darkqa_ground::types::degradation::Kind;
+    use darkqa_ground::types::degradations::Kind;
     use darkqa_ground::types::{Degradation, FrameId};
 
     let clean = ramps(32, 64);

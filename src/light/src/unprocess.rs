@@ -10,7 +10,7 @@ use super::clean::Clean;
 use super::curve;
 use super::lanes::{LANES, Lanes};
 use super::piecewise::Piecewise;
-use darkqa_ground::types::isa::{Isa, Kernel};
+use darkqa_ground::types::images::{Isa, Kernel};
 
 /// The noise-free RAW image from which a camera in this state would make `clean`.
 ///

@@ -14,7 +14,7 @@ mod errors;
 mod pools;
 mod state;
 
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Image, Light, Rgb, Severity};
 use darkqa_light::{CaptureState, Exposures, NoiseKey, NoiseTerms, negative};
 use pyo3::prelude::*;

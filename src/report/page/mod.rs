@@ -34,8 +34,8 @@ use crate::text::alert::Alert;
 use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
 use crate::types::Truths;
-use crate::types::keyed_flag::spelled_setting;
-use crate::types::manifest::RunManifest;
+use crate::types::flags::spelled_setting;
+use crate::types::manifests::RunManifest;
 use darkqa_score::confusion::Confusion;
 use darkqa_score::grid::Grid;
 

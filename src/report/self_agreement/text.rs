@@ -13,7 +13,7 @@ use crate::text::light_readings::LightReadings;
 use crate::text::terminal::{render, table};
 use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use darkqa_score::health::Health;
 
 /// The report as text. `runs` are the runs with their folders.

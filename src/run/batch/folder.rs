@@ -15,7 +15,7 @@ use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
 use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
 use crate::store::{AddressChange, Store};
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
 use darkqa_score::record::Detail;
 

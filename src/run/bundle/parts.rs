@@ -13,7 +13,7 @@ use crate::report::page::shown_thumbnails;
 use crate::runs::run_files::RunFiles;
 use crate::runs::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
 use crate::store;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{Record, Thumbnail};
 use darkqa_score::record::Detail;
 

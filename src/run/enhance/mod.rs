@@ -20,7 +20,7 @@ use crate::images::progress::Progress;
 use crate::images::refusals::Refusals;
 use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{Decides, Digest, FrameId, InputNote, Rgb};
 use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, SizeArgs, list_of_presets};
 use doctor::DoctorFileArgs;

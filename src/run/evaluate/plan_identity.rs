@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::images::questions::ASK;
 use crate::images::recipe::Recipe;
 use crate::picture::ReadingRule;
-use crate::types::manifest::Identity;
+use crate::types::manifests::Identity;
 use crate::types::{AxisLevel, Family, SetLight};
 use darkqa_questions::rules::Rules;
 

@@ -23,7 +23,7 @@ use crate::images::questions::{QuestionBank, open_data, open_unasked, select};
 use crate::images::recipe::Recipe;
 use crate::images::source::{Source, first_asked, inspect_all};
 use crate::runs::part::part;
-use crate::types::manifest::PartPlace;
+use crate::types::manifests::PartPlace;
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 use darkqa_enhance::ModelFile;
 use darkqa_questions::observer::understood;

@@ -13,7 +13,7 @@ use crate::images::progress::Progress;
 use crate::runs::Outcome;
 use crate::runs::run_plan::{NewPlan, PlannedFrame, recorded_command};
 use crate::text::words::counted;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// Writes the plan of a run into its folder. Nothing is asked.
 ///

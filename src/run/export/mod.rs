@@ -27,7 +27,7 @@ use crate::runs::Outcome;
 use crate::runs::part_args::{PartArgs, keep_part};
 use crate::runs::shard::Shard;
 use crate::text::words::counted;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{Condition, Decides, FrameId, Question};
 use darkqa_enhance::EnhancerArgs;
 use darkqa_light::{LightArgs, LightSettings};

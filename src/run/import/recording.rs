@@ -27,7 +27,7 @@ use crate::picture::reading_rule::ReadingRule;
 use crate::runs::Outcome;
 use crate::text::words::counted;
 use crate::types::Decides;
-use crate::types::flag::positive;
+use crate::types::flags::positive;
 
 /// Bytes at the start of a message that hold its time.
 const STAMP: u64 = 64;

@@ -13,7 +13,7 @@ use super::settings::AnswersFile;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{
     Condition, Degradation, Digest, KindSet, OpenDetail, Record, Step, TrialKey, Via,
 };

@@ -26,8 +26,7 @@ use crate::runs::StdoutFormat;
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::StoredRun;
 use crate::store::Store;
-use crate::types::manifest::{Columns, Identity};
-use crate::types::manifest::{JUDGES, PartPlace};
+use crate::types::manifests::{Columns, Identity, JUDGES, PartPlace};
 use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 
 /// A typical answer, for estimating the length of a judge's prompt.

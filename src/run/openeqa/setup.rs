@@ -18,7 +18,7 @@ use crate::images::source::Source;
 use crate::images::walk::WalkFolder;
 use crate::runs::part::part;
 use crate::text::words::counted;
-use crate::types::manifest::PartPlace;
+use crate::types::manifests::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 use darkqa_enhance::ModelFile;
 

@@ -19,7 +19,7 @@ use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::runs::Outcome;
 use crate::text::words::counted;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{Condition, Digest};
 use darkqa_enhance::ModelFile;
 

@@ -16,8 +16,8 @@ use crate::run_reports::story_curves;
 use crate::runs::Outcome;
 use crate::runs::rebuild::ImageRebuilder;
 use crate::runs::run_parts::choice_run;
-use crate::types::degradation::Kind;
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::degradations::Kind;
+use crate::types::manifests::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, KindReading, Record, Rgb, TrialOutcome};
 use darkqa_score::subject::is_control;
 

@@ -13,7 +13,7 @@ use crate::drawing::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
 use crate::images::placed_image::ImageOrigin;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, Degradation, FrameId, KindReading, Rgb, Severity};
 use darkqa_light::bayer::Bayer;
 use darkqa_light::noise::{self, Term};

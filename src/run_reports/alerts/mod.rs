@@ -23,7 +23,7 @@ use super::join::{Joined, JoinedRun};
 use crate::runs::over_budget::OverBudget;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::{counted, plural};
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{FrameId, InputSummary};
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
 use darkqa_score::comparison::compares_models;

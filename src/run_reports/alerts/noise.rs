@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::run_reports::join::Joined;
 use crate::text::alert::{Alert, AlertKind};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{Condition, Degradation, Severity, TrialRef};
 use darkqa_score::record::Detail;
 

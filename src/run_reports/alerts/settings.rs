@@ -8,7 +8,7 @@ use crate::run_reports::settings::{
     ENCODING, Setting, Settings, differing, light, listed, parameter_flags, some, without_repeated,
 };
 use crate::text::alert::{Alert, AlertKind};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use darkqa_score::record::Detail;
 
 /// The flags that decide the orders in which choices are shown.

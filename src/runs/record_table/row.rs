@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::store::Column;
-use crate::types::manifest::RunManifest;
-use crate::types::recorded_names::RecordedNames;
+use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{
     Condition, ConditionColumns, Digest, QuestionId, Record, RunQuestion, Severity,
 };

@@ -13,7 +13,7 @@ use super::paired::{ClusterNet, PairedTest};
 use super::pooled::pool;
 use super::significance::{ALPHA, Significance, SwapMethod, holm, least_p};
 use super::subject::Subject;
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, KindReading};
 
 /// Comparison of the models by their mean accuracy over the dark levels ([`is_dark`]), each level alike, on raw images.

@@ -16,7 +16,7 @@ use super::grid::Grid;
 use super::paired::{ClusterNet, PairedTest};
 use super::significance::{ALPHA, holm};
 use super::subject::Subject;
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
     AxisLevel, EnhancerName, Family, KindReading, LightGroup, ReadingName, View,
 };

@@ -273,7 +273,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
             ComparisonKind::Variant => match subject
                 .variant
                 .kind
-                .and_then(darkqa_ground::types::degradation::Kind::base)
+                .and_then(darkqa_ground::types::degradations::Kind::base)
             {
                 None => Vec::new(),
                 // The same level of the base kind, which has no light readings.

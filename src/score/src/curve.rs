@@ -7,7 +7,7 @@ use super::choice::ReadingMode;
 use super::grid::{Grid, TrialResult};
 use super::subject::Subject;
 use super::threshold::{CurveSummary, LevelCounts};
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Axis, AxisLevel, EnhancerName, Family, KindReading, LightGroup, View};
 
 /// Summary of one model over all levels, in one variant, raw or with one enhancer.

@@ -15,7 +15,7 @@ use super::paired::{ClusterNet, PairedTest};
 use super::pooled_kind::PooledKind;
 use super::significance::{Significance, holm, least_p};
 use super::subject::{Subject, pooled_models};
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 
 use finding::is_severe;

@@ -3,7 +3,7 @@
 use super::confusion::FalseAnswer;
 use super::grid::GridItem;
 use darkqa_ground::types::Family;
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 
 /// The two sides of a pooled finding. On each, right replies count, unless a variant defines others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

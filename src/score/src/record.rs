@@ -4,7 +4,7 @@ use super::choice::{LENIENT_VERSION, readings};
 use crate::choice::llm_match::{Protocol, mark};
 use crate::choice::option_probabilities::option_probabilities;
 use darkqa_ground::error::Result;
-use darkqa_ground::types::record::Record;
+use darkqa_ground::types::records::Record;
 use darkqa_ground::types::{
     Answer, ChoiceDetail, Choices, Finish, OpenDetail, Reply, Step, StoredDetail, TrialOutcome,
     UnreadReason,

@@ -15,7 +15,7 @@ use super::pooled::PooledFinding;
 use super::pooled_kind::PooledKind;
 use super::significance::ALPHA;
 use super::subject::{Subject, judged};
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, KindReading};
 
 /// A test, by its place in the findings.

@@ -2,7 +2,7 @@
 
 use super::{checked, findings};
 use crate::sentences::hallucination::{self, TopAnswer};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Family, Severity};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::confusion::{AgainstClean, Collapse, FalseAnswer};

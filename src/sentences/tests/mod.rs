@@ -8,7 +8,7 @@ mod words_alone;
 
 use super::sentence::{Sentence, level_runs};
 use super::{darkness, pooled, sample, words_alone as below};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, EnhancerName, KindReading, Severity};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::estimate::Estimate;

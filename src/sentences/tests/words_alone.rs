@@ -2,7 +2,7 @@
 
 use super::{checked, finding};
 use crate::sentences::words_alone;
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Family, KindReading, Severity};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparison::{Comparison, ComparisonKind, TestedComparison};

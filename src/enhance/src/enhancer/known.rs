@@ -11,7 +11,7 @@ use crate::sidecar::{self, ModelSidecar};
 use crate::size_search::TakenSizes;
 use crate::usage::Usage;
 use darkqa_ground::error::Result;
-use darkqa_ground::types::enhancer_note::{ProbeNote, ProbeOutcome};
+use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
 use darkqa_ground::types::{Rgb, SizeLog};
 
 /// Maximum mean output for a white image, in 0..1, at which the output may be a residual. Chosen: models that return the image itself

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::grid::Grid;
 use crate::pair_darkness::{PairDarkness, pair_facts};
 use crate::subject::Subject;
-use darkqa_ground::types::degradation::Axis;
+use darkqa_ground::types::degradations::Axis;
 use darkqa_ground::types::{KindReading, View};
 
 /// Distance in EV between a photograph and a level within which the two are compared; chosen: half the largest step of the paper's

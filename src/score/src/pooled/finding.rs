@@ -5,7 +5,7 @@ use crate::claim::{Claim, ParsedFinding};
 use crate::estimate::{Estimate, largest};
 use crate::pooled_kind::PooledKind;
 use crate::significance::{Significance, SwapMethod};
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading};
 
 /// Difference of two conditions at one level, for all models of the pool together, in the strict parsing and the lenient one.

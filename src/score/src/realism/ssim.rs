@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::Rgb;
-use darkqa_ground::types::isa::{Isa, Kernel};
+use darkqa_ground::types::images::{Isa, Kernel};
 
 /// Half-width of the window in pixels: 3.5 deviations of 1.5 pixels, rounded down.
 const RADIUS: usize = 5;

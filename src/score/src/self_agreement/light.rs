@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::choice::ReadingMode;
 use crate::estimate::Estimate;
-use darkqa_ground::types::question::CANNOT_TELL;
+use darkqa_ground::types::questions::CANNOT_TELL;
 use darkqa_ground::types::{
     ChoiceDetail, Condition, LightGroup, QuestionId, Treatment, TrialRef, Trials, UnreadReason,
     View,

@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::cluster::FrameTies;
 use crate::self_agreement::SelfAgreement;
 use crate::self_agreement::cell::AgreementCell;
-use darkqa_ground::types::run_question::BANK_ID;
+use darkqa_ground::types::questions::BANK_ID;
 use darkqa_ground::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, QuestionId,
     Record, RunQuestion, TrialOutcome, UnreadReason,
