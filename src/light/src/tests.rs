@@ -398,7 +398,7 @@ fn every_kind_of_degradation_is_made_described_and_tested() {
     let clean = ramps(32, 64);
     let key = super::NoiseKey::new(0, &FrameId("a".to_owned()));
     let described = include_str!("../../docs/files.md");
-    let tested = include_str!("../../../tests/program/synthesize.rs");
+    let tested = include_str!("../../../tests/program/images/synthesize.rs");
     let mut missing = Vec::new();
     for kind in Kind::ALL {
         let how = Degradation::new(kind, kind.ladder()[2], None).unwrap();
@@ -411,7 +411,7 @@ fn every_kind_of_degradation_is_made_described_and_tested() {
             missing.push(format!("{word} in src/docs/files.md"));
         }
         if !tested.contains(&format!("-{word}")) {
-            missing.push(format!("L…-{word} in tests/program/synthesize.rs"));
+            missing.push(format!("L…-{word} in tests/program/images/synthesize.rs"));
         }
     }
     assert!(missing.is_empty(), "{missing:?}");

@@ -6,8 +6,8 @@
 //! against the true ones ([`confusion`]) and the agreement of models ([`agreement`]).
 //!
 //! Intervals are computed from the clusters ([`cluster`]). Each method was chosen because its 95 % intervals cover the true value in
-//! simulation (`tests/program/statistics.rs` and `coverage/`; `src/docs/numbers.md` lists the cases with a coverage below 93 %). The plain
-//! percentile bootstrap does not do so with fewer than about 50 clusters, or near 0 and 1.
+//! simulation (`statistics.rs` and `coverage/` in `tests/program/scores`; `src/docs/numbers.md` lists the cases with a coverage below
+//! 93 %). The plain percentile bootstrap does not do so with fewer than about 50 clusters, or near 0 and 1.
 //!
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
 //! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`paired`]), and an exact test;
