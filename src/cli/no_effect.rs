@@ -22,7 +22,7 @@ use crate::types::flags::spelled;
 use crate::types::{AxisLevel, SetLight};
 use darkqa_enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use darkqa_light::{CameraArgs, LightArgs, SensorArgs};
-use darkqa_score::realism::residual::Bins;
+use darkqa_score::photographs::realism::residual::Bins;
 
 /// One line for each reason why flags of the call have no effect.
 pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {

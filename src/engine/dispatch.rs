@@ -32,8 +32,8 @@ use crate::images::trial::{Item, PreparedGroup, Trial};
 use crate::images::workers::unstarted;
 use crate::store::Store;
 use crate::types::{Digest, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
-use darkqa_score::image_dependence::{ImageDependence, LitReply};
-use darkqa_score::record::answered;
+use darkqa_score::answers::record::answered;
+use darkqa_score::answers::{ImageDependence, LitReply};
 
 /// Number of finished groups that may wait until they are asked about.
 const GROUPS_AHEAD: usize = 2;

@@ -14,7 +14,7 @@ use crate::runs::renamed::{self, OtherSettings};
 use crate::store::now;
 use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
 use crate::types::{InputSummary, ListedModel, StoredDetail as _};
-use darkqa_score::record::Detail as _;
+use darkqa_score::answers::record::Detail as _;
 
 /// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
 ///

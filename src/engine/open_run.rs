@@ -44,7 +44,7 @@ use crate::text::words::{counted, plural};
 use crate::types::manifests::{Counts, RunManifest};
 use crate::types::{EnhancerName, TrialKey, View};
 use darkqa_enhance::{Enhancer, Usage};
-use darkqa_score::image_dependence::FEWEST;
+use darkqa_score::answers::FEWEST;
 
 /// Share of `--max-cost` below which a cost that no server stated is not mentioned; chosen.
 const SMALL_SHARE: f64 = 0.01;

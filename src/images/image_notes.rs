@@ -9,8 +9,9 @@ use crate::picture::Payload;
 use crate::store::Store;
 use crate::types::questions::PixelBox;
 use crate::types::{Condition, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
-use darkqa_score::realism::{psnr, ssim::ssim};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
+use darkqa_score::photographs::realism::psnr;
+use darkqa_score::photographs::realism::ssim::ssim;
 
 /// The notes about one image; `None` for what is not wanted or exists already.
 #[derive(Debug, Default)]

@@ -10,8 +10,8 @@ use crate::images::photograph::{SourcePhotograph, matched};
 use crate::images::progress::Progress;
 use crate::images::source::{Frames, Source, SourceFrame};
 use crate::types::{PairDark, PairFacts, PhotoName};
-use darkqa_score::pair_darkness::PairDarkness;
-use darkqa_score::realism::scene::SceneMatch;
+use darkqa_score::photographs::pair_darkness::PairDarkness;
+use darkqa_score::photographs::realism::scene::SceneMatch;
 
 /// Maximum number of frames whose photographs are measured before a run; chosen.
 const SAMPLED: usize = 24;

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::images::image_notes::ImageNotes;
 use crate::picture::Payload;
 use crate::types::{Condition, Record, TrialKey};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The subject of a trial: a question with choices, an open question, or an answer to judge.
 pub(crate) trait Item: Clone + Send + Sync + 'static {

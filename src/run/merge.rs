@@ -17,7 +17,7 @@ use crate::runs::run_parts::{MissingParts, RunParts, one_kind, runs_in};
 use crate::runs::stored::{ExperimentKind, StoredRun};
 use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The flags of `report merge`.
 #[derive(Debug, Args)]

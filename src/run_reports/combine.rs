@@ -14,11 +14,11 @@ use crate::types::manifests::RunManifest;
 use crate::types::{
     ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word,
 };
-use darkqa_score::chance::OfferedChoices;
+use darkqa_score::accuracies::OfferedChoices;
 use darkqa_score::cluster::{ClusterUnit, Clusters, FrameTies};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
-use darkqa_score::photographed_set::PhotographedSet;
+use darkqa_score::photographs::PhotographedSet;
 use darkqa_score::subject::without_run;
 
 /// Several runs of questions with choices, joined.

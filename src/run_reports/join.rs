@@ -13,7 +13,7 @@ use crate::types::{
     Condition, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail, TrialKey,
     TrialRef, Trials,
 };
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The runs, with all trials, questions and thumbnails.
 pub(super) struct Joined<D: Detail> {

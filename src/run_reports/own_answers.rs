@@ -18,7 +18,7 @@ use crate::runs::{StdoutFormat, Syntax};
 use crate::text::alert::Alert;
 use crate::types::ChoiceDetail;
 use crate::types::manifests::RunManifest;
-use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
 
 /// The files of a report by name, and its text for standard output.
 pub(super) struct ReportOutput {

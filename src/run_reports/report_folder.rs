@@ -7,7 +7,7 @@ use crate::files;
 use crate::runs::stored::RunLayout;
 use crate::store::{AddressChange, Store};
 use crate::types::manifests::RunManifest;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The folder that the report of one run is written into.
 pub(super) enum ReportFolder<'a, D: Detail> {

@@ -3,8 +3,8 @@
 use crate::error::Result;
 use crate::types::manifests::{FIRST_REPLY_READING, RunManifest};
 use crate::types::{ChoiceDetail, Record};
+use darkqa_score::answers::record::reread;
 use darkqa_score::choice::LENIENT_VERSION;
-use darkqa_score::record::reread;
 
 /// How the lenient reading of stored replies changes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

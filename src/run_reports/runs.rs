@@ -31,7 +31,7 @@ use crate::store::{AddressChange, Store};
 use crate::text::alert::Alert;
 use crate::types::manifests::{Counts, Status};
 use crate::types::{ChoiceDetail, Decides, ModelColumn, OpenDetail, TrialRef, Truths};
-use darkqa_score::record::{self, Detail as _};
+use darkqa_score::answers::record::{self, Detail as _};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]

@@ -9,7 +9,7 @@ use crate::runs::renamed::rename;
 use crate::store::{RecordLog, Store, each_record};
 use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{Record, TextPlace, TrialKey, Trials};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The bytes of records that are written at once. Chosen: fewer calls of the system than records.
 const CHUNK: usize = 1 << 20;

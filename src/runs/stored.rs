@@ -15,7 +15,7 @@ use crate::types::{
     ChoiceDetail, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record,
     RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
 };
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The models of a run that a report shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

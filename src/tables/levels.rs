@@ -7,7 +7,7 @@ use crate::text::terminal::{differing, texts};
 use crate::text::words::{ends, percent};
 use crate::types::UnreadReason;
 use crate::types::degradations::Axis;
-use darkqa_score::accuracy::{AccuracyCell, AccuracySummary};
+use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::findings::Findings;
 

@@ -10,7 +10,7 @@ use crate::types::{
     AxisLevel, EnhancerName, KindReading, LightGroup, ModelListing, SetLight, View,
 };
 use darkqa_score::findings::Findings;
-use darkqa_score::pair_darkness::PairDarkness;
+use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::subject::Subject;
 
 /// A model in one variant, raw or with one enhancer.

@@ -23,8 +23,8 @@ use darkqa_light::{
 use darkqa_picture::Payload;
 use darkqa_picture::PayloadFormat;
 use darkqa_picture::bilinear;
-use darkqa_score::realism::psnr;
-use darkqa_score::realism::ssim::ssim;
+use darkqa_score::photographs::realism::psnr;
+use darkqa_score::photographs::realism::ssim::ssim;
 
 /// A frame with edges, ramps and some texture, made by integer arithmetic.
 #[expect(clippy::unwrap_used, reason = "the size fits the samples")]

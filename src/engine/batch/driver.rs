@@ -22,7 +22,7 @@ use crate::images::progress::Progress;
 use crate::store::Store;
 use crate::types::TrialKey;
 use crate::types::manifests::RunManifest;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Maximum wait between two checks of the batches, as a multiple of `--poll`; chosen: 5 minutes with the default of 10 s.
 const MAX_WAIT_POLLS: u32 = 30;

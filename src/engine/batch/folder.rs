@@ -20,7 +20,7 @@ use crate::images::progress::Progress;
 use crate::images::workers::unstarted;
 use crate::store::Store;
 use crate::types::manifests::RunManifest;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The task for the batches of a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -12,7 +12,7 @@ use crate::ask::QuotaRefusal;
 use crate::engine::budget::{Answering, Budget};
 use crate::engine::in_flight_cost::InFlightCost;
 use crate::error::Result;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// How many looks long nothing is submitted after the first refusal; chosen: a minute with the default of 10 s.
 const FIRST_HOLD: u32 = 6;

@@ -13,7 +13,7 @@ use crate::store::Store;
 use crate::types::flags::read_word;
 use crate::types::manifests::RunManifest;
 use crate::types::{Failure, FailureKind, LostAttempts, Record, Reply, TrialKey, Unstated, Usage};
-use darkqa_score::record::{Detail, answered};
+use darkqa_score::answers::record::{Detail, answered};
 
 /// Numbers of lines, by what they led to.
 #[derive(Debug, Default)]

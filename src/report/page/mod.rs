@@ -36,7 +36,7 @@ use crate::text::table::Table;
 use crate::types::Truths;
 use crate::types::flags::spelled_setting;
 use crate::types::manifests::RunManifest;
-use darkqa_score::confusion::Confusion;
+use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::grid::Grid;
 
 /// The template of the page, its style and its script.

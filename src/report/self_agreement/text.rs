@@ -14,7 +14,7 @@ use crate::text::terminal::{render, table};
 use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
 use crate::types::manifests::RunManifest;
-use darkqa_score::health::Health;
+use darkqa_score::accuracies::Health;
 
 /// The report as text. `runs` are the runs with their folders.
 #[must_use]

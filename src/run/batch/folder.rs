@@ -17,7 +17,7 @@ use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
 use crate::store::{AddressChange, Store};
 use crate::types::manifests::Status;
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The flags of `batch status`.
 #[derive(Debug, Args)]

@@ -17,7 +17,7 @@ use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
 use crate::store::{AddressChange, Store};
 use crate::types::manifests::{Counts, RunManifest};
 use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 pub(crate) use folder::{BatchFolderArgs, BatchStatusArgs, cancel, fetch, status};
 

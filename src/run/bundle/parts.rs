@@ -15,7 +15,7 @@ use crate::runs::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
 use crate::store;
 use crate::types::manifests::RunManifest;
 use crate::types::{Record, Thumbnail};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The small images that a bundle has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -10,7 +10,7 @@ use crate::types::flags::keyed_form;
 use crate::types::manifests::{RunManifest, judge_flag};
 use crate::types::text::shown;
 use crate::types::{AxisLevel, Trials, shell_word};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Inputs of a README.
 pub(super) struct ReadmeInputs<'a> {

@@ -24,7 +24,7 @@ use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply,
     StoredDetail as _, TrialKey, TrialRef, Trials, UnreadReason,
 };
-use darkqa_score::record::{Detail, answered};
+use darkqa_score::answers::record::{Detail, answered};
 
 /// The flags of `study read`.
 #[derive(Debug, Args)]

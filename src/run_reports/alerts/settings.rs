@@ -9,7 +9,7 @@ use crate::run_reports::settings::{
 };
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::manifests::RunManifest;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The flags that decide the orders in which choices are shown.
 const ORDERS: [&str; 2] = ["--shuffle-options", "--circular"];

@@ -10,7 +10,7 @@ use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{
     Condition, ConditionColumns, Digest, QuestionId, Record, RunQuestion, Severity,
 };
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The detail of a record that has a table of its own.
 pub(super) trait Tabled: Detail + Sync + 'static {

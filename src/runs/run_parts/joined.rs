@@ -13,7 +13,7 @@ use crate::runs::placed_trials::read_part;
 use crate::runs::stored::sort;
 use crate::types::Trials;
 use crate::types::manifests::{Counts, RunManifest, Status};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The parts of one run, of any divisions of it.
 pub(crate) struct RunParts<D: Detail> {

@@ -23,7 +23,7 @@ use darkqa_ground::types::manifests::{
     ColumnDifference, Columns, JUDGES, RecordedNames, RunManifest, differences, judge_flag,
 };
 use darkqa_ground::types::{Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The current time in UTC, to the second, as a manifest states it.
 pub fn now() -> String {

@@ -38,7 +38,7 @@ use darkqa_ground::types::{
     ChoiceDetail, Distinct, FrameId, ImageFidelity, InputSummary, QuestionId, Record, RunQuestion,
     Thumbnail, TrialKey, Via,
 };
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 use changed_questions::ChangedQuestions;
 use damaged_file::{each_readable_line, lacks_notes, set_file_aside};

@@ -19,11 +19,12 @@ use darkqa_ground::types::{
     AnswerReading, AxisLevel, Condition, Degradation, EnhancerName, Family, KindReading, Record,
     Severity,
 };
+use darkqa_score::accuracies::curves;
 use darkqa_score::bootstrap::Resamples;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::cluster::Clusters;
 use darkqa_score::cluster::FrameTies;
-use darkqa_score::curve::curves;
+use darkqa_score::comparisons::paired::PairedComparison;
 use darkqa_score::estimate::ClusterCount;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
@@ -35,7 +36,6 @@ use darkqa_score::open::OpenSummary;
 use darkqa_score::open::QuestionGroups;
 use darkqa_score::open::ScoredAnswer;
 use darkqa_score::open::open_summary;
-use darkqa_score::paired::PairedComparison;
 use darkqa_score::subject::Subject;
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
@@ -427,7 +427,7 @@ fn a_made_set_gives_the_papers_arithmetic() {
     }
     let offers = records
         .iter()
-        .map(|record| darkqa_score::chance::OfferedChoices {
+        .map(|record| darkqa_score::accuracies::OfferedChoices {
             family: record.detail.family.clone(),
             choices: record.detail.choices.len(),
             orders: 1,

@@ -7,8 +7,8 @@ use darkqa_ground::types::{
 };
 use darkqa_score::cluster::Clusters;
 use darkqa_score::cluster::FrameTies;
-use darkqa_score::fidelity::FidelityFindings;
 use darkqa_score::grid::Grid;
+use darkqa_score::photographs::FidelityFindings;
 
 /// Frames of a scene, and questions about a frame.
 const FRAMES: usize = 2;

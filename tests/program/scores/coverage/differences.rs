@@ -1,7 +1,7 @@
 //! Intervals of differences, of one model and of six together.
 
 use super::*;
-use darkqa_score::paired::difference;
+use darkqa_score::comparisons::paired::difference;
 
 /// Share of right replies that a change makes wrong, and of wrong ones that it makes right.
 const LOST: f64 = 0.08;

@@ -7,10 +7,9 @@ use darkqa_ground::types::{AnswerReading, Condition, Degradation, Record, Severi
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::cluster::Clusters;
 use darkqa_score::cluster::FrameTies;
+use darkqa_score::comparisons::paired::PairedComparison;
+use darkqa_score::comparisons::{PooledKind, pooled};
 use darkqa_score::grid::Grid;
-use darkqa_score::paired::PairedComparison;
-use darkqa_score::pooled::pooled;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 
 /// Clusters, the standard deviation of a scene's effect in logits, and the share of right replies that is lost in the dark.
@@ -84,7 +83,7 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
         let grid = Grid::new(&trials, &units);
         let (findings, _) = pooled(&grid);
         let all = |finding: &&_| {
-            let finding: &darkqa_score::pooled::PooledFinding = finding;
+            let finding: &darkqa_score::comparisons::PooledFinding = finding;
             finding.kind == PooledKind::Noise && finding.family.is_none()
         };
         let finding = findings.iter().find(all).unwrap();

@@ -1,8 +1,7 @@
 //! Intervals of shares, of scores between 0 and 1, and of κ.
 
 use super::*;
-use darkqa_score::agreement::AgreementCounts;
-use darkqa_score::agreement::clustered_kappa;
+use darkqa_score::comparisons::{AgreementCounts, clustered_kappa};
 
 pub(super) fn share(random: &mut StdRng, design: &Design, _: &Resamples) -> [Option<bool>; 1] {
     let counts = design.clusters(random, |random, replies| {
