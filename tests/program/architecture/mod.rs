@@ -74,9 +74,9 @@ const MOST_LINES: usize = 600;
 const CIRCLES: [(&[&str], &str); 4] = [
     (
         &[
-            "choice/src/lenient.rs",
-            "choice/src/stated.rs",
-            "choice/src/structured.rs",
+            "choice/src/rules/lenient.rs",
+            "choice/src/rules/stated.rs",
+            "choice/src/rules/structured.rs",
         ],
         "it stays: a reply within a reply is read by the reader that found it",
     ),

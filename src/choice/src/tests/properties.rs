@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::by_rule::choices;
 use super::reply;
-use crate::words::{Role, lists};
+use crate::text::words::{Role, lists};
 use crate::{ReadingMode, read};
 use darkqa_ground::types::questions::Answer;
 

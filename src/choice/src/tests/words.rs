@@ -3,9 +3,8 @@
 use super::by_rule::choices;
 use super::choices_of;
 use crate::choice_views::{ChoiceViews, Naming};
-use crate::plain::fold;
-use crate::tokens::tokens;
-use crate::words::{Role, Roles, lists, phrase_at};
+use crate::text::words::{Role, Roles, lists, phrase_at};
+use crate::text::{fold, tokens};
 use crate::{ReadingMode, read};
 use darkqa_ground::types::questions::Answer;
 

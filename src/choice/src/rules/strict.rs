@@ -1,13 +1,13 @@
 //! The strict reading: a choice's text, its letter, or its letter with its text.
 
-use super::names::index_of;
+use crate::names::index_of;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// The answer of a reply that is exactly one of the strict forms; otherwise `None`.
 ///
 /// The forms, in upper or lower case, are: a choice's text with or without a final period; `B`, `(B)`, `[B]`, `B.`, `B)`,
 /// `B:`, `（B）`, `B．`, `B：`, `B、`; and such a letter, or `B -`, before the text of the same choice.
-pub(super) fn read(text: &str, choices: &[String]) -> Option<Answer> {
+pub(crate) fn read(text: &str, choices: &[String]) -> Option<Answer> {
     let by_text = position(text, choices);
     let by_letter = label(text).and_then(|(letter, rest)| {
         let index = index_of(letter).filter(|index| *index < choices.len());

@@ -26,7 +26,7 @@ struct Marks {
 }
 
 static MARKS: LazyLock<Vec<Mark>> = LazyLock::new(|| {
-    let marks: Marks = toml::from_str(include_str!("reasoning.toml")).unwrap_or_default();
+    let marks: Marks = toml::from_str(include_str!("../reasoning.toml")).unwrap_or_default();
     marks.mark
 });
 
@@ -79,7 +79,7 @@ static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
 ///
 /// # Errors
 /// If nothing is left to read, the reason.
-pub(super) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
+pub(crate) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
     let (mut text, marker) = match END.find_iter(reply).last() {
         Some(marker) => (&reply[marker.end()..], marker.as_str()),
         None => (reply, ""),
@@ -100,14 +100,14 @@ pub(super) fn without_reasoning(reply: &str) -> Result<&str, UnreadReason> {
 
 /// The text behind the name of a channel of reasoning whose marks a server dropped; `None` without one. Where the reasoning ends cannot
 /// be told.
-pub(super) fn behind_channel(text: &str) -> Option<&str> {
+pub(crate) fn behind_channel(text: &str) -> Option<&str> {
     let name = NAME_OF_CHANNEL.find(text)?;
     Some(text[name.end()..].trim_matches(is_blank))
 }
 
 /// The text in compatibility form (NFKC) without invisible characters and template tokens. It ends at the first token that
 /// ends a turn with text.
-pub(super) fn tidy(text: &str) -> String {
+pub(crate) fn tidy(text: &str) -> String {
     let mut text: String = if text.is_ascii() {
         text.to_owned()
     } else {
@@ -135,7 +135,7 @@ pub(super) fn tidy(text: &str) -> String {
 }
 
 /// The text before the next question that a model asks itself, if there is any.
-pub(super) fn before_next_turn(text: &str) -> Option<&str> {
+pub(crate) fn before_next_turn(text: &str) -> Option<&str> {
     let next = NEXT_TURN.find(text)?;
     Some(text[..next.start()].trim()).filter(|text| !text.is_empty())
 }
@@ -152,6 +152,6 @@ fn is_blank(c: char) -> bool {
 
 /// A compiled literal pattern; the tests compile every one.
 #[expect(clippy::expect_used, reason = "a literal that the tests compile")]
-pub(super) fn compiled(pattern: &str) -> Regex {
+pub(crate) fn compiled(pattern: &str) -> Regex {
     Regex::new(pattern).expect("a literal pattern")
 }

@@ -23,6 +23,6 @@ static REFUSAL: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 /// True if a text in lower case declines to answer or states that nothing can be seen.
-pub(super) fn declines(folded: &str) -> bool {
+pub(crate) fn declines(folded: &str) -> bool {
     REFUSAL.is_match(folded)
 }

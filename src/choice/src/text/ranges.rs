@@ -2,11 +2,11 @@
 
 /// Stretches of a text in bytes, each from its first byte to the byte after its last.
 #[derive(Debug, Default)]
-pub(super) struct Ranges(Vec<(usize, usize)>);
+pub(crate) struct Ranges(Vec<(usize, usize)>);
 
 impl Ranges {
     /// These stretches. Overlapping ones are joined, empty ones left out.
-    pub(super) fn new(mut all: Vec<(usize, usize)>) -> Self {
+    pub(crate) fn new(mut all: Vec<(usize, usize)>) -> Self {
         all.retain(|(start, end)| start < end);
         all.sort_unstable();
         let mut joined: Vec<(usize, usize)> = Vec::with_capacity(all.len());
@@ -20,7 +20,7 @@ impl Ranges {
     }
 
     /// Whether a byte lies in one of them.
-    pub(super) fn contain(&self, byte: usize) -> bool {
+    pub(crate) fn contain(&self, byte: usize) -> bool {
         let after = self.0.partition_point(|range| range.1 <= byte);
         self.0.get(after).is_some_and(|range| range.0 <= byte)
     }

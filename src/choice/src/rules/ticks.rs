@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use super::clean::compiled;
+use crate::text::clean::compiled;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// One mark: yes, or no.

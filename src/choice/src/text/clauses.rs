@@ -5,7 +5,7 @@ use super::words::{Role, Roles, phrase_at};
 
 /// Unit of the text that ends at an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Boundary {
+pub(crate) enum Boundary {
     /// Nothing.
     None,
     /// A part of a clause: a comma, a bracket, a dash, "because".
@@ -21,41 +21,41 @@ const MAX_ADVERBS: usize = 8;
 
 /// One word, phrase or sign of a text.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Element {
+pub(crate) struct Element {
     /// First byte.
-    pub(super) start: usize,
+    pub(crate) start: usize,
     /// The byte after the last byte.
-    pub(super) end: usize,
-    pub(super) kind: TokenKind,
-    pub(super) roles: Roles,
-    pub(super) boundary: Boundary,
+    pub(crate) end: usize,
+    pub(crate) kind: TokenKind,
+    pub(crate) roles: Roles,
+    pub(crate) boundary: Boundary,
 }
 
 impl Element {
     /// The element's characters in the text that it comes from.
-    pub(super) fn slice<'a>(&self, folded: &'a str) -> &'a str {
+    pub(crate) fn slice<'a>(&self, folded: &'a str) -> &'a str {
         &folded[self.start..self.end]
     }
 
-    pub(super) fn has(&self, role: Role) -> bool {
+    pub(crate) fn has(&self, role: Role) -> bool {
         self.roles.has(role)
     }
 
     /// Whether a clause ends here.
-    pub(super) fn cuts(&self) -> bool {
+    pub(crate) fn cuts(&self) -> bool {
         self.boundary >= Boundary::Clause
     }
 }
 
 /// The elements of a text.
-pub(super) struct Clauses<'a> {
-    pub(super) folded: &'a str,
-    pub(super) elements: Vec<Element>,
+pub(crate) struct Clauses<'a> {
+    pub(crate) folded: &'a str,
+    pub(crate) elements: Vec<Element>,
 }
 
 impl<'a> Clauses<'a> {
     /// The elements of a text in lower case, of these tokens.
-    pub(super) fn new(folded: &'a str, tokens: &[Token]) -> Self {
+    pub(crate) fn new(folded: &'a str, tokens: &[Token]) -> Self {
         let mut elements = Vec::with_capacity(tokens.len());
         let mut at = 0;
         while let Some(first) = tokens.get(at) {
@@ -78,13 +78,13 @@ impl<'a> Clauses<'a> {
     }
 
     /// Index of the first element that begins at a byte or behind it.
-    pub(super) fn index(&self, byte: usize) -> usize {
+    pub(crate) fn index(&self, byte: usize) -> usize {
         self.elements
             .partition_point(|element| element.start < byte)
     }
 
     /// The element that begins at a byte, with spaces before it.
-    pub(super) fn from(&self, byte: usize) -> Option<&Element> {
+    pub(crate) fn from(&self, byte: usize) -> Option<&Element> {
         let element = self.elements.get(self.index(byte))?;
         self.folded[byte..element.start]
             .trim()
@@ -93,25 +93,25 @@ impl<'a> Clauses<'a> {
     }
 
     /// Whether an element is one of these signs.
-    pub(super) fn is_sign(&self, at: usize, signs: &[char]) -> bool {
+    pub(crate) fn is_sign(&self, at: usize, signs: &[char]) -> bool {
         self.elements.get(at).is_some_and(|element| {
             element.kind == TokenKind::Sign && element.slice(self.folded).starts_with(signs)
         })
     }
 
     /// Whether a clause or a part of one ends before an element, or the text begins with it.
-    pub(super) fn begins(&self, at: usize) -> bool {
+    pub(crate) fn begins(&self, at: usize) -> bool {
         at == 0 || self.elements[at - 1].boundary > Boundary::None
     }
 
     /// Whether an element may stand between a verb and its predicate.
-    pub(super) fn is_adverb(&self, at: usize) -> bool {
+    pub(crate) fn is_adverb(&self, at: usize) -> bool {
         let element = &self.elements[at];
         element.has(Role::Adverb) || element.slice(self.folded).ends_with("ly")
     }
 
     /// Index of the element before a predicate, behind adverbs: its verb, if it has one.
-    pub(super) fn verb_before(&self, at: usize) -> Option<usize> {
+    pub(crate) fn verb_before(&self, at: usize) -> Option<usize> {
         let mut verb = at.checked_sub(1)?;
         let first = verb.saturating_sub(MAX_ADVERBS);
         while verb > first && self.is_adverb(verb) {
@@ -121,7 +121,7 @@ impl<'a> Clauses<'a> {
     }
 
     /// Makes the sign at a byte end nothing: the point of "B. kitchen".
-    pub(super) fn join(&mut self, byte: usize) {
+    pub(crate) fn join(&mut self, byte: usize) {
         let at = self.index(byte);
         if let Some(element) = self
             .elements

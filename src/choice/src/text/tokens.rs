@@ -1,10 +1,10 @@
 //! The words and signs of a text: [`tokens`].
 
-use super::names::unspaced;
+use crate::names::unspaced;
 
 /// The kind of a token.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum TokenKind {
+pub(crate) enum TokenKind {
     /// A word or a number; in a script without spaces, a character.
     Word,
     /// Any other character that is not a space.
@@ -15,29 +15,29 @@ pub(super) enum TokenKind {
 
 /// One word or sign of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Token {
+pub(crate) struct Token {
     /// First byte.
-    pub(super) start: usize,
+    pub(crate) start: usize,
     /// The byte after the last byte.
-    pub(super) end: usize,
-    pub(super) kind: TokenKind,
+    pub(crate) end: usize,
+    pub(crate) kind: TokenKind,
 }
 
 impl Token {
     /// The token's characters in the text that it comes from.
-    pub(super) fn slice<'a>(&self, text: &'a str) -> &'a str {
+    pub(crate) fn slice<'a>(&self, text: &'a str) -> &'a str {
         &text[self.start..self.end]
     }
 
     /// Whether the token is this sign.
-    pub(super) fn is_sign(&self, text: &str, signs: &[char]) -> bool {
+    pub(crate) fn is_sign(&self, text: &str, signs: &[char]) -> bool {
         self.kind == TokenKind::Sign && self.slice(text).starts_with(signs)
     }
 }
 
 /// Every token of a text, from left to right. An apostrophe inside a word belongs to it, and so does a point or a comma
 /// between digits ("2.5") or a point of an abbreviation ("e.g.").
-pub(super) fn tokens(text: &str) -> Vec<Token> {
+pub(crate) fn tokens(text: &str) -> Vec<Token> {
     let mut tokens: Vec<Token> = Vec::with_capacity(text.len() / 4);
     let mut previous = ' ';
     for (start, c) in text.char_indices() {

@@ -1,9 +1,8 @@
 //! How far a denial or a question reaches: [`ends`].
 
-use super::clauses::{Boundary, Clauses};
-use super::named::Names;
-use super::tokens::TokenKind;
-use super::words::Role;
+use crate::named::Names;
+use crate::text::words::Role;
+use crate::text::{Boundary, Clauses, TokenKind};
 
 /// Whether the reach of a denial that begins at byte `open` ends at an element.
 ///

@@ -1,12 +1,12 @@
 //! Answers that are announced: "the answer is B", "Answer: kitchen", "I'd go with (B)", "B is correct".
 
 use super::lenient;
-use super::letters::{AFTER_A, AFTER_I, abbreviated, called_letter, hyphenated};
-use super::markers::{self, Lead, Marker, MarkerKind};
-use super::names::{Delimiting, Name, NameState, continues_word, index_of};
-use super::plain::fold;
-use super::view::ReplyView;
-use super::words::Role;
+use crate::letters::{AFTER_A, AFTER_I, abbreviated, called_letter, hyphenated};
+use crate::markers::{self, Lead, Marker, MarkerKind};
+use crate::names::{Delimiting, Name, NameState, continues_word, index_of};
+use crate::text::fold;
+use crate::text::words::Role;
+use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// A statement about a choice at one place in a reply.

@@ -11,23 +11,21 @@
 //! From level 5 on, only affirmed names count. A name does not count that is in a list of all choices, in a question, in a condition, a
 //! color of the image, or denied ([`NameState`]). A level that finds two different answers accepts neither, and no later level is tried.
 
-use super::choice_views::ChoiceViews;
-use super::clean;
 use super::contradiction::contradiction;
 use super::first_line::first_line;
-use super::names::{Delimiting, Name, NameState};
-use super::plain::{fold, plain};
-use super::refusal::declines;
 use super::stated::{alternative, stated};
 use super::strict;
 use super::structured::{boxed, json};
 use super::ticks::{ticked, without_unknown};
-use super::view::ReplyView;
 use super::yes_no::yes_or_no;
+use crate::choice_views::ChoiceViews;
+use crate::names::{Delimiting, Name, NameState};
+use crate::text::{clean, declines, fold, plain};
+use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, Choices, UnreadReason};
 
 /// The lenient reading of a reply without its reasoning.
-pub(super) fn read(text: &str, choices: &Choices) -> Answer {
+pub(crate) fn read(text: &str, choices: &Choices) -> Answer {
     let choices = ChoiceViews::new(choices);
     let tidy = clean::tidy(text);
     let tidy = without_unknown(&tidy);

@@ -1,14 +1,14 @@
 //! The word "no": an answer, or a determiner ("no light reaches the sensor"): [`answers`].
 
-use super::tokens::{Token, TokenKind, tokens};
-use super::words::{Role, phrase_at};
+use crate::text::words::{Role, phrase_at};
+use crate::text::{Token, TokenKind, tokens};
 
 /// Number of bytes behind "no" that are looked at.
 const LOOK_AHEAD: usize = 64;
 
 /// Whether the "no" at `start..end` can be an answer: behind it stands the end, a line break, a punctuation mark, or, at the
 /// beginning of a clause, a clause of its own ("No there is none"); and it is no idiom ("no doubt").
-pub(super) fn answers(folded: &str, start: usize, end: usize) -> bool {
+pub(crate) fn answers(folded: &str, start: usize, end: usize) -> bool {
     let to = folded.floor_char_boundary(end + LOOK_AHEAD);
     let around = &folded[start..to];
     let words = tokens(around);

@@ -1,12 +1,11 @@
 //! Stretches of a text in which names are denied, and stay in the way of other names: [`denied`].
 
-use super::clauses::{Boundary, Clauses};
-use super::named::Names;
-use super::ranges::Ranges;
-use super::words::Role;
+use crate::named::Names;
+use crate::text::words::Role;
+use crate::text::{Boundary, Clauses, Ranges};
 
 /// The names that "not" and its like deny: those behind it in its part of a clause, and the one directly before it.
-pub(super) fn denied(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
+pub(crate) fn denied(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
     Ranges::new([before(clauses), behind(clauses, names)].concat())
 }
 

@@ -1,12 +1,11 @@
 //! Conditional and counterfactual parts of a text: [`conditional`].
 
-use super::clauses::{Boundary, Clauses, Element};
-use super::ranges::Ranges;
-use super::words::Role;
+use crate::text::words::Role;
+use crate::text::{Boundary, Clauses, Element, Ranges};
 
 /// The conditions with their main clauses, and what precedes "would need" and its like. A condition that only makes the model
 /// choose ("if I had to guess") is none.
-pub(super) fn conditional(clauses: &Clauses<'_>) -> Ranges {
+pub(crate) fn conditional(clauses: &Clauses<'_>) -> Ranges {
     let mut ranges = Vec::new();
     let (mut first, mut unmet) = (0, false);
     let elements = &clauses.elements;

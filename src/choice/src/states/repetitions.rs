@@ -1,16 +1,16 @@
 //! Lists of all choices in a text, which repeat the prompt: [`repetitions`].
 
-use super::choice_views::ChoiceViews;
-use super::named::Names;
-use super::names::Name;
-use super::ranges::Ranges;
+use crate::choice_views::ChoiceViews;
+use crate::named::Names;
+use crate::names::Name;
+use crate::text::Ranges;
 
 /// Maximum number of bytes between two choices of a list.
 const MAX_GAP: usize = 24;
 
 /// The stretches that list all choices in the order shown, by their texts or letters, with nothing between them but labels and
 /// separators. Two choices alone make a list only with labels or a heading, on a line of their own, or if they are yes and no.
-pub(super) fn repetitions(names: &Names<'_>, offered: &ChoiceViews) -> Ranges {
+pub(crate) fn repetitions(names: &Names<'_>, offered: &ChoiceViews) -> Ranges {
     let count = offered.texts.len();
     let by_text = lists(names, &names.texts, count, offered);
     let by_letter = lists(names, &names.letters, count, offered);

@@ -1,14 +1,12 @@
 //! Colors that a text attributes to the image, not to an object in it: [`image_colors`].
 
-use super::choice_views::{ChoiceViews, Naming};
-use super::clauses::{Boundary, Clauses};
-use super::names::Name;
-use super::ranges::Ranges;
-use super::tokens::TokenKind;
-use super::words::Role;
+use crate::choice_views::{ChoiceViews, Naming};
+use crate::names::Name;
+use crate::text::words::Role;
+use crate::text::{Boundary, Clauses, Ranges, TokenKind};
 
 /// The names of colors that describe the image: "the image is black", "gray noise", "I only see black", "completely black".
-pub(super) fn image_colors(clauses: &Clauses<'_>, texts: &[Name], offered: &ChoiceViews) -> Ranges {
+pub(crate) fn image_colors(clauses: &Clauses<'_>, texts: &[Name], offered: &ChoiceViews) -> Ranges {
     let described = texts
         .iter()
         .filter(|name| {

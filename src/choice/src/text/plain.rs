@@ -35,7 +35,7 @@ static BOX: LazyLock<Regex> = LazyLock::new(|| compiled(r"\[[ xX]\]"));
 const LATEX_DEPTH: usize = 4;
 
 /// The text without markup, one space between words, no empty lines, trimmed.
-pub(super) fn plain(text: &str) -> String {
+pub(crate) fn plain(text: &str) -> String {
     let text = LETTER_TAG.replace(text.trim(), "($1)");
     let mut text = if text.contains("```") {
         FENCE.replace_all(&text, "\n").into_owned()
@@ -90,7 +90,7 @@ fn with_single_spaces(text: &str) -> String {
 }
 
 /// An en dash between two letters, in one byte, as long as a hyphen: "living–room" is a name, "kitchen–bathroom" is two.
-pub(super) const RANGE: char = '\u{1e}';
+pub(crate) const RANGE: char = '\u{1e}';
 
 /// The text without emphasis, quotes and pictographs. A cross mark becomes "not", any hyphen between letters "-".
 fn without_signs(text: &str) -> String {
@@ -130,7 +130,7 @@ fn without_signs(text: &str) -> String {
 
 /// The text in lower case with the same byte positions: a character whose lower case has another length stays as it is. A
 /// hyphen between two letters becomes a blank, and "grey" becomes "gray".
-pub(super) fn fold(text: &str) -> String {
+pub(crate) fn fold(text: &str) -> String {
     let lower = |c: char| {
         if c.is_ascii() {
             return c.to_ascii_lowercase();

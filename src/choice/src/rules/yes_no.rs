@@ -1,7 +1,7 @@
 //! A leading "yes" or "no": [`yes_or_no`].
 
-use super::names::Delimiting;
-use super::view::ReplyView;
+use crate::names::Delimiting;
+use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// The leading word, if yes and no are among the choices: "Yes, there is no lamp". A leading "no" counts only if it is an

@@ -1,14 +1,13 @@
 //! Stretches of a text in which names are taken out of the running: [`excluded`].
 
-use super::clauses::{Boundary, Clauses, Element};
-use super::named::Names;
-use super::ranges::Ranges;
 use super::reach::ends;
-use super::words::Role;
+use crate::named::Names;
+use crate::text::words::Role;
+use crate::text::{Boundary, Clauses, Element, Ranges};
 
 /// The names that "rule out" and its like exclude: those behind it in its clause; and before "can be ruled out" and its like,
 /// those of its clause.
-pub(super) fn excluded(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
+pub(crate) fn excluded(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
     let mut exclusions = Exclusions {
         clauses,
         names,

@@ -5,9 +5,9 @@ use std::sync::LazyLock;
 use regex::Regex;
 use serde_json::Value;
 
-use super::choice_views::ChoiceViews;
-use super::clean::compiled;
 use super::lenient;
+use crate::choice_views::ChoiceViews;
+use crate::text::clean::compiled;
 
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 

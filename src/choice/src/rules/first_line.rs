@@ -1,9 +1,9 @@
 //! A first line that is an answer by itself: [`first_line`].
 
-use super::names::{Delimiting, Name, NameState};
 use super::strict;
-use super::view::ReplyView;
-use super::words::Role;
+use crate::names::{Delimiting, Name, NameState};
+use crate::text::words::Role;
+use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// The first line, if it parses strictly. It is ambiguous if another line parses strictly as another choice, or if another choice follows a

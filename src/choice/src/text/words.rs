@@ -11,12 +11,12 @@ use super::plain::fold;
 use super::tokens::{Token, TokenKind, tokens};
 
 /// The lists of words and phrases.
-const WORDS: &str = include_str!("words.toml");
+const WORDS: &str = include_str!("../words.toml");
 
 /// Function of a phrase in a reply. Each has a list in `words.toml`, which explains it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Role {
+pub(crate) enum Role {
     /// Takes the names behind it out of the running.
     Exclude,
     /// As a predicate, takes the names before it out of the running.
@@ -115,21 +115,21 @@ pub(super) enum Role {
 
 /// A set of roles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Roles(u64);
+pub(crate) struct Roles(u64);
 
 impl Roles {
     /// The set of one role.
-    pub(super) const fn from_role(role: Role) -> Self {
+    pub(crate) const fn from_role(role: Role) -> Self {
         Self(1 << role as u64)
     }
 
     /// Whether the set has this role.
-    pub(super) const fn has(self, role: Role) -> bool {
+    pub(crate) const fn has(self, role: Role) -> bool {
         self.0 & (1 << role as u64) != 0
     }
 
     /// Whether the set has any of these roles.
-    pub(super) fn has_any(self, roles: &[Role]) -> bool {
+    pub(crate) fn has_any(self, roles: &[Role]) -> bool {
         roles.iter().any(|role| self.has(*role))
     }
 
@@ -180,7 +180,7 @@ static PHRASES: LazyLock<HashMap<String, Vec<Phrase>>> = LazyLock::new(|| {
     clippy::expect_used,
     reason = "a file of this program, which the tests read"
 )]
-pub(super) fn lists() -> BTreeMap<Role, Vec<String>> {
+pub(crate) fn lists() -> BTreeMap<Role, Vec<String>> {
     toml::from_str(WORDS).expect("words.toml has the lists of `Role`")
 }
 
@@ -196,7 +196,7 @@ fn words_of(phrase: &str) -> Vec<String> {
 
 /// The longest phrase that begins with the first of these tokens: its number of tokens, and its roles. A contraction with
 /// "not" is [`Role::Not`] if it is not in the lists.
-pub(super) fn phrase_at(folded: &str, tokens: &[Token]) -> Option<(usize, Roles)> {
+pub(crate) fn phrase_at(folded: &str, tokens: &[Token]) -> Option<(usize, Roles)> {
     let first = tokens
         .first()
         .filter(|token| token.kind == TokenKind::Word)?;

@@ -1,9 +1,9 @@
 //! A letter with the text of another choice, wherever it stands: [`contradiction`].
 
-use super::clauses::Boundary;
-use super::names::{Delimiting, Name};
-use super::view::ReplyView;
-use super::words::Role;
+use crate::names::{Delimiting, Name};
+use crate::text::Boundary;
+use crate::text::words::Role;
+use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, UnreadReason};
 
 /// A letter with the text of another choice: "B. bathroom", "kitchen (C)", "I choose D, the kitchen".
@@ -105,5 +105,5 @@ fn ends_part(view: &ReplyView<'_>, end: usize) -> bool {
 /// Whether a clause ends at a byte.
 fn at_clause_end(view: &ReplyView<'_>, end: usize) -> bool {
     let next = view.clauses.elements.get(view.clauses.index(end));
-    next.is_none_or(super::clauses::Element::cuts)
+    next.is_none_or(crate::text::Element::cuts)
 }

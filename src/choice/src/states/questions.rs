@@ -1,14 +1,13 @@
 //! Stretches of a text in which names are questioned: [`questioned`].
 
-use super::clauses::{Boundary, Clauses};
-use super::named::Names;
-use super::ranges::Ranges;
 use super::reach::ends;
-use super::words::Role;
+use crate::named::Names;
+use crate::text::words::Role;
+use crate::text::{Boundary, Clauses, Ranges};
 
 /// The sentences with a question mark, and what follows "whether", "you asked" and their like. A whole reply that is a bare
 /// name with a question mark is a shy answer, and asks nothing.
-pub(super) fn questioned(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
+pub(crate) fn questioned(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
     let mut ranges = Vec::new();
     let (mut sentence, mut open) = (0, None);
     let shy = is_bare_name(clauses, names);
