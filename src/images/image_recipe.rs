@@ -12,7 +12,7 @@ use crate::types::degradations::{Axis, Kind};
 use crate::types::{
     Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ReadingName, Rgb,
 };
-use darkqa_light::blur::{blur, blurred_codes};
+use darkqa_light::movement::blur::{blur, blurred_codes};
 use darkqa_light::{
     self, Amplify, AppliedDegradation, CameraState, Clean, Coupling, Draws, NoiseKey, Streak, Tone,
     develop_with_state, expose, exposure,

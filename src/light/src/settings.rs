@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::applied::AppliedDegradation;
 use super::auto::{AutoExposure, AutoSettings};
+use super::draws::NoiseKey;
 use super::levels::{LIGHT, Levels, ladder};
-use super::motion::{FrameView, Motion};
-use super::random::NoiseKey;
+use super::movement::{FrameView, Motion};
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{CameraModel, Sampling};
 use darkqa_ground::error::{Error, Result};

@@ -1,8 +1,8 @@
 //! Tests of the whole pipeline: its figures, and that pixels depend on its arguments alone.
 
 use super::camera::tests::median;
-use super::negative::ladder;
-use super::noise::Term;
+use super::raw::negative::ladder;
+use super::raw::noise::Term;
 use super::*;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Digest, FrameId, Severity};

@@ -16,7 +16,8 @@ mod state;
 
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Image, Light, Rgb, Severity};
-use darkqa_light::{CaptureState, Exposures, NoiseKey, NoiseTerms, negative};
+use darkqa_light::raw::negative;
+use darkqa_light::{CaptureState, Exposures, NoiseKey, NoiseTerms};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;

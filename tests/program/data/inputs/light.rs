@@ -8,7 +8,7 @@ use crate::support::exr_files::{
 use crate::support::run::{Bench, records, words};
 use darkqa_ground::types::{FrameId, Light, Pixels, Severity};
 use darkqa_light::exposure::expose;
-use darkqa_light::negative::Negative;
+use darkqa_light::raw::negative::Negative;
 use darkqa_light::{CameraModel, LightReading, NoiseKey, Synthesis};
 use darkqa_picture::ImageFile;
 use darkqa_picture::ReadingRule;

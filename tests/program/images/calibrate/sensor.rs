@@ -5,9 +5,8 @@ use std::io::Cursor;
 use std::path::Path;
 
 use darkqa_ground::types::FrameId;
-use darkqa_light::bayer::Bayer;
-use darkqa_light::noise::Term;
-use darkqa_light::noise::add as add_noise;
+use darkqa_light::raw::Bayer;
+use darkqa_light::raw::noise::{Term, add as add_noise};
 use darkqa_light::{Amplify, CameraModel, CameraState, NoiseKey, Sampling};
 use rayon::prelude::*;
 use tiff::encoder::colortype::Gray16;

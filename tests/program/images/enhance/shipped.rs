@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use darkqa_enhance::Enhancer;
 use darkqa_ground::types::{Rgb, Severity};
 use darkqa_light::exposure::expose;
-use darkqa_light::negative::Negative;
+use darkqa_light::raw::negative::Negative;
 use darkqa_light::{NoiseKey, Synthesis};
 use darkqa_scenes::Rooms;
 

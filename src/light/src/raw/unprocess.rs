@@ -5,11 +5,10 @@ use std::sync::LazyLock;
 use rayon::prelude::*;
 
 use super::bayer::{Bayer, Plane, RawRow};
-use super::camera::CameraState;
-use super::clean::Clean;
-use super::curve;
-use super::lanes::{LANES, Lanes};
-use super::piecewise::Piecewise;
+use crate::camera::CameraState;
+use crate::clean::Clean;
+use crate::curve;
+use crate::draws::{LANES, Lanes, Piecewise};
 use darkqa_ground::types::images::{Isa, Kernel};
 
 /// The noise-free RAW image from which a camera in this state would make `clean`.
@@ -331,8 +330,8 @@ impl Filter {
 
 #[cfg(test)]
 mod tests {
-    use super::super::camera::tests::median;
     use super::*;
+    use crate::camera::tests::median;
     use darkqa_ground::types::{Light, Rgb};
 
     fn flat(code: u8, height: usize, width: usize) -> Bayer {

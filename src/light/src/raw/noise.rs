@@ -10,12 +10,9 @@
 use rayon::prelude::*;
 
 use super::bayer::{Bayer, Plane, RawRow};
-use super::camera::CameraState;
-use super::lanes::{LANES, Lanes};
-use super::poisson;
-use super::quantile::Quantile;
-use super::random::{Component, NoiseKey, Site, Stream};
-use super::reading::Amplify;
+use crate::camera::CameraState;
+use crate::draws::{Component, LANES, Lanes, NoiseKey, Quantile, Site, Stream, poisson};
+use crate::reading::Amplify;
 use darkqa_ground::types::images::{Isa, Kernel};
 
 /// One term of the noise.
@@ -206,8 +203,8 @@ fn scale(adu: &mut Lanes<f32>, factor: f32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::camera::tests::median;
     use super::*;
+    use crate::camera::tests::median;
     use darkqa_ground::types::FrameId;
 
     fn key() -> NoiseKey {

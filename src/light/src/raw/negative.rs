@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::bayer::Bayer;
-use super::camera::CameraState;
-use super::clean::Clean;
 use super::isp::Developer;
 use super::noise::{Noise, Term};
-use super::random::NoiseKey;
-use super::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
 use super::unprocess::Unprocess;
+use crate::camera::CameraState;
+use crate::clean::Clean;
+use crate::draws::NoiseKey;
+use crate::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
 use darkqa_ground::types::images::{Isa, Sample};
 use darkqa_ground::types::{Image, Rgb, Severity};
 
@@ -147,7 +147,7 @@ pub fn ladder<'a>(
 
 /// A frame after an exposure drop, with the noise of this sensor in this state of its frame.
 #[must_use]
-pub(super) fn develop_by(
+pub(crate) fn develop_by(
     clean: Clean<'_>,
     key: &NoiseKey,
     synthesis: &Synthesis,
@@ -178,7 +178,7 @@ pub fn develop_with_state(
 }
 
 /// A sample of a developed image.
-pub(super) trait Target: Sample + Send {
+pub(crate) trait Target: Sample + Send {
     /// Writes the samples of display values after an exposure drop.
     fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]);
 }
@@ -198,7 +198,7 @@ impl Target for f32 {
 }
 
 /// One exposure of the sensor: camera state and noise, ready for any row.
-pub(super) struct Capture {
+pub(crate) struct Capture {
     unprocess: Unprocess,
     noise: Noise,
     developer: Developer,
@@ -216,7 +216,7 @@ impl Capture {
     }
 
     /// The image of a frame after an exposure drop; drop and headroom of the light reading are in EV.
-    pub(super) fn image<T: Target>(
+    pub(crate) fn image<T: Target>(
         self,
         clean: Clean<'_>,
         drop_ev: f64,
@@ -228,7 +228,7 @@ impl Capture {
         image
     }
 
-    pub(super) fn with(
+    pub(crate) fn with(
         key: &NoiseKey,
         state: &CameraState,
         amplify: Amplify,

@@ -1,7 +1,7 @@
 //! Conversion between display colours and camera colours: [`Matrix`], [`rgb_to_camera`].
 
 /// 3 × 3 colour matrix, row by row; it is applied to a column of red, green, blue.
-pub type Matrix = [[f64; 3]; 3];
+pub(crate) type Matrix = [[f64; 3]; 3];
 
 /// XYZ → camera, for the four cameras of the Darmstadt Noise Dataset (Brooks et al. 2019, `random_ccm`).
 const XYZ_TO_CAMERA: [Matrix; 4] = [
@@ -38,7 +38,7 @@ const SRGB_TO_XYZ: Matrix = [
 ///
 /// `weights` must be non-negative and not all zero; their sum does not matter.
 #[must_use]
-pub fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
+pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
     let total: f64 = weights.iter().sum();
     let mut mix = [[0.0; 3]; 3];
     for (weight, camera) in weights.iter().zip(XYZ_TO_CAMERA) {
@@ -56,7 +56,7 @@ pub fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
 
 /// Inverse of a matrix, by cofactors. The matrices of [`rgb_to_camera`] are far from singular.
 #[must_use]
-pub fn inverse(matrix: &Matrix) -> Matrix {
+pub(crate) fn inverse(matrix: &Matrix) -> Matrix {
     let [a, b, c] = *matrix;
     let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
     let determinant = a[0] * cofactors[0][0] + a[1] * cofactors[0][1] + a[2] * cofactors[0][2];

@@ -13,7 +13,7 @@ const OCTAVES: usize = 32;
 /// power therefore has the same relative accuracy everywhere, also at its steep end. The error of a piece is at most
 /// f″(x) x² / 8 · 2⁻¹⁴: 8·10⁻⁶ for a logarithm.
 #[derive(Debug, Clone)]
-pub struct Piecewise {
+pub(crate) struct Piecewise {
     /// Upper bits of the lower end of the domain, where the first piece begins.
     first: u32,
     /// Value at the beginning of each piece, and its increase per unit in the last place of the argument.
@@ -23,7 +23,7 @@ pub struct Piecewise {
 impl Piecewise {
     /// Tabulates `function` from 2^`exponent` up to 2^(`exponent` + 32).
     #[must_use]
-    pub fn new(exponent: i32, function: impl Fn(f64) -> f64) -> Self {
+    pub(crate) fn new(exponent: i32, function: impl Fn(f64) -> f64) -> Self {
         let base = libm::ldexp(1.0, exponent);
         let begin = |piece: usize| {
             let octave = (1_u64 << (piece / PIECES)) as f64;
@@ -50,7 +50,7 @@ impl Piecewise {
     /// The function at `x`, which must be in the domain.
     #[inline(always)]
     #[must_use]
-    pub fn at(&self, x: f32) -> f32 {
+    pub(crate) fn at(&self, x: f32) -> f32 {
         let bits = x.to_bits();
         let piece = (bits >> WITHIN).wrapping_sub(self.first) as usize % (OCTAVES * PIECES);
         let [value, rise] = self.pieces[piece];

@@ -11,11 +11,10 @@
 use std::sync::LazyLock;
 
 use super::bayer::{self, Bayer, Plane, RawRow, Sites};
-use super::camera::CameraState;
-use super::curve;
-use super::lanes::{LANES, Lanes};
-use super::piecewise::Piecewise;
-use super::reading::Tone;
+use crate::camera::CameraState;
+use crate::curve;
+use crate::draws::{LANES, Lanes, Piecewise};
+use crate::reading::Tone;
 use darkqa_ground::types::images::{Isa, Kernel};
 
 /// Gamma compression of light from 2⁻³¹ up; light below 10⁻⁸ is treated as 10⁻⁸.
@@ -45,7 +44,7 @@ fn expand(light: &Piecewise, display: f32) -> f32 {
 
 /// Image processing of one camera, ready for any row.
 #[derive(Debug)]
-pub(super) struct Developer {
+pub(crate) struct Developer {
     /// Gain of each Bayer plane: white balance times brightness.
     gains: [f32; 4],
     /// Matrix from camera colours to linear sRGB.
@@ -57,7 +56,7 @@ pub(super) struct Developer {
 }
 
 impl Developer {
-    pub(super) fn new(state: &CameraState, tone: Tone, isa: Isa) -> Self {
+    pub(crate) fn new(state: &CameraState, tone: Tone, isa: Isa) -> Self {
         Self {
             gains: [state.red_gain, 1.0, 1.0, state.blue_gain]
                 .map(|balance| (balance * state.rgb_gain) as f32),
@@ -88,7 +87,7 @@ impl Developer {
     }
 
     /// Multiplies a sensor row by the white-balance and brightness gains and clips it between 0 and the sensor's saturation.
-    pub(super) fn balance(&self, row: usize, line: &mut RawRow<'_>) {
+    pub(crate) fn balance(&self, row: usize, line: &mut RawRow<'_>) {
         for (parity, samples) in line.planes().into_iter().enumerate() {
             let gain = self.gains[Plane::at(row, parity) as usize];
             self.isa.run(WhiteBalance {
@@ -104,7 +103,7 @@ impl Developer {
     ///
     /// `row` is an index into `balanced`. The first and last row are mirrored; if `balanced` is a part of an image, it must
     /// also contain the rows next to those asked for.
-    pub(super) fn display(&self, balanced: &Bayer, row: usize, values: &mut [f32]) {
+    pub(crate) fn display(&self, balanced: &Bayer, row: usize, values: &mut [f32]) {
         let last = balanced.height() - 1;
         let rows = [
             if row == 0 { 1 } else { row - 1 },
@@ -120,7 +119,7 @@ impl Developer {
     }
 
     /// Writes the 8-bit codes of display values after an exposure drop.
-    pub(super) fn encode(&self, display: &[f32], drop_ev: f64, codes: &mut [u8]) {
+    pub(crate) fn encode(&self, display: &[f32], drop_ev: f64, codes: &mut [u8]) {
         self.isa.run(Encode {
             display,
             factor: curve::display_factor(drop_ev - self.headroom_ev) as f32,
@@ -294,8 +293,8 @@ impl Kernel for Expand<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::camera::tests::median;
     use super::*;
+    use crate::camera::tests::median;
     use darkqa_ground::types::Severity;
 
     fn developer(tone: Tone) -> Developer {

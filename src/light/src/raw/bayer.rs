@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::lanes::{LANES, Lanes};
+use crate::draws::{LANES, Lanes};
 
 /// Colour plane of an RGGB mosaic: every second row and every second column of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Plane {
+pub(crate) enum Plane {
     /// Red: even rows, even columns.
     R,
     /// Green in the rows of red: even rows, odd columns.
@@ -19,11 +19,11 @@ pub enum Plane {
 
 impl Plane {
     /// All four planes, in the order in which per-plane numbers are listed.
-    pub const ALL: [Self; 4] = [Self::R, Self::Gr, Self::Gb, Self::B];
+    pub(crate) const ALL: [Self; 4] = [Self::R, Self::Gr, Self::Gb, Self::B];
 
     /// Plane of the site at a sensor row and column.
     #[must_use]
-    pub fn at(row: usize, column: usize) -> Self {
+    pub(crate) fn at(row: usize, column: usize) -> Self {
         Self::ALL[2 * (row & 1) + (column & 1)]
     }
 }

@@ -1,7 +1,7 @@
 //! Batches of samples: [`Lanes`].
 
 /// Samples that a kernel processes at once.
-pub const LANES: usize = 64;
+pub(crate) const LANES: usize = 64;
 
 /// Batch of [`LANES`] numbers, one per sample.
-pub type Lanes<T> = [T; LANES];
+pub(crate) type Lanes<T> = [T; LANES];

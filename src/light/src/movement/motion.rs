@@ -6,8 +6,8 @@ use std::str::FromStr;
 use rand_distr::{Distribution as _, Open01};
 use serde::{Serialize, Serializer};
 
-use super::random::{Component, NoiseKey, Site};
 use super::streak::Streak;
+use crate::draws::{Component, NoiseKey, Site};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::flags::key_values::{number, pairs};
 

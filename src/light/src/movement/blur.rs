@@ -6,11 +6,11 @@
 
 use rayon::prelude::*;
 
-use super::clean::Clean;
-use super::codes::{encode, shown_light};
-use super::curve;
-use super::lanes::{LANES, Lanes};
 use super::streak::{Streak, Tap};
+use crate::clean::Clean;
+use crate::codes::{encode, shown_light};
+use crate::curve;
+use crate::draws::{LANES, Lanes};
 use darkqa_ground::types::images::{Isa, Kernel};
 use darkqa_ground::types::{Light, Rgb};
 

@@ -3,14 +3,14 @@
 use rayon::prelude::*;
 
 use super::bayer::Bayer;
-use super::camera::CameraState;
-use super::clean::Clean;
 use super::isp::Developer;
 use super::negative::Negative;
 use super::noise::{Noise, Term};
-use super::random::NoiseKey;
-use super::reading::{Amplify, Tone};
 use super::unprocess::unprocess_up_to;
+use crate::camera::CameraState;
+use crate::clean::Clean;
+use crate::draws::NoiseKey;
+use crate::reading::{Amplify, Tone};
 use darkqa_ground::types::images::Isa;
 
 /// Noise-free RAW image of a frame, by one camera.
@@ -28,7 +28,7 @@ pub struct CleanRaw {
 
 impl CleanRaw {
     /// The noise-free RAW image of `clean` by a camera in the given state. `headroom_ev` is that of the light reading
-    /// ([`Synthesis::headroom_ev`](super::Synthesis::headroom_ev)); it matters for light alone.
+    /// ([`Synthesis::headroom_ev`](crate::Synthesis::headroom_ev)); it matters for light alone.
     #[must_use]
     pub fn new<'a>(clean: impl Into<Clean<'a>>, camera: CameraState, headroom_ev: f64) -> Self {
         let clean = clean.into();
@@ -74,8 +74,8 @@ impl CleanRaw {
 
 #[cfg(test)]
 mod tests {
-    use super::super::camera::tests::median;
     use super::*;
+    use crate::camera::tests::median;
     use darkqa_ground::types::{FrameId, Light, Rgb};
 
     #[test]

@@ -25,7 +25,7 @@ const ROUND: f32 = 12_582_912.0;
 
 /// Replaces means (from 0 to 2·10⁶) by Poisson numbers, each drawn from two words.
 #[inline(always)]
-pub fn lanes(means: &mut Lanes<f32>, words: [&Lanes<u32>; 2]) {
+pub(crate) fn lanes(means: &mut Lanes<f32>, words: [&Lanes<u32>; 2]) {
     let (mut min, mut max) = (f32::INFINITY, 0.0_f32);
     for mean in means.iter() {
         min = if *mean < min { *mean } else { min };

@@ -15,7 +15,7 @@ const LAST: f32 = 2_147_483_520.0;
 pub struct Quantile(Piecewise);
 
 /// Quantile function of the standard normal distribution.
-pub static NORMAL: LazyLock<Quantile> = LazyLock::new(|| Quantile::new(standard_normal));
+pub(crate) static NORMAL: LazyLock<Quantile> = LazyLock::new(|| Quantile::new(standard_normal));
 
 impl Quantile {
     /// Tabulates a quantile function, which is called for u in (0, ½].
