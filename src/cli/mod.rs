@@ -21,8 +21,8 @@ use tracing_subscriber::EnvFilter;
 
 use crate::engine::open_files::raise_limit;
 use crate::error::{Error, Result};
-use crate::images::image_words;
 use crate::images::progress::{Progress, Verbosity};
+use crate::images::recipes::image_words;
 use crate::run::evaluate::{check, evaluate, export_batch, plan, run_batch};
 use crate::run::merge::merge;
 use crate::run::openeqa::openeqa;

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::ask::{Prices, by_flag};
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
-use crate::images::recipe::Recipe;
+use crate::images::recipes::Recipe;
 use crate::picture::Scaling;
 use crate::types::degradations::Kind;
 use crate::types::manifests::Columns;

@@ -6,9 +6,8 @@
 use std::collections::HashMap;
 
 use crate::engine::budget::text_tokens;
-use crate::images::plan::Plan;
-use crate::images::source::Source;
-use crate::images::trial::Item;
+use crate::images::frames::Source;
+use crate::images::trials::{Item, Plan};
 use crate::store::StoredTrial;
 use crate::types::TrialKey;
 

@@ -3,9 +3,8 @@
 use crate::ask::Price;
 use crate::engine::budget::{shown_tokens, text_tokens};
 use crate::engine::experiment::Experiment;
-use crate::images::plan::{SourcePlan, TrialGroup};
-use crate::images::source::Source;
-use crate::images::trial::Item as _;
+use crate::images::frames::Source;
+use crate::images::trials::{Item as _, SourcePlan, TrialGroup};
 use crate::runs::run_plan::FrameCost;
 
 /// Processor seconds for each million pixels of an image that is degraded and encoded; measured on 1280 × 720, rounded.

@@ -7,10 +7,10 @@ use crate::engine::experiment::Experiment;
 use crate::error::Result;
 use crate::image_store::ImageSet;
 use crate::images::frame_work::FrameWork;
+use crate::images::frames::Source;
 use crate::images::image_pipeline::ImagePipeline;
-use crate::images::plan::Plan;
-use crate::images::source::Source;
-use crate::images::stored_images::Needed;
+use crate::images::stored::Needed;
+use crate::images::trials::Plan;
 use crate::types::{Condition, ImageFacts};
 
 /// Number of sources whose images are made to measure their size; with enhancers, only the first source.

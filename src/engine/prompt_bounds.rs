@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use crate::images::trial::Prompt;
+use crate::images::trials::Prompt;
 use crate::types::ImageFacts;
 
 /// Tokens that a chat template adds to a message; chosen: more than those of known models.

@@ -18,7 +18,7 @@ use serde_json::{Map, Value, json};
 use crate::dataset::FolderArgs;
 use crate::dataset::frame_folder::{self, FramePaths};
 use crate::error::{Error, Result};
-use crate::images::input_tally::InputTally;
+use crate::images::frames::InputTally;
 use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::keyframes::{KeyFrameArgs, choose};

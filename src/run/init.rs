@@ -10,7 +10,7 @@ use crate::dataset::{DataPlace, Dataset, SceneArgs, SelectionArgs, SetArgs};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::images::progress::Progress;
-use crate::images::questions::open_data;
+use crate::images::trials::questions::open_data;
 use crate::picture::ReadingRule;
 use crate::picture::png;
 use crate::runs::Outcome;

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
-use crate::images::thumbnail::MissingThumbnails;
+use crate::images::notes::thumbnail::MissingThumbnails;
 use crate::run_reports::{choice, open};
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::dataset::frame_folder::{self, FramePaths};
 use crate::error::{Error, Result};
-use crate::images::input_tally::InputTally;
+use crate::images::frames::InputTally;
 use crate::import::recording::{
     Channel, Content, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
 };

@@ -9,8 +9,7 @@ use crate::ask::prompts::openeqa::judge_prompt;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::engine::models::ModelUnderTest;
 use crate::error::Result;
-use crate::images::plan::{SourcePlan, TrialGroup};
-use crate::images::trial::{Prompt, Trial};
+use crate::images::trials::{Prompt, SourcePlan, Trial, TrialGroup};
 use crate::runs::predictions::{AnswerState, predictions};
 use crate::types::{Digest, OpenDetail, QuestionId, Record, TrialKey};
 

@@ -11,8 +11,7 @@ use crate::dataset::openeqa::OpenQuestion;
 use crate::engine::key_facts::KeyFacts;
 use crate::engine::models::asked_in;
 use crate::error::Result;
-use crate::images::plan::{SourcePlan, TrialGroup};
-use crate::images::trial::{Prompt, Trial};
+use crate::images::trials::{Prompt, SourcePlan, Trial, TrialGroup};
 use crate::types::{Condition, Digest, View};
 
 /// The trials of all answers, grouped by walk: first those without images, then those of each condition.

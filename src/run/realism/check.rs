@@ -6,7 +6,7 @@ use super::settings::RealismArgs;
 use super::workers::PairWorkers;
 use crate::dataset::pairs::Pair;
 use crate::error::{Error, Result};
-use crate::images::input_tally::InputTally;
+use crate::images::frames::InputTally;
 use crate::picture::ImageFile;
 use crate::report::realism::LeftOut;
 use crate::types::Rgb;

@@ -10,7 +10,7 @@ use crate::drawing::figures::StoryCurves;
 use crate::drawing::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::images::montage::montage;
+use crate::images::notes::montage;
 use crate::picture::{Payload, PayloadFormat};
 use crate::run_reports::story_curves;
 use crate::runs::Outcome;

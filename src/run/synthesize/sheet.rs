@@ -12,7 +12,7 @@ use crate::dataset::Picture;
 use crate::drawing::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
-use crate::images::placed_image::ImageOrigin;
+use crate::images::stored::ImageOrigin;
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, Degradation, FrameId, KindReading, Rgb, Severity};
 use darkqa_light::raw::noise::{self, Term};

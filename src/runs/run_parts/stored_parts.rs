@@ -7,7 +7,7 @@ use super::joined::RunParts;
 use super::missing::MissingParts;
 use super::part::no_part;
 use crate::error::{Error, Result};
-use crate::images::thumbnail::MissingThumbnails;
+use crate::images::notes::thumbnail::MissingThumbnails;
 use crate::runs::run_texts::RunTexts;
 use crate::runs::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, manifest, open_questions};
 use crate::store;

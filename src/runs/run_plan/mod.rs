@@ -17,7 +17,7 @@ use serde::de::DeserializeOwned;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::images::source::Source;
+use crate::images::frames::Source;
 use crate::runs::part::{Divided, own_sources};
 use crate::runs::shard::Shard;
 use crate::store::PLAN;

@@ -13,7 +13,7 @@ use crate::dataset::{
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::images::progress::Progress;
-use crate::images::questions_by_rule::by_rule;
+use crate::images::trials::questions_by_rule::by_rule;
 use crate::picture::ReadingRule;
 use crate::text::words::counted;
 use crate::types::{Digest, Family, FrameId, Question};

@@ -6,10 +6,9 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown};
-use crate::images::enhancers::{Model, OpenEnhancers};
-use crate::images::image_maker::Maker;
-use crate::images::recipe::{ImageKeyFacts, Recipe};
-use crate::images::source::Source;
+use crate::images::enhancement::enhancers::{Model, OpenEnhancers};
+use crate::images::frames::Source;
+use crate::images::recipes::{ImageKeyFacts, Maker, Recipe};
 use crate::types::{Condition, Digest};
 use darkqa_enhance::{self, Findings};
 

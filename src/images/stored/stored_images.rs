@@ -6,12 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
-use crate::images::image_maker::Maker;
-use crate::images::recipe::{ImageKeyFacts, Recipe};
-use crate::images::source::{Source, SourceFrame};
-use crate::images::stored_findings::StoredFindings;
-use crate::images::stored_thumbnails::ThumbnailPlace;
-use crate::images::thumbnail::ShownObjects;
+use crate::images::frames::{Source, SourceFrame};
+use crate::images::notes::thumbnail::ShownObjects;
+use crate::images::recipes::{ImageKeyFacts, Maker, Recipe};
+use crate::images::stored::stored_findings::StoredFindings;
+use crate::images::stored::stored_thumbnails::ThumbnailPlace;
 use crate::picture::Payload;
 use crate::types::{Condition, FrameId};
 use darkqa_enhance::ImageUse;

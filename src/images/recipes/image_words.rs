@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::dataset::{DataArgs, DecodeArgs, SceneArgs};
 use crate::error::{Error, Result};
-use crate::images::walk::Walk;
+use crate::images::frames::Walk;
 use crate::picture::ImageArgs;
 use crate::types::Decides;
 use crate::types::flags::spelled;

@@ -2,9 +2,9 @@
 
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
+use crate::images::frames::Source;
 use crate::images::image_steps::ImageSteps;
-use crate::images::plan::SourcePlan;
-use crate::images::source::Source;
+use crate::images::trials::SourcePlan;
 use crate::types::{Condition, EnhancerName, Rgb, Severity};
 use darkqa_enhance::{DARK, FRAMES, brightness};
 use darkqa_light::expose;

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::images::trial::Trial;
+use crate::images::trials::trial::Trial;
 use crate::types::{Condition, TrialKey};
 
 /// All trials that share their images, or that have none.

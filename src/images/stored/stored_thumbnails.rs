@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::image_store::{Content, Entry, EntryFacts, ImageStore, Key, Shown};
-use crate::images::thumbnail::{self, ShownObjects};
+use crate::images::notes::thumbnail::{self, ShownObjects};
 use crate::types::questions::PixelBox;
 use crate::types::{Condition, Digest, FrameId, Thumbnail};
 

@@ -6,9 +6,9 @@ use rayon::prelude::*;
 
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::images::photograph::{SourcePhotograph, matched};
+use crate::images::frames::photograph::{SourcePhotograph, matched};
+use crate::images::frames::source::{Frames, Source, SourceFrame};
 use crate::images::progress::Progress;
-use crate::images::source::{Frames, Source, SourceFrame};
 use crate::types::{PairDark, PairFacts, PhotoName};
 use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::photographs::realism::scene::SceneMatch;

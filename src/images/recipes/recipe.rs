@@ -6,10 +6,9 @@ use std::num::NonZeroU32;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::images::enhanced_images::{DarkImage, EnhancedImages};
-use crate::images::image_recipe::ImageRecipe;
-use crate::images::source::{Source, SourceFrame};
-use crate::images::walk::{CameraOf, DegradedAt, Walk};
+use crate::images::enhancement::{DarkImage, EnhancedImages};
+use crate::images::frames::{CameraOf, DegradedAt, Source, SourceFrame, Walk};
+use crate::images::recipes::image_recipe::ImageRecipe;
 use crate::picture::PayloadFormat;
 use crate::picture::Scaling;
 use crate::types::degradations::Kind;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use crate::images::placed_image::Refusal;
+use crate::images::stored::placed_image::Refusal;
 
 /// The refused images of a command by reason, from several threads.
 #[derive(Debug, Default)]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::ask::{ImagePlaces, Message, Query};
 use crate::error::Error;
-use crate::images::image_notes::ImageNotes;
+use crate::images::notes::ImageNotes;
 use crate::picture::Payload;
 use crate::types::{Condition, Record, TrialKey};
 use darkqa_score::answers::record::Detail;

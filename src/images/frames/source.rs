@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::dataset::{Dataset, Picture};
 use crate::error::{Error, Result};
-use crate::images::photograph::{SourcePhotograph, matched};
+use crate::images::frames::photograph::{SourcePhotograph, matched};
 use crate::images::progress::Progress;
 use crate::types::text::excerpt;
 use crate::types::{

@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::images::source::warn_of_inputs;
+use crate::images::frames::source::warn_of_inputs;
 use crate::types::{FrameId, InputNote, InputSummary};
 
 /// Changes to the images of a command so far.

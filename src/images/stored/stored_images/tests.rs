@@ -2,8 +2,7 @@ use std::num::NonZeroUsize;
 
 use super::*;
 use crate::files::folder_access::FolderAccess;
-use crate::images::source::SourceFrame;
-use crate::images::walk::{CameraOf, DegradedAt};
+use crate::images::frames::{CameraOf, DegradedAt, SourceFrame};
 use crate::picture::Scaling;
 use crate::types::{Digest, EnhancerName, InputNote};
 use darkqa_enhance::SizeArgs;

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::images::placed_image::{ImageOrigin, Sidecar, differing};
+use crate::images::stored::{ImageOrigin, Sidecar, differing};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{
     Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ReadingName, Rgb,

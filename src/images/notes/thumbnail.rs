@@ -7,7 +7,7 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::images::montage::{columns, montage};
+use crate::images::notes::montage::{columns, montage};
 use crate::picture::{Payload, PayloadFormat, Scaling};
 use crate::types::questions::PixelBox;
 use crate::types::{Condition, Digest, FrameId, ObjectCrop, Rgb, RunQuestion, Thumbnail};

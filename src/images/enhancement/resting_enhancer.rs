@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use crate::error::{Error, Result};
-use crate::images::enhancers::EnhancerRunArgs;
+use crate::images::enhancement::enhancers::EnhancerRunArgs;
 use crate::types::{EnhancerName, Rgb};
 use darkqa_enhance::{Enhancer, Findings, ImageUse, Implausible, ModelFile, Stopper, Usage};
 

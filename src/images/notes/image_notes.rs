@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::error::Result;
-use crate::images::stored_images::Similarity;
-use crate::images::thumbnail::MissingThumbnails;
+use crate::images::notes::thumbnail::MissingThumbnails;
+use crate::images::stored::Similarity;
 use crate::picture::Payload;
 use crate::store::Store;
 use crate::types::questions::PixelBox;
