@@ -2,13 +2,12 @@
 //!
 //! A gap in a column, or a broken answer, does not make it give way to another: columns are compared in the rows that both answer.
 
-use super::answers::{Reading, digit, yes_or_no};
-use super::items::{AnswerCell, Item};
 use super::map::flag;
 use super::names::Role;
-use super::offered::Offered;
 use super::roles::{Column, Roles};
-use super::row::Table;
+use crate::dataset::ready_made::cells::Table;
+use crate::dataset::ready_made::choices::{Offered, Reading, digit, yes_or_no};
+use crate::dataset::ready_made::items::{AnswerCell, Item};
 use crate::types::text::excerpt;
 
 /// The choice that a column names in each row; `None` where it names none that can be read.
@@ -33,7 +32,7 @@ fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
 ///
 /// # Errors
 /// If two columns say different things of a row; the error shows the row and the two commands.
-pub(super) fn option_column<'a>(
+pub(in crate::dataset::ready_made) fn option_column<'a>(
     table: &Table,
     roles: &'a Roles,
     items: &[Item],
@@ -73,7 +72,11 @@ pub(super) fn option_column<'a>(
 }
 
 /// The flag for a column of no known name whose cells are an option in every row, in the first way that fits; `None` if there is none.
-pub(super) fn unnamed(table: &Table, roles: &Roles, items: &[Item]) -> Option<String> {
+pub(in crate::dataset::ready_made) fn unnamed(
+    table: &Table,
+    roles: &Roles,
+    items: &[Item],
+) -> Option<String> {
     let none = Offered::default();
     let mut fitting = table
         .columns
@@ -105,7 +108,7 @@ pub(super) fn unnamed(table: &Table, roles: &Roles, items: &[Item]) -> Option<St
 ///
 /// # Errors
 /// As [`option_column`].
-pub(super) fn yes_or_no_column<'a>(
+pub(in crate::dataset::ready_made) fn yes_or_no_column<'a>(
     table: &Table,
     roles: &'a Roles,
     items: &[Item],

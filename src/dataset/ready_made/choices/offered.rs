@@ -7,8 +7,8 @@ use crate::types::text::excerpt;
 
 /// The options of a row.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub(super) struct Offered {
-    pub(super) texts: Arc<[String]>,
+pub(in crate::dataset::ready_made) struct Offered {
+    pub(in crate::dataset::ready_made) texts: Arc<[String]>,
     /// The place of each among its columns, by which letters and numbers name it: where B is empty, C is still C.
     pub(super) places: Vec<usize>,
     pub(super) origin: Origin,
@@ -52,7 +52,7 @@ impl Offered {
     }
 
     /// The options in the text of a question, in order.
-    pub(super) fn lettered(texts: &[String]) -> Self {
+    pub(in crate::dataset::ready_made) fn lettered(texts: &[String]) -> Self {
         let origin = Origin::Question;
         Self {
             origin,
@@ -68,10 +68,10 @@ impl Offered {
 
 /// The options of all rows. Equal ones are held once.
 #[derive(Debug, Default)]
-pub(super) struct AllOffered(HashSet<Arc<Offered>>);
+pub(in crate::dataset::ready_made) struct AllOffered(HashSet<Arc<Offered>>);
 
 impl AllOffered {
-    pub(super) fn once(&mut self, offered: Offered) -> Arc<Offered> {
+    pub(in crate::dataset::ready_made) fn once(&mut self, offered: Offered) -> Arc<Offered> {
         if let Some(known) = self.0.get(&offered) {
             return Arc::clone(known);
         }

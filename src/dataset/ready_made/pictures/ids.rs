@@ -2,17 +2,17 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::contradiction::contradictory;
 use super::frames::{Found, Frames};
-use super::roles::Column;
-use super::truths::Answered;
+use crate::dataset::ready_made::choices::Answered;
+use crate::dataset::ready_made::columns::Column;
+use crate::dataset::ready_made::omissions::contradictory;
 use crate::error::Result;
 use crate::files::reading;
 use crate::types::{Digest, FrameId, QuestionId};
 
 /// The ids of questions.
 #[derive(Debug)]
-pub(super) struct Ids {
+pub(in crate::dataset::ready_made) struct Ids {
     texts: Vec<String>,
     /// The column, or that they follow from the content.
     name: String,
@@ -23,21 +23,21 @@ pub(super) struct Ids {
 
 impl Ids {
     /// The pairs of questions that differ in their answers alone, by their places.
-    pub(super) fn contradictory(&self) -> &[[usize; 2]] {
+    pub(in crate::dataset::ready_made) fn contradictory(&self) -> &[[usize; 2]] {
         &self.contradictory
     }
 
-    pub(super) fn id(&self, question: usize) -> QuestionId {
+    pub(in crate::dataset::ready_made) fn id(&self, question: usize) -> QuestionId {
         QuestionId(self.texts[question].clone())
     }
 
     /// The column, or `content`.
-    pub(super) fn name(&self) -> String {
+    pub(in crate::dataset::ready_made) fn name(&self) -> String {
         self.name.clone()
     }
 
     /// A note to the user about the identifiers.
-    pub(super) fn note(&self) -> Option<String> {
+    pub(in crate::dataset::ready_made) fn note(&self) -> Option<String> {
         self.note.clone()
     }
 }
@@ -56,7 +56,7 @@ enum ImagesBy {
 
 impl Frames<'_> {
     /// The ids of the questions: those of the first column in which all differ, or by content.
-    pub(super) fn ids(&self, answered: &[Answered]) -> Result<Ids> {
+    pub(in crate::dataset::ready_made) fn ids(&self, answered: &[Answered]) -> Result<Ids> {
         let texts = |column: &Column| -> Option<Vec<String>> {
             answered
                 .iter()

@@ -4,18 +4,16 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::cell::{Cell, FileFacts, LONGEST_NAME};
-use super::container::{Archive, SetFile};
 use super::images::{CellPart, EmbeddedImage, ImagesAre, RowImage, images};
-use super::map::flag;
-use super::names::Role;
-use super::roles::{Column, Roles};
-use super::row::Table;
-use super::settings::SeveralImages;
-use super::step::Step;
-use super::truths::Answered;
 use crate::dataset::Root;
 use crate::dataset::image_source::ImageSource;
+use crate::dataset::ready_made::cells::{Cell, FileFacts, LONGEST_NAME, Step, Table};
+use crate::dataset::ready_made::choices::Answered;
+use crate::dataset::ready_made::columns::map::flag;
+use crate::dataset::ready_made::columns::names::Role;
+use crate::dataset::ready_made::columns::{Column, Roles};
+use crate::dataset::ready_made::container::{Archive, SetFile};
+use crate::dataset::ready_made::settings::SeveralImages;
 use crate::error::{Error, Result};
 use crate::types::text::excerpt;
 use crate::types::{Digest, FrameId};
@@ -38,7 +36,7 @@ pub(super) enum Found {
 }
 
 /// The frames of a set. Equal bytes in cells are one frame, with one noise.
-pub(super) struct Frames<'a> {
+pub(in crate::dataset::ready_made) struct Frames<'a> {
     pub(super) table: &'a Table,
     root: &'a Root,
     /// The ZIP file that holds the set.
@@ -60,7 +58,7 @@ pub(super) struct Frames<'a> {
 pub(in crate::dataset) type Series = BTreeMap<FrameId, Vec<FrameId>>;
 
 impl<'a> Frames<'a> {
-    pub(super) fn new(
+    pub(in crate::dataset::ready_made) fn new(
         table: &'a Table,
         root: &'a Root,
         archive: Option<&'a Arc<Archive>>,
@@ -170,7 +168,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Why an image of a row cannot be used; `None` if all are there. Files are not opened.
-    pub(super) fn problem(&self, row: usize) -> Option<Error> {
+    pub(in crate::dataset::ready_made) fn problem(&self, row: usize) -> Option<Error> {
         self.in_row(row).find_map(|found| match found {
             Err(problem) => Some(problem),
             Ok(Found::Cell { row, facts, .. }) if facts.format.is_none() => {
@@ -276,7 +274,7 @@ impl<'a> Frames<'a> {
     }
 
     /// The frame of a question; of a question about several images the name of all of them together. The sources are kept.
-    pub(super) fn frame(&mut self, answered: &Answered) -> Result<FrameId> {
+    pub(in crate::dataset::ready_made) fn frame(&mut self, answered: &Answered) -> Result<FrameId> {
         let found: Vec<Found> = self.in_row(answered.row).collect::<Result<_>>()?;
         let shown: Vec<FrameId> = found.into_iter().map(|found| self.keep(found)).collect();
         if let [only] = &*shown {
@@ -337,7 +335,9 @@ impl<'a> Frames<'a> {
     }
 
     /// The sources of all frames that were asked for, and the images of rows that show several.
-    pub(super) fn take_sources(&mut self) -> (BTreeMap<FrameId, ImageSource>, Series) {
+    pub(in crate::dataset::ready_made) fn take_sources(
+        &mut self,
+    ) -> (BTreeMap<FrameId, ImageSource>, Series) {
         (
             std::mem::take(&mut self.sources),
             std::mem::take(&mut self.series),

@@ -14,15 +14,15 @@ const ANSWERING: [&str; 4] = ["gpt", "assistant", "model", "bot"];
 
 /// The paths of the first question and its answer in a column of conversations, as `--map` takes them.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Turns {
-    pub(super) question: String,
+pub(in crate::dataset::ready_made) struct Turns {
+    pub(in crate::dataset::ready_made) question: String,
     /// `None` if nobody answers.
-    pub(super) answer: Option<String>,
+    pub(in crate::dataset::ready_made) answer: Option<String>,
 }
 
 impl Turns {
     /// The turns in the first column that holds conversations; `None` if none does.
-    pub(super) fn find(table: &Table) -> Option<Self> {
+    pub(in crate::dataset::ready_made) fn find(table: &Table) -> Option<Self> {
         let row = table.rows.first()?;
         table
             .columns
@@ -32,7 +32,7 @@ impl Turns {
     }
 
     /// The turns in a cell of a column.
-    pub(super) fn from_cell(column: &str, cell: &Cell) -> Option<Self> {
+    pub(in crate::dataset::ready_made) fn from_cell(column: &str, cell: &Cell) -> Option<Self> {
         let cell = cell.parsed().map_or(Cow::Borrowed(cell), Cow::Owned);
         let Cell::List(turns) = &*cell else {
             return None;

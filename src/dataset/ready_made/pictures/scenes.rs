@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::map::{Map, flag};
-use super::names::Role;
-use super::roles::Column;
-use super::row::Table;
-use super::summary::count;
-use super::truths::is_own;
+use crate::dataset::ready_made::cells::Table;
+use crate::dataset::ready_made::choices::is_own;
+use crate::dataset::ready_made::columns::Column;
+use crate::dataset::ready_made::columns::map::{Map, flag};
+use crate::dataset::ready_made::columns::names::Role;
+use crate::dataset::ready_made::summary::count;
 use crate::error::{Error, Result};
 use crate::types::FrameId;
 
@@ -16,7 +16,7 @@ pub(in crate::dataset) type SceneNames = BTreeMap<FrameId, String>;
 
 /// The column of scenes and what it says of the frames.
 #[derive(Debug)]
-pub(super) struct Scenes<'a> {
+pub(in crate::dataset::ready_made) struct Scenes<'a> {
     column: Option<&'a Column>,
     /// True if the user named the column, or wrote this program's own form. Otherwise a column that contradicts itself is not used.
     is_meant: bool,
@@ -28,7 +28,11 @@ pub(super) struct Scenes<'a> {
 
 impl<'a> Scenes<'a> {
     /// No frames yet.
-    pub(super) fn new(table: &Table, map: &Map, column: Option<&'a Column>) -> Self {
+    pub(in crate::dataset::ready_made) fn new(
+        table: &Table,
+        map: &Map,
+        column: Option<&'a Column>,
+    ) -> Self {
         Self {
             column,
             is_meant: map.entry(Role::Scene).is_some() || is_own(table),
@@ -42,7 +46,12 @@ impl<'a> Scenes<'a> {
     ///
     /// # Errors
     /// If the user named the column and gives the frame a second scene.
-    pub(super) fn add(&mut self, table: &Table, row: usize, frame: &FrameId) -> Result<()> {
+    pub(in crate::dataset::ready_made) fn add(
+        &mut self,
+        table: &Table,
+        row: usize,
+        frame: &FrameId,
+    ) -> Result<()> {
         let Some(column) = self.column else {
             return Ok(());
         };
@@ -71,7 +80,7 @@ impl<'a> Scenes<'a> {
     }
 
     /// The scenes; none if the column contradicts itself.
-    pub(super) fn take(&mut self) -> SceneNames {
+    pub(in crate::dataset::ready_made) fn take(&mut self) -> SceneNames {
         match self.contradiction {
             None => std::mem::take(&mut self.names),
             Some(_) => SceneNames::new(),
@@ -79,7 +88,7 @@ impl<'a> Scenes<'a> {
     }
 
     /// Column and number of scenes in words; `None` without a column.
-    pub(super) fn note(&self) -> Option<String> {
+    pub(in crate::dataset::ready_made) fn note(&self) -> Option<String> {
         let name = &self.column?.name;
         if let Some(problem) = &self.contradiction {
             return Some(format!("{name} is not used as the scene: {problem}"));

@@ -2,40 +2,38 @@
 
 use std::collections::BTreeSet;
 
-use super::cell::Cell;
-pub(super) use super::column::Column;
+pub(in crate::dataset::ready_made) use super::column::Column;
 use super::map::{How, Map, flag};
 use super::names::{Role, known, plain};
-use super::row::Table;
 use super::template::Template;
-use super::turns::Turns;
+use crate::dataset::ready_made::cells::{Cell, Table, Turns};
 use crate::types::Choices;
 use crate::types::questions::letter;
 use crate::types::text::excerpt;
 
 /// The columns by role.
 #[derive(Debug)]
-pub(super) struct Roles {
-    pub(super) question: Asked,
+pub(in crate::dataset::ready_made) struct Roles {
+    pub(in crate::dataset::ready_made) question: Asked,
     /// The columns of images; the first that has any wins, or all of a numbered family.
-    pub(super) images: Images,
+    pub(in crate::dataset::ready_made) images: Images,
     /// Columns of lists or texts of options.
-    pub(super) options: Vec<Column>,
+    pub(in crate::dataset::ready_made) options: Vec<Column>,
     /// Columns of one option each, in order.
-    pub(super) cells: Vec<Column>,
-    pub(super) answers: Vec<Column>,
-    pub(super) ids: Vec<Column>,
-    pub(super) hint: Option<Column>,
-    pub(super) families: Families,
-    pub(super) evidence: Option<Column>,
-    pub(super) scene: Option<Column>,
-    pub(super) split_options: Option<String>,
-    pub(super) in_question: InQuestion,
+    pub(in crate::dataset::ready_made) cells: Vec<Column>,
+    pub(in crate::dataset::ready_made) answers: Vec<Column>,
+    pub(in crate::dataset::ready_made) ids: Vec<Column>,
+    pub(in crate::dataset::ready_made) hint: Option<Column>,
+    pub(in crate::dataset::ready_made) families: Families,
+    pub(in crate::dataset::ready_made) evidence: Option<Column>,
+    pub(in crate::dataset::ready_made) scene: Option<Column>,
+    pub(in crate::dataset::ready_made) split_options: Option<String>,
+    pub(in crate::dataset::ready_made) in_question: InQuestion,
 }
 
 /// Where the text of a question stands.
 #[derive(Debug)]
-pub(super) enum Asked {
+pub(in crate::dataset::ready_made) enum Asked {
     Column(Column),
     /// In the image, as the user states: the text only points there.
     InImage,
@@ -43,10 +41,10 @@ pub(super) enum Asked {
 
 impl Asked {
     /// The text of questions that stand in their images.
-    pub(super) const IN_IMAGE: &str = "Answer the question in the image.";
+    pub(in crate::dataset::ready_made) const IN_IMAGE: &str = "Answer the question in the image.";
 
     /// The column; `None` if there is none.
-    pub(super) fn column(&self) -> Option<&Column> {
+    pub(in crate::dataset::ready_made) fn column(&self) -> Option<&Column> {
         match self {
             Self::Column(column) => Some(column),
             Self::InImage => None,
@@ -56,7 +54,7 @@ impl Asked {
 
 /// The columns that may name families.
 #[derive(Debug)]
-pub(super) enum Families {
+pub(in crate::dataset::ready_made) enum Families {
     /// By their names, the best first.
     Known(Vec<Column>),
     /// The one that the user names, or none.
@@ -65,7 +63,7 @@ pub(super) enum Families {
 
 /// Whether options are looked for in the text of a question whose columns have none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum InQuestion {
+pub(in crate::dataset::ready_made) enum InQuestion {
     Searched,
     /// The user states that there are no options.
     None,
@@ -73,7 +71,7 @@ pub(super) enum InQuestion {
 
 /// Where the images of a row stand.
 #[derive(Debug)]
-pub(super) enum Images {
+pub(in crate::dataset::ready_made) enum Images {
     /// In the first of these columns that has one.
     First(Vec<Column>),
     /// In all of these columns.
@@ -87,7 +85,7 @@ impl Roles {
     ///
     /// # Errors
     /// If a column of the map is not there, no column is the question, or the columns hold several questions a row.
-    pub(super) fn new(table: &Table, map: &Map) -> Result<Self, String> {
+    pub(in crate::dataset::ready_made) fn new(table: &Table, map: &Map) -> Result<Self, String> {
         let named = |role| Self::named(table, map, role);
         let question = named(Role::Question)?;
         refuse_wide(table, map)?;
@@ -132,7 +130,7 @@ impl Roles {
 
     /// The columns that nobody reads again once the questions have their text, their options and their answers: not those of images,
     /// ids, families and scenes.
-    pub(super) fn read_once(&self) -> BTreeSet<usize> {
+    pub(in crate::dataset::ready_made) fn read_once(&self) -> BTreeSet<usize> {
         let (Images::First(images) | Images::All(images)) = &self.images else {
             // A template may name any column.
             return BTreeSet::new();
@@ -289,7 +287,7 @@ fn no_question(table: &Table) -> String {
 }
 
 /// The column of a name, or the field of structs in it, as `meta.source`.
-pub(super) fn column(table: &Table, name: &str) -> Result<Column, String> {
+pub(in crate::dataset::ready_made) fn column(table: &Table, name: &str) -> Result<Column, String> {
     let own = |name: &str, field: Option<&str>| {
         table.find(name).map(|at| Column {
             at,
@@ -388,7 +386,7 @@ const MOST_SHOWN: usize = 360;
 const LONGEST_SHOWN_NAME: usize = 40;
 
 /// The columns with their kinds and a short value each, one a line.
-pub(super) fn shown(table: &Table) -> String {
+pub(in crate::dataset::ready_made) fn shown(table: &Table) -> String {
     let width = table.columns.iter().map(|name| name.chars().count()).max();
     let width = width.unwrap_or(0).min(24);
     let most = (MOST_SHOWN / table.columns.len().clamp(1, 40)).min(60);

@@ -2,19 +2,18 @@
 
 use std::sync::Arc;
 
-use super::cell::{Cell, FileFacts, LONGEST_NAME, decoded};
-use super::container::SetFile;
-use super::roles::{Images, Roles};
-use super::row::{Row, RowPlace};
-use super::step::Step;
-use super::text_list::list;
+use crate::dataset::ready_made::cells::{
+    Cell, FileFacts, LONGEST_NAME, Row, RowPlace, Step, decoded, list,
+};
+use crate::dataset::ready_made::columns::{Images, Roles};
+use crate::dataset::ready_made::container::SetFile;
 use crate::error::{Error, Result};
 use crate::picture::image_file::format::FileFormat;
 use crate::picture::{ImageFile, ReadingRule};
 
 /// An image of a row.
 #[derive(Debug, Clone)]
-pub(super) enum RowImage {
+pub(in crate::dataset::ready_made) enum RowImage {
     /// Bytes or base64 in a cell.
     Embedded {
         column: usize,
@@ -31,7 +30,7 @@ pub(super) enum RowImage {
 
 /// The content of the image columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ImagesAre {
+pub(in crate::dataset::ready_made) enum ImagesAre {
     /// Images, or the paths of files.
     Files,
     /// The names of frames of other data.
@@ -49,7 +48,7 @@ fn named_frames(row: &Row, roles: &Roles) -> Vec<RowImage> {
 
 impl ImagesAre {
     /// The images of a row, in order.
-    pub(super) fn in_row(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
+    pub(in crate::dataset::ready_made) fn in_row(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
         match self {
             Self::Files => images(row, roles),
             Self::Frames => named_frames(row, roles),
@@ -58,7 +57,7 @@ impl ImagesAre {
 }
 
 /// The images of a row, in order. Of columns that hold the same image, the first with the image itself goes before paths.
-pub(super) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
+pub(in crate::dataset::ready_made) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
     let mut found = Vec::new();
     match &roles.images {
         Images::First(columns) => {
@@ -177,7 +176,7 @@ pub(super) struct CellPart {
 
 impl EmbeddedImage {
     /// The name of the format, by its first bytes.
-    pub(super) fn format(&self) -> &'static str {
+    pub(in crate::dataset::ready_made) fn format(&self) -> &'static str {
         self.facts.format.map_or("other", FileFormat::name)
     }
 

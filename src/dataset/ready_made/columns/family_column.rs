@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 
 use super::roles::{Column, Families};
-use super::row::{Row, Table};
-use super::truths::Answered;
+use crate::dataset::ready_made::cells::{Row, Table};
+use crate::dataset::ready_made::choices::Answered;
 
 /// Where the family of a question stands.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum FamilyOf {
+pub(in crate::dataset::ready_made) enum FamilyOf {
     Column(Column),
     /// The configuration of a repository that holds the row.
     Configuration,
@@ -18,7 +18,11 @@ pub(super) enum FamilyOf {
 impl FamilyOf {
     /// The first of some columns with more than one value among the questions that are asked; else the configuration, if they are of
     /// several; else the first column.
-    pub(super) fn from_table(table: &Table, families: &Families, answered: &[Answered]) -> Self {
+    pub(in crate::dataset::ready_made) fn from_table(
+        table: &Table,
+        families: &Families,
+        answered: &[Answered],
+    ) -> Self {
         let columns = match families {
             Families::Known(columns) => columns,
             Families::Said(column) => return column.clone().map_or(Self::None, Self::Column),
@@ -35,7 +39,7 @@ impl FamilyOf {
     }
 
     /// The family of a row; `None` if nothing names it.
-    pub(super) fn text(&self, table: &Table, row: &Row) -> Option<String> {
+    pub(in crate::dataset::ready_made) fn text(&self, table: &Table, row: &Row) -> Option<String> {
         let text = match self {
             Self::Column(column) => column.text(row),
             Self::Configuration | Self::None => None,
@@ -46,7 +50,7 @@ impl FamilyOf {
     }
 
     /// In words, for the summary.
-    pub(super) fn said(&self) -> String {
+    pub(in crate::dataset::ready_made) fn said(&self) -> String {
         match self {
             Self::Column(column) => format!("column {}", column.name),
             Self::Configuration => "by configuration".to_owned(),

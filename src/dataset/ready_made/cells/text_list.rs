@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::python_list::{python_dict, python_list};
 
 /// The texts of a list in a text: JSON, then Python's notation; `None` if the text is no list of texts and numbers.
-pub(super) fn list(text: &str) -> Option<Vec<String>> {
+pub(in crate::dataset::ready_made) fn list(text: &str) -> Option<Vec<String>> {
     let text = text.trim();
     if !text.starts_with('[') || !is_short(text) {
         return None;
@@ -16,7 +16,7 @@ pub(super) fn list(text: &str) -> Option<Vec<String>> {
 }
 
 /// The names and the texts of an object in a text: JSON, then Python's notation; `None` if the text is no object of texts and numbers.
-pub(super) fn dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
+pub(in crate::dataset::ready_made) fn dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
     let text = text.trim();
     if !text.starts_with('{') || !is_short(text) {
         return None;

@@ -14,7 +14,7 @@ static MARK: LazyLock<Option<Regex>> =
 /// The marks of a row. With one image they are cut. With several, the texts of the row are read in their order: the k-th mark without
 /// a number is the place of the k-th image.
 #[derive(Debug)]
-pub(super) struct ImageMarks {
+pub(in crate::dataset::ready_made) struct ImageMarks {
     /// The number of images.
     images: usize,
     without_number: usize,
@@ -22,7 +22,7 @@ pub(super) struct ImageMarks {
 }
 
 impl ImageMarks {
-    pub(super) fn new(images: usize) -> Self {
+    pub(in crate::dataset::ready_made) fn new(images: usize) -> Self {
         Self {
             images,
             without_number: 0,
@@ -34,7 +34,7 @@ impl ImageMarks {
     ///
     /// # Errors
     /// If a mark names an image that the row does not show, or only some marks have numbers.
-    pub(super) fn read(&mut self, text: &str) -> Result<String, String> {
+    pub(in crate::dataset::ready_made) fn read(&mut self, text: &str) -> Result<String, String> {
         let Some(form) = &*MARK else {
             return Ok(text.to_owned());
         };
@@ -72,7 +72,10 @@ impl ImageMarks {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub(super) fn read_option(&mut self, option: &str) -> Result<String, String> {
+    pub(in crate::dataset::ready_made) fn read_option(
+        &mut self,
+        option: &str,
+    ) -> Result<String, String> {
         if self.images == 1 {
             return Ok(option.to_owned());
         }

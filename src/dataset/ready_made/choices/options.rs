@@ -2,19 +2,17 @@
 
 use std::sync::Arc;
 
-use super::cell::{Cell, Fields};
 use super::lettered::{in_cell, without_letters};
 use super::offered::Offered;
-use super::roles::{Column, Roles};
-use super::row::Row;
-use super::text_list::{dict, list};
+use crate::dataset::ready_made::cells::{Cell, Fields, Row, dict, list};
+use crate::dataset::ready_made::columns::{Column, Roles};
 use crate::types::questions::letter;
 use crate::types::shell_word;
 use crate::types::text::excerpt;
 
 /// The options in the columns of a row.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Options {
+pub(in crate::dataset::ready_made) enum Options {
     /// No column has any.
     None,
     Found(Offered),
@@ -26,7 +24,7 @@ pub(super) enum Options {
 
 impl Options {
     /// The options of a row in its columns.
-    pub(super) fn from_row(row: &Row, roles: &Roles) -> Self {
+    pub(in crate::dataset::ready_made) fn from_row(row: &Row, roles: &Roles) -> Self {
         let mut found: Vec<(String, Offered)> = Vec::new();
         let cells = roles
             .cells

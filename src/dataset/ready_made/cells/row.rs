@@ -8,57 +8,57 @@ use std::sync::Arc;
 use csv::Position;
 
 use super::cell::{Cell, FieldNames};
-use super::map::Map;
-use super::names::{Role, known, plain};
+use crate::dataset::ready_made::columns::map::Map;
+use crate::dataset::ready_made::columns::names::{Role, known, plain};
 
 /// The maximum number of columns of a set.
 const MOST_COLUMNS: usize = 4096;
 
 /// The maximum number of rows of a set; chosen: a row takes half a kilobyte, and a packed file of a few kilobytes can hold millions.
-pub(super) const MOST_ROWS: usize = 1_000_000;
+pub(in crate::dataset::ready_made) const MOST_ROWS: usize = 1_000_000;
 
 /// The maximum length of all rows of a set without its images, in bytes; chosen.
 const MOST_BYTES: usize = 1 << 30;
 
 /// All rows of a set, in the order of its files.
 #[derive(Debug, Default)]
-pub(super) struct Table {
-    pub(super) files: Vec<FileLabel>,
-    pub(super) columns: Vec<String>,
+pub(in crate::dataset::ready_made) struct Table {
+    pub(in crate::dataset::ready_made) files: Vec<FileLabel>,
+    pub(in crate::dataset::ready_made) columns: Vec<String>,
     places: HashMap<String, usize>,
     names: FieldNames,
     /// Whether the last file has a column.
     in_last_file: Vec<bool>,
-    pub(super) rows: Vec<Row>,
+    pub(in crate::dataset::ready_made) rows: Vec<Row>,
     /// The length of all rows, in bytes.
     bytes: usize,
     /// Changes to the rows, in words.
-    pub(super) notes: Vec<String>,
+    pub(in crate::dataset::ready_made) notes: Vec<String>,
 }
 
 /// Facts about a file of rows besides its rows.
 #[derive(Debug, Clone)]
-pub(super) struct FileLabel {
+pub(in crate::dataset::ready_made) struct FileLabel {
     /// The path of the file, for messages; of a file in an archive, behind that of the archive.
-    pub(super) path: PathBuf,
+    pub(in crate::dataset::ready_made) path: PathBuf,
     /// The folder inside the archive that holds the file; `None` outside archives.
-    pub(super) inner: Option<PathBuf>,
+    pub(in crate::dataset::ready_made) inner: Option<PathBuf>,
     /// The configuration of the repository that it belongs to; empty if there is none.
-    pub(super) config: String,
+    pub(in crate::dataset::ready_made) config: String,
 }
 
 /// One row. Cells of columns that come later than its own may lack.
 #[derive(Debug)]
-pub(super) struct Row {
+pub(in crate::dataset::ready_made) struct Row {
     /// The index of its file.
-    pub(super) file: usize,
-    pub(super) place: RowPlace,
+    pub(in crate::dataset::ready_made) file: usize,
+    pub(in crate::dataset::ready_made) place: RowPlace,
     cells: Box<[Cell]>,
 }
 
 /// Where a row stands in its file. Sets have millions of rows, so that what few of them need is in a box.
 #[derive(Debug, Clone)]
-pub(super) enum RowPlace {
+pub(in crate::dataset::ready_made) enum RowPlace {
     /// A record of a table of text.
     Record(Position),
     /// A value of a JSON file: its first byte, its length, and the number of its line or of the value, counted from 1.
@@ -80,7 +80,7 @@ pub(super) enum RowPlace {
 
 /// The unit of a JSON file that holds one row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum JsonUnit {
+pub(in crate::dataset::ready_made) enum JsonUnit {
     Line,
     Object,
 }
@@ -115,13 +115,13 @@ impl fmt::Display for RowPlace {
 
 impl Table {
     /// A file of rows begins.
-    pub(super) fn begin_file(&mut self, file: FileLabel) {
+    pub(in crate::dataset::ready_made) fn begin_file(&mut self, file: FileLabel) {
         self.files.push(file);
         self.in_last_file.clear();
     }
 
     /// The columns of the last file.
-    pub(super) fn columns_of_last_file(&self) -> BTreeSet<String> {
+    pub(in crate::dataset::ready_made) fn columns_of_last_file(&self) -> BTreeSet<String> {
         self.columns
             .iter()
             .zip(&self.in_last_file)
@@ -141,7 +141,7 @@ impl Table {
     ///
     /// # Errors
     /// If there are more than [`MOST_COLUMNS`].
-    pub(super) fn column(&mut self, name: &str) -> Result<usize, String> {
+    pub(in crate::dataset::ready_made) fn column(&mut self, name: &str) -> Result<usize, String> {
         if let Some(&at) = self.places.get(name) {
             return Ok(self.saw(at));
         }
@@ -157,7 +157,7 @@ impl Table {
     }
 
     /// The index of a column; `None` if there is none of this name.
-    pub(super) fn find(&self, name: &str) -> Option<usize> {
+    pub(in crate::dataset::ready_made) fn find(&self, name: &str) -> Option<usize> {
         self.places.get(name).copied()
     }
 
@@ -165,7 +165,7 @@ impl Table {
     ///
     /// # Errors
     /// If there are more rows than [`MOST_ROWS`], or more bytes than [`MOST_BYTES`].
-    pub(super) fn push(
+    pub(in crate::dataset::ready_made) fn push(
         &mut self,
         place: RowPlace,
         cells: Vec<(usize, Cell)>,
@@ -194,7 +194,10 @@ impl Table {
     }
 
     /// Parses the cells of columns of text that a map takes as lists or structs, as tables hold them in JSON: `turns.0.value`.
-    pub(super) fn parse_cells<'m>(&mut self, maps: impl Iterator<Item = &'m Map>) {
+    pub(in crate::dataset::ready_made) fn parse_cells<'m>(
+        &mut self,
+        maps: impl Iterator<Item = &'m Map>,
+    ) {
         let names = maps
             .flat_map(|map| &map.entries)
             .flat_map(|entry| &entry.columns);
@@ -214,7 +217,7 @@ impl Table {
     }
 
     /// Frees the cells of columns that are not read again.
-    pub(super) fn forget(&mut self, columns: &BTreeSet<usize>) {
+    pub(in crate::dataset::ready_made) fn forget(&mut self, columns: &BTreeSet<usize>) {
         for row in &mut self.rows {
             for at in columns {
                 if let Some(cell) = row.cells.get_mut(*at) {
@@ -228,7 +231,11 @@ impl Table {
     ///
     /// # Errors
     /// As [`Self::column`].
-    pub(super) fn add_ids(&mut self, from: usize, ids: Vec<String>) -> Result<(), String> {
+    pub(in crate::dataset::ready_made) fn add_ids(
+        &mut self,
+        from: usize,
+        ids: Vec<String>,
+    ) -> Result<(), String> {
         let names = known(Role::Id);
         if self
             .columns
@@ -250,14 +257,14 @@ impl Table {
     }
 
     /// The file and place of a row, for messages.
-    pub(super) fn place(&self, row: usize) -> String {
+    pub(in crate::dataset::ready_made) fn place(&self, row: usize) -> String {
         let row = &self.rows[row];
         format!("{}, {}", self.files[row.file].path.display(), row.place)
     }
 }
 
 /// The error of a set with too many rows.
-pub(super) fn too_many_rows() -> String {
+pub(in crate::dataset::ready_made) fn too_many_rows() -> String {
     format!(
         "more than {MOST_ROWS} rows, which are not read; write a part of them to a file of its own"
     )
@@ -265,7 +272,7 @@ pub(super) fn too_many_rows() -> String {
 
 impl Row {
     /// The cell of a column.
-    pub(super) fn cell(&self, column: usize) -> &Cell {
+    pub(in crate::dataset::ready_made) fn cell(&self, column: usize) -> &Cell {
         self.cells.get(column).unwrap_or(&Cell::Absent)
     }
 }

@@ -5,7 +5,7 @@ use super::text_list::list;
 
 /// A step from a cell to a value inside it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) enum Step {
+pub(in crate::dataset::ready_made) enum Step {
     /// An item of a list, or of the text of a list.
     Item(usize),
     /// A field of a struct.
@@ -14,7 +14,7 @@ pub(super) enum Step {
 
 impl Cell {
     /// The value at some steps.
-    pub(super) fn at(&self, steps: &[Step]) -> Option<Self> {
+    pub(in crate::dataset::ready_made) fn at(&self, steps: &[Step]) -> Option<Self> {
         let Some((step, rest)) = steps.split_first() else {
             return Some(self.clone());
         };

@@ -6,7 +6,7 @@ use crate::types::questions::letter;
 
 /// How an answer identifies a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Reading {
+pub(in crate::dataset::ready_made) enum Reading {
     /// Letter of the choice: `A`, `(a)` or `A.`. A lower-case letter needs a bracket, full stop or colon.
     Letter,
     /// Text of the choice, ignoring letter case, surrounding space and a final full stop.
@@ -18,10 +18,11 @@ pub(super) enum Reading {
 }
 
 impl Reading {
-    pub(super) const ALL: [Self; 4] = [Self::Letter, Self::Text, Self::Index0, Self::Index1];
+    pub(in crate::dataset::ready_made) const ALL: [Self; 4] =
+        [Self::Letter, Self::Text, Self::Index0, Self::Index1];
 
     /// Name in `--map` and messages.
-    pub(super) fn name(self) -> &'static str {
+    pub(in crate::dataset::ready_made) fn name(self) -> &'static str {
         match self {
             Self::Letter => "letter",
             Self::Text => "text",
@@ -30,12 +31,16 @@ impl Reading {
         }
     }
 
-    pub(super) fn from_name(name: &str) -> Option<Self> {
+    pub(in crate::dataset::ready_made) fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|reading| reading.name() == name)
     }
 
     /// Index of the choice that the answer identifies; `None` if it identifies none.
-    pub(super) fn truth(self, answer: &str, options: &Offered) -> Option<usize> {
+    pub(in crate::dataset::ready_made) fn truth(
+        self,
+        answer: &str,
+        options: &Offered,
+    ) -> Option<usize> {
         let option_at = |wanted: usize| options.places.iter().position(|place| *place == wanted);
         let answer = answer.trim();
         match self {
@@ -66,7 +71,11 @@ impl Reading {
 
     /// Like [`Self::truth`], for a reading that the user did not choose: numbers identify none of the options that a question's text
     /// lists by letter.
-    pub(super) fn by_rule(self, answer: &str, options: &Offered) -> Option<usize> {
+    pub(in crate::dataset::ready_made) fn by_rule(
+        self,
+        answer: &str,
+        options: &Offered,
+    ) -> Option<usize> {
         let is_number = matches!(self, Self::Index0 | Self::Index1);
         if is_number && options.origin == Origin::Question {
             return None;
@@ -139,7 +148,7 @@ pub(super) fn one_reading(rows: &[AnswerOf<'_>]) -> OneReading {
 }
 
 /// Index of the choice of a yes/no question that the answer identifies: 0 for yes, 1 for no.
-pub(super) fn yes_or_no(answer: &str) -> Option<usize> {
+pub(in crate::dataset::ready_made) fn yes_or_no(answer: &str) -> Option<usize> {
     match &*folded(answer) {
         "yes" | "true" => Some(0),
         "no" | "false" => Some(1),
@@ -148,7 +157,7 @@ pub(super) fn yes_or_no(answer: &str) -> Option<usize> {
 }
 
 /// Index of the choice of a yes/no question that a digit identifies: 0 (yes) for the digit 1, 1 (no) for the digit 0.
-pub(super) fn digit(answer: &str) -> Option<usize> {
+pub(in crate::dataset::ready_made) fn digit(answer: &str) -> Option<usize> {
     match number(answer.trim()) {
         Some(1) => Some(0),
         Some(0) => Some(1),

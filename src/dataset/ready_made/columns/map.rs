@@ -3,31 +3,31 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::answers::Reading;
 use super::names::Role;
+use crate::dataset::ready_made::choices::Reading;
 use crate::types::shell_word;
 
 /// The value of `--map`: roles and their columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Map {
     text: String,
-    pub(super) entries: Vec<Entry>,
+    pub(in crate::dataset::ready_made) entries: Vec<Entry>,
 }
 
 /// One role of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Entry {
+pub(in crate::dataset::ready_made) struct Entry {
     pub(super) role: Role,
     /// A column, several (cells of options, images) or a template with `{Column}`; none turns the role off.
-    pub(super) columns: Vec<String>,
+    pub(in crate::dataset::ready_made) columns: Vec<String>,
     /// The same names as one, which holds commas if there are several: a column of that name goes first.
     pub(super) whole: String,
-    pub(super) how: How,
+    pub(in crate::dataset::ready_made) how: How,
 }
 
 /// How the cells of a column are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum How {
+pub(in crate::dataset::ready_made) enum How {
     /// By rule.
     ByRule,
     /// Options in one text, between these signs.
@@ -37,7 +37,11 @@ pub(super) enum How {
 }
 
 /// A column for a role as a flag that a shell can read, with the reading of answers if one is named.
-pub(super) fn flag(role: Role, column: &str, reading: Option<Reading>) -> String {
+pub(in crate::dataset::ready_made) fn flag(
+    role: Role,
+    column: &str,
+    reading: Option<Reading>,
+) -> String {
     let how = match reading {
         Some(reading) => format!(":{}", reading.name()),
         // What follows the last colon is how the column is read: here, by rule.
@@ -52,7 +56,9 @@ pub(super) fn flag(role: Role, column: &str, reading: Option<Reading>) -> String
 
 impl Map {
     /// The maps as one. A later one wins over an earlier one, role by role.
-    pub(super) fn joined<'a>(maps: impl IntoIterator<Item = &'a Self>) -> Self {
+    pub(in crate::dataset::ready_made) fn joined<'a>(
+        maps: impl IntoIterator<Item = &'a Self>,
+    ) -> Self {
         let mut joined = Self::default();
         for map in maps {
             for entry in &map.entries {
@@ -64,7 +70,7 @@ impl Map {
     }
 
     /// The entry of a role.
-    pub(super) fn entry(&self, role: Role) -> Option<&Entry> {
+    pub(in crate::dataset::ready_made) fn entry(&self, role: Role) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.role == role)
     }
 }

@@ -1,19 +1,18 @@
 //! A column of a set: [`Column`].
 
-use super::cell::Cell;
-use super::row::Row;
+use crate::dataset::ready_made::cells::{Cell, Row};
 
 /// A column, or a field of structs in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Column {
-    pub(super) at: usize,
-    pub(super) field: Option<String>,
-    pub(super) name: String,
+pub(in crate::dataset::ready_made) struct Column {
+    pub(in crate::dataset::ready_made) at: usize,
+    pub(in crate::dataset::ready_made) field: Option<String>,
+    pub(in crate::dataset::ready_made) name: String,
 }
 
 impl Column {
     /// The cell of the column in a row.
-    pub(super) fn cell<'a>(&self, row: &'a Row) -> &'a Cell {
+    pub(in crate::dataset::ready_made) fn cell<'a>(&self, row: &'a Row) -> &'a Cell {
         let cell = row.cell(self.at);
         match &self.field {
             None => cell,
@@ -27,7 +26,7 @@ impl Column {
     }
 
     /// The cell as text, if it holds one.
-    pub(super) fn text(&self, row: &Row) -> Option<String> {
+    pub(in crate::dataset::ready_made) fn text(&self, row: &Row) -> Option<String> {
         let cell = self.cell(row);
         (!cell.is_absent()).then(|| cell.text()).flatten()
     }

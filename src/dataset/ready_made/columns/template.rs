@@ -1,14 +1,14 @@
 //! Names of image files with the cells of a row in them: [`Template`].
 
 use super::column::Column;
-use super::row::{Row, Table};
+use crate::dataset::ready_made::cells::{Row, Table};
 
 /// The greatest width of a number; chosen.
 const WIDEST: usize = 64;
 
 /// The name of an image file with cells in braces: `images/{id}.jpg`, or `images/{id:012}.jpg` for a number in twelve digits.
 #[derive(Debug)]
-pub(super) struct Template {
+pub(in crate::dataset::ready_made) struct Template {
     text: String,
     parts: Vec<Part>,
 }
@@ -51,12 +51,12 @@ impl Template {
     }
 
     /// The template as the user wrote it.
-    pub(super) fn text(&self) -> &str {
+    pub(in crate::dataset::ready_made) fn text(&self) -> &str {
         &self.text
     }
 
     /// The name with the cells of a row; `None` if one is absent.
-    pub(super) fn filled(&self, row: &Row) -> Option<String> {
+    pub(in crate::dataset::ready_made) fn filled(&self, row: &Row) -> Option<String> {
         self.parts
             .iter()
             .map(|part| match part {

@@ -7,12 +7,12 @@ use regex::{Match, Regex};
 use serde::Deserialize;
 
 /// The file of names and instructions.
-const COLUMNS: &str = include_str!("columns.toml");
+const COLUMNS: &str = include_str!("../columns.toml");
 
 /// The role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Role {
+pub(in crate::dataset::ready_made) enum Role {
     Question,
     Image,
     Options,
@@ -81,13 +81,13 @@ static ENDINGS: LazyLock<Vec<Regex>> = LazyLock::new(|| {
 });
 
 /// The names of the columns of a role, plain, the best first.
-pub(super) fn known(role: Role) -> &'static [String] {
+pub(in crate::dataset::ready_made) fn known(role: Role) -> &'static [String] {
     let known = KNOWN.as_ref().and_then(|known| known.roles.get(&role));
     known.map_or(&[], Vec::as_slice)
 }
 
 /// A name in lower case, letters and digits alone.
-pub(super) fn plain(name: &str) -> String {
+pub(in crate::dataset::ready_made) fn plain(name: &str) -> String {
     name.chars()
         .filter(|c| c.is_alphanumeric())
         .flat_map(char::to_lowercase)
@@ -96,7 +96,7 @@ pub(super) fn plain(name: &str) -> String {
 
 /// A text without the instructions at its end, and these, the last first. An instruction is a sentence or a line of its own, with
 /// something before it.
-pub(super) fn without_endings(text: &str) -> (&str, Vec<String>) {
+pub(in crate::dataset::ready_made) fn without_endings(text: &str) -> (&str, Vec<String>) {
     let (mut text, mut cut) = (text.trim_end(), Vec::new());
     loop {
         let own = |ending: &Match<'_>| {

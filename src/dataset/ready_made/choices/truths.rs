@@ -2,35 +2,33 @@
 
 use std::sync::Arc;
 
-use super::answer_column;
 use super::answers::{
     AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
 };
-use super::cell::Cell;
-use super::items::{AnswerCell, Item};
-use super::left_out::{LeftOut, Why};
-use super::map::{How, flag};
-use super::names::Role;
 use super::offered::Offered;
-use super::roles::{Column, Roles};
-use super::row::Table;
+use crate::dataset::ready_made::cells::{Cell, Table};
+use crate::dataset::ready_made::columns::map::{How, flag};
+use crate::dataset::ready_made::columns::names::Role;
+use crate::dataset::ready_made::columns::{Column, Roles, answer_column};
+use crate::dataset::ready_made::items::{AnswerCell, Item};
+use crate::dataset::ready_made::omissions::{LeftOut, Why};
 use crate::types::Choices;
 use crate::types::text::excerpt;
 
 /// A question with its choices.
 #[derive(Debug)]
-pub(super) struct Answered {
-    pub(super) row: usize,
-    pub(super) text: String,
-    pub(super) choices: Choices,
+pub(in crate::dataset::ready_made) struct Answered {
+    pub(in crate::dataset::ready_made) row: usize,
+    pub(in crate::dataset::ready_made) text: String,
+    pub(in crate::dataset::ready_made) choices: Choices,
 }
 
 /// The questions with their truths, and how these were read.
 #[derive(Debug)]
-pub(super) struct Truths {
-    pub(super) answered: Vec<Answered>,
+pub(in crate::dataset::ready_made) struct Truths {
+    pub(in crate::dataset::ready_made) answered: Vec<Answered>,
     /// The column and the reading, in words.
-    pub(super) said: Vec<String>,
+    pub(in crate::dataset::ready_made) said: Vec<String>,
 }
 
 /// The smallest share of questions that begin with a verb, for digits to mean no and yes.
@@ -40,7 +38,7 @@ const SHARE_OF_VERBS: f64 = 0.9;
 ///
 /// # Errors
 /// If there are no answers, no reading fits all of them, or two readings fit and differ.
-pub(super) fn truths(
+pub(in crate::dataset::ready_made) fn truths(
     table: &Table,
     roles: &Roles,
     how: &How,
@@ -65,7 +63,7 @@ pub(super) fn truths(
         );
         return Err(format!(
             "no answers among its columns: {remedy} Its columns:\n{}",
-            super::roles::shown(table)
+            crate::dataset::ready_made::columns::shown(table)
         ));
     }
     let mut listed: Vec<Item> = items
@@ -115,7 +113,7 @@ fn names_no_options(table: &Table, roles: &Roles, item: &Item) -> bool {
 }
 
 /// Whether the lines are of this program's own form, in which the answer is the text of a choice.
-pub(super) fn is_own(table: &Table) -> bool {
+pub(in crate::dataset::ready_made) fn is_own(table: &Table) -> bool {
     const FIELDS: [&str; 11] = [
         "id",
         "frame",

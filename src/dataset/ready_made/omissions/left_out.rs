@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use super::settings::{SetArgs, SeveralImages};
 use super::skip_bad::SkipBad;
+use crate::dataset::ready_made::settings::{SetArgs, SeveralImages};
 
 /// Why a row cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Why {
+pub(in crate::dataset::ready_made) enum Why {
     SeveralImages,
     NoImage,
     Open,
@@ -19,7 +19,7 @@ pub(super) enum Why {
 
 impl Why {
     /// The name in the manifest and in messages.
-    pub(super) fn name(self) -> &'static str {
+    pub(in crate::dataset::ready_made) fn name(self) -> &'static str {
         match self {
             Self::SeveralImages => "several images",
             Self::NoImage => "no image",
@@ -55,24 +55,28 @@ impl Why {
 
 /// The rows that are not asked: how many, and the place and problem of the first.
 #[derive(Debug, Default)]
-pub(super) struct LeftOut {
+pub(in crate::dataset::ready_made) struct LeftOut {
     counts: BTreeMap<Why, (usize, String)>,
 }
 
 impl LeftOut {
     /// Adds a row with its problem.
-    pub(super) fn add(&mut self, why: Why, problem: impl FnOnce() -> String) {
+    pub(in crate::dataset::ready_made) fn add(
+        &mut self,
+        why: Why,
+        problem: impl FnOnce() -> String,
+    ) {
         let entry = self.counts.entry(why).or_insert_with(|| (0, problem()));
         entry.0 += 1;
     }
 
     /// How many rows are left out, by the reason.
-    pub(super) fn counts(&self) -> impl Iterator<Item = (Why, usize)> {
+    pub(in crate::dataset::ready_made) fn counts(&self) -> impl Iterator<Item = (Why, usize)> {
         self.counts.iter().map(|(why, (count, _))| (*why, *count))
     }
 
     /// The number of broken rows, and the problem of the first; `None` if there are none.
-    pub(super) fn bad(&self) -> Option<(usize, &str)> {
+    pub(in crate::dataset::ready_made) fn bad(&self) -> Option<(usize, &str)> {
         let (count, first) = self.counts.get(&Why::Bad)?;
         Some((*count, first))
     }
@@ -81,7 +85,11 @@ impl LeftOut {
     ///
     /// # Errors
     /// One line for each reason that no flag allows: the count, the first row, and the flag.
-    pub(super) fn check(&self, rows: usize, args: &SetArgs) -> Result<(), String> {
+    pub(in crate::dataset::ready_made) fn check(
+        &self,
+        rows: usize,
+        args: &SetArgs,
+    ) -> Result<(), String> {
         let mut problems = Vec::new();
         for (why, (count, first)) in &self.counts {
             let (why, head) = (*why, format!("{count} of {rows} rows"));
@@ -120,8 +128,8 @@ impl LeftOut {
 
 #[cfg(test)]
 mod tests {
-    use super::super::settings::LeaveOut;
     use super::*;
+    use crate::dataset::ready_made::settings::LeaveOut;
 
     #[test]
     fn nothing_is_left_out_without_a_word_of_the_user() {

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use super::names::without_endings;
+use crate::dataset::ready_made::columns::names::without_endings;
 use crate::types::Choices;
 use crate::types::questions::letter;
 use crate::types::text::excerpt;
@@ -20,7 +20,7 @@ struct Mark {
 
 /// The form of options with letters in a question.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Lettered {
+pub(in crate::dataset::ready_made) enum Lettered {
     None,
     /// The question, with what stands behind the options as its last line, and the options.
     Found {
@@ -43,7 +43,7 @@ static INSTRUCTION: LazyLock<Option<Regex>> = LazyLock::new(|| {
 /// The question and the options of a text that holds options: those of the last run of the marks A, B, … in order, at least two, whose
 /// options have a letter or a digit each. A mark stands at the start, or after space, a comma, a semicolon or a colon. The last option
 /// ends with its line, if the others stand on one line each; what follows belongs to the question.
-pub(super) fn in_question(text: &str) -> Lettered {
+pub(in crate::dataset::ready_made) fn in_question(text: &str) -> Lettered {
     let (body, _) = without_endings(text);
     let tail = text[body.len()..].trim();
     let marks = marks(body);

@@ -3,14 +3,17 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::left_out::{LeftOut, Why};
-use super::row::Table;
-use super::settings::SetArgs;
-use super::truths::Answered;
+use crate::dataset::ready_made::cells::Table;
+use crate::dataset::ready_made::choices::Answered;
+use crate::dataset::ready_made::settings::SetArgs;
 use crate::types::Digest;
 
 /// The pairs of questions whose digests are equal and whose answers differ, by their places. Each question that another contradicts is
 /// in a pair.
-pub(super) fn contradictory(answered: &[Answered], digests: &[Digest]) -> Vec<[usize; 2]> {
+pub(in crate::dataset::ready_made) fn contradictory(
+    answered: &[Answered],
+    digests: &[Digest],
+) -> Vec<[usize; 2]> {
     let truth = |at: usize| answered[at].choices.truth();
     let mut first: HashMap<&Digest, usize> = HashMap::new();
     let mut opposed: HashMap<&Digest, usize> = HashMap::new();
@@ -38,7 +41,7 @@ pub(super) fn contradictory(answered: &[Answered], digests: &[Digest]) -> Vec<[u
 ///
 /// # Errors
 /// If the user does not; the error names the first pair.
-pub(super) fn leave_out(
+pub(in crate::dataset::ready_made) fn leave_out(
     table: &Table,
     args: &SetArgs,
     answered: &mut Vec<Answered>,

@@ -14,7 +14,7 @@ use crate::types::text::excerpt;
 
 /// The maximum length of a text that may be a path or the id of a row. A longer one of the base64 alphabet is a file (the rule of
 /// VLMEvalKit, `vlmeval/dataset/image_base.py`).
-pub(super) const LONGEST_NAME: usize = 64;
+pub(in crate::dataset::ready_made) const LONGEST_NAME: usize = 64;
 
 /// The length from which on a text of the base64 alphabet is not kept: its file is read again when it is shown.
 const LONGEST_KEPT: usize = 1024;
@@ -24,7 +24,7 @@ const SHORTEST_LINE: usize = 60;
 
 /// A value in a row. The bytes of files are not kept. Sets have millions of cells, so that a cell is no larger than a text.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Cell {
+pub(in crate::dataset::ready_made) enum Cell {
     /// Null, or no such column in this row.
     Absent,
     Bool(bool),
@@ -40,7 +40,7 @@ pub(super) enum Cell {
 }
 
 /// The fields of a struct, with their names.
-pub(super) type Fields = Box<[(Arc<str>, Cell)]>;
+pub(in crate::dataset::ready_made) type Fields = Box<[(Arc<str>, Cell)]>;
 
 /// The names of fields in the cells of a table. Equal ones are held once.
 #[derive(Debug, Default)]
@@ -58,14 +58,14 @@ impl FieldNames {
 
 /// Facts about bytes that are not kept.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct FileFacts {
-    pub(super) digest: Digest,
+pub(in crate::dataset::ready_made) struct FileFacts {
+    pub(in crate::dataset::ready_made) digest: Digest,
     /// The format by the first bytes; `None` if it is none that is read.
-    pub(super) format: Option<FileFormat>,
+    pub(in crate::dataset::ready_made) format: Option<FileFormat>,
 }
 
 impl FileFacts {
-    pub(super) fn from_bytes(bytes: &[u8]) -> Self {
+    pub(in crate::dataset::ready_made) fn from_bytes(bytes: &[u8]) -> Self {
         Self {
             digest: Digest::from_bytes(bytes),
             format: FileFormat::detect(bytes).ok(),
@@ -124,7 +124,7 @@ impl Cell {
     }
 
     /// Whether nothing is there: null, an empty text or list, or a word by which tables write that (`nan`, `N/A`, `None`, `null`).
-    pub(super) fn is_absent(&self) -> bool {
+    pub(in crate::dataset::ready_made) fn is_absent(&self) -> bool {
         match self {
             Self::Absent => true,
             Self::Text(text) => {
@@ -138,7 +138,7 @@ impl Cell {
     }
 
     /// The cell as text; `None` if it is absent, or neither a text nor a number nor a truth value.
-    pub(super) fn text(&self) -> Option<String> {
+    pub(in crate::dataset::ready_made) fn text(&self) -> Option<String> {
         match self {
             Self::Bool(is_true) => Some(is_true.to_string()),
             Self::Number(text) => Some(whole(text)),
@@ -148,7 +148,7 @@ impl Cell {
     }
 
     /// The list or struct in a text of JSON; `None` if it holds none.
-    pub(super) fn parsed(&self) -> Option<Self> {
+    pub(in crate::dataset::ready_made) fn parsed(&self) -> Option<Self> {
         let Self::Text(text) = self else {
             return None;
         };
@@ -159,7 +159,7 @@ impl Cell {
     }
 
     /// The field of a struct, by its name; the item of a list, by its number from 0.
-    pub(super) fn field(&self, name: &str) -> Option<&Self> {
+    pub(in crate::dataset::ready_made) fn field(&self, name: &str) -> Option<&Self> {
         if let Self::List(cells) = self {
             return cells.get(name.parse::<usize>().ok()?);
         }
@@ -173,7 +173,7 @@ impl Cell {
     }
 
     /// The kind of value, for messages.
-    pub(super) fn kind(&self) -> &'static str {
+    pub(in crate::dataset::ready_made) fn kind(&self) -> &'static str {
         match self {
             Self::Absent => "nothing",
             Self::Bool(_) => "truth",
@@ -186,7 +186,7 @@ impl Cell {
     }
 
     /// The value in at most about `most` characters, for messages.
-    pub(super) fn shown(&self, most: usize) -> String {
+    pub(in crate::dataset::ready_made) fn shown(&self, most: usize) -> String {
         let whole = match self {
             Self::Absent => String::new(),
             Self::Bool(_) | Self::Number(_) => self.text().unwrap_or_default(),
@@ -258,7 +258,7 @@ fn whole(number: &str) -> String {
 }
 
 /// The file in a text, if the text is base64 and longer than a name. The head of a `data:` address is cut.
-pub(super) fn decoded(text: &str) -> Option<Vec<u8>> {
+pub(in crate::dataset::ready_made) fn decoded(text: &str) -> Option<Vec<u8>> {
     let text = text.trim();
     let text = match text.strip_prefix("data:") {
         Some(address) => address.split_once(',')?.1,
