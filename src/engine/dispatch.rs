@@ -12,13 +12,12 @@ use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
 use crate::ask::{AskError, Call, Reach, Reservation, sleep_running};
-use crate::engine::budget::{Budget, Permit, text_tokens};
-use crate::engine::budget_notes::BudgetNotes;
 use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
-use crate::engine::in_flight_cost::InFlightCost;
+use crate::engine::costs::{
+    Budget, BudgetNotes, InFlightCost, MeasuredTokens, Permit, text_tokens,
+};
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
-use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
 use crate::engine::suspects::Suspects;

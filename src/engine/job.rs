@@ -4,12 +4,11 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use crate::engine::batch::{self, BatchFileArgs, BatchRunArgs};
+use crate::engine::costs::{MeasuredTokens, estimate};
 use crate::engine::dark_already;
-use crate::engine::estimate;
 use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::folder;
 use crate::engine::manifest;
-use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline, truncated};
 use crate::error::{Error, Result};
 use crate::images::enhancement::enhancers::OpenEnhancers;

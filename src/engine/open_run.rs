@@ -7,12 +7,11 @@ use std::time::Instant;
 
 use crate::ask::ImageLimit;
 use crate::engine::batch::journal::Journal;
-use crate::engine::budget::{Answering, Budget};
 use crate::engine::circuit_breaker::EndReason;
+use crate::engine::costs::{Answering, Budget, InFlightCost};
 use crate::engine::dark_already;
 use crate::engine::dispatch::{Dispatcher, TrialCounts};
 use crate::engine::experiment::{DetailOf, Experiment};
-use crate::engine::in_flight_cost::InFlightCost;
 use crate::engine::manifest;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::settings::JobSettings;

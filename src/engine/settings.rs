@@ -10,10 +10,10 @@ use clap::Args;
 use serde_json::Value;
 
 use crate::ask::{AccessArgs, Bounds, Constrain, Parameters, RequestArgs, Sending};
+use crate::engine::costs::{MoneyArgs, MoneySettings};
 use crate::engine::models::{
     AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline,
 };
-use crate::engine::money::{MoneyArgs, MoneySettings};
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::image_store::StoreArgs;

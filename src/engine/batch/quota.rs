@@ -9,8 +9,7 @@ use super::event::{Event, PartFacts};
 use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
 use crate::ask::QuotaRefusal;
-use crate::engine::budget::{Answering, Budget};
-use crate::engine::in_flight_cost::InFlightCost;
+use crate::engine::costs::{Answering, Budget, InFlightCost};
 use crate::error::Result;
 use darkqa_score::answers::record::Detail;
 

@@ -10,7 +10,7 @@ use super::marks::{marks, prompt};
 use super::plan::answers;
 use super::record::OpenItem;
 use super::setup::OpenSetup;
-use crate::engine::budget::text_tokens;
+use crate::engine::costs::text_tokens;
 use crate::engine::experiment::{ExpectedRequest, Experiment};
 use crate::engine::identity;
 use crate::engine::models::ModelUnderTest;

@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::ask::{ImageLimit, Price, Server};
-use crate::engine::budget::{Budget, shown_tokens, text_tokens};
+use crate::engine::costs::budget::{Budget, shown_tokens, text_tokens};
+use crate::engine::costs::measured_tokens::MeasuredTokens;
+use crate::engine::costs::planned_images::{PlannedImages, SampledImages};
 use crate::engine::experiment::{ExpectedRequest, Experiment};
-use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::open_run::limit;
-use crate::engine::planned_images::{PlannedImages, SampledImages};
 use crate::error::Result;
 use crate::images::frames::Source;
 use crate::images::image_pipeline::ImagePipeline;

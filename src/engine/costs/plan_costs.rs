@@ -1,7 +1,7 @@
 //! The estimated cost of each source of a plan: [`costs`].
 
 use crate::ask::Price;
-use crate::engine::budget::{shown_tokens, text_tokens};
+use crate::engine::costs::budget::{shown_tokens, text_tokens};
 use crate::engine::experiment::Experiment;
 use crate::images::frames::Source;
 use crate::images::trials::{Item as _, SourcePlan, TrialGroup};

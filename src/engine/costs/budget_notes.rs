@@ -1,7 +1,7 @@
 //! Notices about the upper bound that `--max-cost` is: [`BudgetNotes`].
 
 use crate::ask::Spending;
-use crate::engine::budget::Budget;
+use crate::engine::costs::budget::Budget;
 use crate::engine::models::ModelUnderTest;
 
 /// Notices about the limit of cost, each said once for each model.

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::ask::{Price, PricedRequest, ReplyExcess, Reservation, Spending, TokenBound};
+use crate::engine::costs::money::MoneySettings;
+use crate::engine::costs::prompt_bounds::{self, PromptBounds, PromptFacts};
 use crate::engine::models::ModelUnderTest;
-use crate::engine::money::MoneySettings;
-use crate::engine::prompt_bounds::{self, PromptBounds, PromptFacts};
 use crate::error::{Error, Result};
 use crate::images::frames::Source;
 use crate::images::trials::{Item, Prompt, Trial};

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use crate::engine::budget::text_tokens;
+use crate::engine::costs::budget::text_tokens;
 use crate::images::frames::Source;
 use crate::images::trials::{Item, Plan};
 use crate::store::StoredTrial;
