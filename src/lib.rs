@@ -194,7 +194,7 @@ pub(crate) use darkqa_store as store;
 
 pub use error::{Error, Result};
 pub use runs::record_table::{Records, RunRecord, StoredRun};
-pub use types::degradation::Kind;
+pub use types::degradations::Kind;
 pub use types::{
     Answer, Choices, Condition, Degradation, DepthKind, Digest, Family, Frame, FrameId, Intrinsics,
     Label, Labels, Question, QuestionId, Reply, Rgb, Segmentation, Severity, UnreadReason,

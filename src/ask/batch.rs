@@ -2,12 +2,11 @@
 
 use serde_json::Value;
 
-use super::bounded_json::parse;
-use super::complaint::{Complaint, UnreadableReply};
-use super::constraint::letter_of;
-use super::parameters::Constrain;
-use super::reply_secrets::without_secrets;
-use super::secret::Scrub;
+use super::failures::{Complaint, UnreadableReply};
+use super::replies::bounded_json::parse;
+use super::requests::Constrain;
+use super::requests::constraint::letter_of;
+use super::secrets::{Scrub, without_secrets};
 use super::wire::{batch_reply, body_usage};
 use crate::types::{Failure, FailureKind, Reply, Usage};
 

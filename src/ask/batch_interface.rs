@@ -2,9 +2,8 @@
 
 use std::num::{NonZeroU64, NonZeroUsize};
 
-use super::url::BaseUrl;
-use super::vendor::Vendor;
-use super::vendor_batch::{BatchForm, VendorBatch};
+use super::endpoints::BaseUrl;
+use super::vendors::{BatchForm, Vendor, VendorBatch};
 use crate::error::{Error, Result};
 
 /// The Batch API at an address; that of OpenAI if the address is not in the table of vendors.

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use crate::types::flag::flag_words;
+use crate::types::flags::flag_words;
 
 /// An API through which a model is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::ops::Range;
 use clap::ValueEnum;
 use serde::Serialize;
 
-use crate::types::flag::flag_words;
+use crate::types::flags::flag_words;
 
 /// Tiles of a plane along each side (chosen): photon transfer is fitted to tiles, so that light that falls off towards the
 /// corners adds points, not variance.

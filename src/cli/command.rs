@@ -29,7 +29,7 @@ use crate::run::study;
 use crate::run::synthesize::SynthesizeCommand;
 use crate::run_reports::ReportArgs;
 use crate::types::Decides;
-use crate::types::keyed_flag::KeyedFlag;
+use crate::types::flags::KeyedFlag;
 
 use super::keyed::{grouped, name_of};
 

@@ -4,7 +4,7 @@ use clap::builder::PossibleValue;
 use clap::{Arg, ArgAction, Command};
 
 use crate::types::Decides;
-use crate::types::keyed_flag::{KEYED_FLAGS, KeyedFlag, spelled};
+use crate::types::flags::{KEYED_FLAGS, KeyedFlag, spelled};
 
 /// The name of a flag in files, which is the name of the field.
 pub(super) fn name_of(arg: &Arg) -> String {

@@ -31,7 +31,7 @@ use super::keyed::{name_of, respelled};
 use crate::ask::OPENAI_KEY;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::near_name::{nearest, question, suggestion};
+use crate::types::text::near_name::{nearest, question, suggestion};
 
 /// Prefix of this program's environment variables.
 const PREFIX: &str = "DARKQA_";

@@ -21,16 +21,16 @@ use tracing_subscriber::EnvFilter;
 
 use crate::engine::open_files::raise_limit;
 use crate::error::{Error, Result};
-use crate::images::image_words;
 use crate::images::progress::{Progress, Verbosity};
+use crate::images::recipes::image_words;
 use crate::run::evaluate::{check, evaluate, export_batch, plan, run_batch};
 use crate::run::merge::merge;
 use crate::run::openeqa::openeqa;
 use crate::run::{self, study};
 use crate::run_reports::report;
 use crate::runs::Outcome;
-use crate::types::manifest::Status;
-use crate::types::shown_text::{shown, shown_in_colours};
+use crate::types::manifests::Status;
+use crate::types::text::{shown, shown_in_colours};
 
 use command::{BatchCommand, Colours, Command, NAME, ReportCommand, ReportForm, StudyCommand};
 use layers::one_line;

@@ -17,12 +17,12 @@ use crate::picture::ImageArgs;
 use crate::run::evaluate::{EvaluateArgs, ShrinkArgs};
 use crate::run::openeqa::{JudgeArgs, OpenEqaArgs};
 use crate::run::synthesize::Sheet;
-use crate::types::degradation::Kind;
-use crate::types::keyed_flag::spelled;
+use crate::types::degradations::Kind;
+use crate::types::flags::spelled;
 use crate::types::{AxisLevel, SetLight};
 use darkqa_enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use darkqa_light::{CameraArgs, LightArgs, SensorArgs};
-use darkqa_score::realism::residual::Bins;
+use darkqa_score::photographs::realism::residual::Bins;
 
 /// One line for each reason why flags of the call have no effect.
 pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {

@@ -8,7 +8,7 @@ use clap::{Arg, Command as Clap, CommandFactory as _};
 use super::*;
 use crate::cli::keyed::{grouped, name_of, with_value};
 use crate::types::Decides;
-use crate::types::keyed_flag::{KEYED_FLAGS, keyed_form};
+use crate::types::flags::{KEYED_FLAGS, keyed_form};
 
 #[test]
 fn the_command_line_is_valid() {

@@ -17,9 +17,8 @@ use super::family::{checked, other};
 use super::ready_made::one_line;
 use crate::error::{Error, Result};
 use crate::files::reading::text;
-use crate::types::question::CANNOT_TELL;
-use crate::types::run_question::BANK_ID;
-use crate::types::shown_text::excerpt;
+use crate::types::questions::{BANK_ID, CANNOT_TELL};
+use crate::types::text::excerpt;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
 /// The built-in bank.

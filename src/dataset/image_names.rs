@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::picture::image_file::format::READ;
-use crate::types::frame::is_image_ending;
+use crate::types::images::is_image_ending;
 
 /// Endings of the names of images in formats that are not read.
 const UNREAD: [&str; 28] = [

@@ -32,7 +32,7 @@ use std::sync::LazyLock;
 use crate::error::{Error, Result};
 use crate::picture::{ImageFile, ReadingRule};
 use crate::rooms::{self, Rooms};
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 use crate::types::{Frame, FrameId, Labels, PhotoName, Question};
 
 pub(crate) use bank::{Bank, BankPlace};

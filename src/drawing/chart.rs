@@ -13,7 +13,7 @@ pub(crate) mod thresholds;
 use serde::Serialize;
 
 use crate::text::words::light;
-use crate::types::degradation::Axis;
+use crate::types::degradations::Axis;
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 use darkqa_score::estimate::Estimate;
 

@@ -6,8 +6,8 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use crate::text::words::light;
-use crate::types::degradation::Axis;
-use crate::types::shown_text::shown;
+use crate::types::degradations::Axis;
+use crate::types::text::shown;
 use crate::types::{
     AxisLevel, Condition, EnhancerName, FrameId, KindReading, LightGroup, Thumbnail,
 };

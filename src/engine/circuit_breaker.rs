@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::ask::{AskError, Reach};
 use crate::engine::models::ModelUnderTest;
 use crate::error::Error;
-use crate::types::manifest::{Counts, Status};
+use crate::types::manifests::{Counts, Status};
 use crate::types::{Failure, FailureKind};
 
 /// Failed trials after which a model is stopped if none has succeeded: the next would fail, too.

@@ -12,28 +12,27 @@ use tokio::task::{JoinError, JoinSet};
 use tokio::time::timeout;
 
 use crate::ask::{AskError, Call, Reach, Reservation, sleep_running};
-use crate::engine::budget::{Budget, Permit, text_tokens};
-use crate::engine::budget_notes::BudgetNotes;
 use crate::engine::circuit_breaker::{CircuitBreaker, EndReason};
-use crate::engine::in_flight_cost::InFlightCost;
+use crate::engine::costs::{
+    Budget, BudgetNotes, InFlightCost, MeasuredTokens, Permit, text_tokens,
+};
 use crate::engine::interrupt::Interrupt;
 use crate::engine::lanes::{Lanes, PreparedTrial};
-use crate::engine::measured_tokens::MeasuredTokens;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
 use crate::engine::suspects::Suspects;
 use crate::engine::truncation::TruncationCheck;
 use crate::error::{Error, Result};
-use crate::images::image_notes::ImageNotes;
 use crate::images::image_pipeline::EnhancerStopper;
+use crate::images::notes::ImageNotes;
 use crate::images::progress::{LINE_INTERVAL, Progress, TrialProgress};
 use crate::images::timings::{TimedStep, Timings};
-use crate::images::trial::{Item, PreparedGroup, Trial};
+use crate::images::trials::{Item, PreparedGroup, Trial};
 use crate::images::workers::unstarted;
 use crate::store::Store;
 use crate::types::{Digest, FailureKind, Finish, LostAttempts, Record, Reply, SetLight};
-use darkqa_score::image_dependence::{ImageDependence, LitReply};
-use darkqa_score::record::answered;
+use darkqa_score::answers::record::answered;
+use darkqa_score::answers::{ImageDependence, LitReply};
 
 /// Number of finished groups that may wait until they are asked about.
 const GROUPS_AHEAD: usize = 2;

@@ -5,16 +5,14 @@ use serde_json::Value;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
-use crate::images::plan::SourcePlan;
-use crate::images::recipe::Recipe;
-use crate::images::source::{Frames, Source};
-use crate::images::trial::Item;
+use crate::images::frames::{Frames, Source};
+use crate::images::recipes::Recipe;
+use crate::images::trials::{Item, SourcePlan};
 use crate::report::power::PowerForecast;
 use crate::runs::outcome::{Outcome, StdoutFormat};
 use crate::runs::stored::StoredRun;
 use crate::store::Store;
-use crate::types::manifest::PartPlace;
-use crate::types::manifest::{Columns, Identity};
+use crate::types::manifests::{Columns, Identity, PartPlace};
 use crate::types::{Record, RunQuestion};
 
 /// Record type of an experiment's trials.

@@ -9,7 +9,7 @@ use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::models::{AskSettings, ModelName};
 use crate::engine::settings::{JobSettings, RESULTS, RunPlace};
 use crate::error::{Error, Result};
-use crate::images::plan::Plan;
+use crate::images::trials::Plan;
 use crate::store::{self, AddressChange};
 use crate::types::{Digest, StoredDetail as _};
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::ask::ImagePlaces;
 use crate::engine::models::ModelUnderTest;
 use crate::error::Result;
-use crate::images::trial::Prompt;
+use crate::images::trials::Prompt;
 use crate::types::{Condition, Digest, QuestionId, TrialKey};
 
 /// All that decides a reply, as it enters the key of a trial. Question and condition are included, because built-in models answer by

@@ -5,7 +5,7 @@ use std::sync::{Arc, Weak};
 
 use crate::engine::models::ModelUnderTest;
 use crate::engine::open_files::ConnectionRoom;
-use crate::images::trial::{Stimulus, Trial};
+use crate::images::trials::{Stimulus, Trial};
 use crate::images::workers::ThreadArgs;
 use crate::text::words::counted;
 

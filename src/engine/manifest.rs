@@ -8,13 +8,13 @@ use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::identity;
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
-use crate::images::image_words::ImageWords;
-use crate::images::source::input_summary;
+use crate::images::frames::input_summary;
+use crate::images::recipes::image_words::ImageWords;
 use crate::runs::renamed::{self, OtherSettings};
 use crate::store::now;
-use crate::types::manifest::{Counts, RunManifest, RunPart, Status};
+use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
 use crate::types::{InputSummary, ListedModel, StoredDetail as _};
-use darkqa_score::record::Detail as _;
+use darkqa_score::answers::record::Detail as _;
 
 /// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
 ///

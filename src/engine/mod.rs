@@ -5,30 +5,22 @@
 //! their `Experiment`. Cost limits, resuming and batches are here, once.
 
 pub(crate) mod batch;
-pub(crate) mod budget;
-pub(crate) mod budget_notes;
 pub(crate) mod circuit_breaker;
+pub(crate) mod costs;
 pub(crate) mod dark_already;
 pub(crate) mod dispatch;
-pub(crate) mod estimate;
 pub(crate) mod experiment;
 pub(crate) mod folder;
 pub(crate) mod identity;
-pub(crate) mod in_flight_cost;
 pub(crate) mod interrupt;
 pub(crate) mod job;
 pub(crate) mod key_facts;
 pub(crate) mod lanes;
 pub(crate) mod manifest;
-pub(crate) mod measured_tokens;
 pub(crate) mod models;
-pub(crate) mod money;
 pub(crate) mod observer;
 pub(crate) mod open_files;
 pub(crate) mod open_run;
-pub(crate) mod plan_costs;
-pub(crate) mod planned_images;
-pub(crate) mod prompt_bounds;
 pub(crate) mod room_net;
 pub(crate) mod settings;
 pub(crate) mod suspects;

@@ -21,7 +21,7 @@ use serde_json::{Value, json};
 
 use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server};
 use crate::error::{Error, Result};
-use crate::images::trial::{Item, Stimulus, Trial};
+use crate::images::trials::{Item, Stimulus, Trial};
 use crate::runs::renamed::ADAPTED_FOR;
 use crate::types::{Condition, Record, View};
 

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::ask::{Call, Local, LocalAnswer, Random};
 use crate::error::{Error, Result};
-use crate::types::recent::Recent;
+use crate::types::values::Recent;
 use crate::types::{Digest, Question, Rgb};
 use darkqa_enhance::{Network, ROOM_NET, RuntimeSearch};
 use darkqa_questions::colors::Palette;

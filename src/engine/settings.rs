@@ -10,23 +10,23 @@ use clap::Args;
 use serde_json::Value;
 
 use crate::ask::{AccessArgs, Bounds, Constrain, Parameters, RequestArgs, Sending};
+use crate::engine::costs::{MoneyArgs, MoneySettings};
 use crate::engine::models::{
     AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline,
 };
-use crate::engine::money::{MoneyArgs, MoneySettings};
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::image_store::StoreArgs;
-use crate::images::conditions::check_used;
-use crate::images::enhancers::{self, EnhancerRunArgs};
-use crate::images::image_words::ImageWords;
+use crate::images::enhancement::enhancers::{self, EnhancerRunArgs};
+use crate::images::recipes::image_words::ImageWords;
+use crate::images::trials::check_used;
 use crate::picture::{ImageArgs, PayloadFormat};
 use crate::runs::outcome::{RecordTable, ShowArgs, StdoutFormat};
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
 use crate::store;
-use crate::types::flag::seconds;
-use crate::types::manifest::Columns;
+use crate::types::flags::seconds;
+use crate::types::manifests::Columns;
 use crate::types::{Decides, SetLight, View};
 use darkqa_enhance::{EnhancerArgs, ModelFile};
 use darkqa_light::{LightArgs, LightSettings};

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use crate::types::flag;
+use crate::types::flags::flag_words;
 
 /// Which images are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -13,4 +13,4 @@ pub(crate) enum StoredKinds {
     All,
 }
 
-flag::flag_words!(StoredKinds);
+flag_words!(StoredKinds);

@@ -10,7 +10,7 @@ use super::kinds::StoredKinds;
 use crate::error::Result;
 use crate::files::folder_access::FolderAccess;
 use crate::types::Decides;
-use crate::types::flag::positive;
+use crate::types::flags::positive;
 
 /// Flags of the folder in which images are kept for other runs.
 #[derive(Debug, Clone, Args)]

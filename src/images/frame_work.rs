@@ -8,13 +8,11 @@ use std::sync::Arc;
 
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
+use crate::images::frames::{DegradedAt, Source, SourceFrame, SourcePhotograph};
 use crate::images::image_steps::ImageSteps;
-use crate::images::photograph::SourcePhotograph;
-use crate::images::recipe::Recipe;
-use crate::images::source::{Source, SourceFrame};
-use crate::images::stored_images::StoredPlace;
+use crate::images::recipes::Recipe;
+use crate::images::stored::StoredPlace;
 use crate::images::timings::TimedStep;
-use crate::images::walk::DegradedAt;
 use crate::picture::Scaling;
 use crate::picture::bilinear;
 use crate::picture::{Payload, PayloadFormat};

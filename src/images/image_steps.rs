@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use crate::ask::ImageLimit;
 use crate::error::Result;
-use crate::images::recipe::Recipe;
-use crate::images::source::Frames;
-use crate::images::stored_images::{
+use crate::images::frames::Frames;
+use crate::images::recipes::Recipe;
+use crate::images::stored::{
     MadeNotes, Needed, Similarity, StoredImage, StoredImages, StoredPlace,
 };
 use crate::images::timings::{TimedStep, Timings};

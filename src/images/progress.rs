@@ -9,7 +9,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, P
 use tracing_subscriber::fmt::MakeWriter;
 
 use crate::report::forecast::{hours, money};
-use crate::types::shown_text::shown;
+use crate::types::text::shown;
 
 /// Progress on standard error: bars on a terminal, else a line a minute about the trials.
 #[derive(Debug, Clone)]

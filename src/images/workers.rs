@@ -7,7 +7,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::{Error, Result};
 use crate::types::Decides;
-use crate::types::flag::threads;
+use crate::types::flags::threads;
 
 /// Flag of the number of threads that make images.
 #[derive(Debug, Clone, Copy, Default, Args)]

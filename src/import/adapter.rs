@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::labels;
-use crate::types::flag::positive;
+use crate::types::flags::positive;
 use crate::types::{Decides, DepthKind, Intrinsics, Labels, Rgb, SegmentName, Segmentation};
 
 /// Flags that describe the maps and the camera of a data set.

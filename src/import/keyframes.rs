@@ -7,7 +7,7 @@ use clap::Args;
 use super::adapter::ListedFrame;
 use crate::error::{Error, Result};
 use crate::types::Decides;
-use crate::types::flag::positive;
+use crate::types::flags::positive;
 
 /// Flags that choose the frames of each scene.
 #[derive(Debug, Clone, Copy, Default, Args)]

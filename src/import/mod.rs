@@ -29,7 +29,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::types::flag::flag_words;
+use crate::types::flags::flag_words;
 
 pub(crate) use adapter::{Adapter, FrameMaps, ListedFrame, StatedArgs};
 pub(crate) use left_over::LeftOver;
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn every_kind_is_described_and_tested() {
         let page = include_str!("../docs/importing.md");
-        let tests = include_str!("../../tests/program/import.rs");
+        let tests = include_str!("../../tests/program/data/import.rs");
         let missing: Vec<String> = DataSetKind::value_variants()
             .iter()
             .map(ToString::to_string)
@@ -151,7 +151,7 @@ mod tests {
             .collect();
         assert!(
             missing.is_empty(),
-            "src/docs/importing.md or tests/program/import.rs lacks {missing:?}"
+            "src/docs/importing.md or tests/program/data/import.rs lacks {missing:?}"
         );
     }
 }

@@ -15,7 +15,7 @@ use crate::text::csv::fields;
 use crate::text::light_readings::LightReadings;
 use crate::text::table::{Table, TableRow};
 use crate::types::UnreadReason;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 
 /// A head, and the rows of tables as objects with the column names as keys.
 #[derive(Serialize)]

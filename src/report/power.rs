@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::text::words::counted;
 use darkqa_score::cluster::{ClusterUnit, Clusters};
-use darkqa_score::paired::POWER;
+use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
 use darkqa_score::tested_sentences::AskedSets;
 

@@ -21,12 +21,11 @@ use crate::text::light_readings::LightReadings;
 use crate::text::terminal::render;
 use crate::text::words::{counted, percent, reach_of};
 use crate::text::wrapped::{WIDTH, wrapped};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{Axis, AxisLevel};
-use darkqa_score::accuracy::AccuracyCell;
+use darkqa_score::accuracies::{AccuracyCell, Health};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::Grid;
-use darkqa_score::health::Health;
 use darkqa_score::subject::judged;
 
 /// Width of the column of intervals, in characters.

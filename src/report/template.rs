@@ -5,7 +5,7 @@ use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::types::shown_text::shown;
+use crate::types::text::shown;
 
 /// Parts that several pages share, each with its placeholder in the templates.
 const PARTS: [(&str, &str); 3] = [

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::image_store::{clear, listing};
 use crate::runs::Outcome;
 use crate::types::Decides;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// The flags of `cache`.
 #[derive(Debug, Args)]

@@ -16,7 +16,7 @@ use crate::images::workers::{ThreadArgs, pool};
 use crate::report::calibration;
 use crate::runs::Outcome;
 use crate::types::Decides;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// The flags of `calibrate`.
 #[derive(Debug, Args)]

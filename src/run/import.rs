@@ -20,7 +20,7 @@ use crate::dataset::FolderArgs;
 use crate::dataset::frame_folder::{self, FramePaths};
 use crate::error::{Error, Result};
 use crate::files::reading::open;
-use crate::images::input_tally::InputTally;
+use crate::images::frames::InputTally;
 use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::keyframes::{KeyFrameArgs, choose};
@@ -31,7 +31,7 @@ use crate::picture::ImageFile;
 use crate::picture::png;
 use crate::runs::Outcome;
 use crate::text::words::{counted, first_names};
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{Decides, FrameId, InputNote, Rgb, shell_word};
 
 /// Plausible median depths of a frame in millimetres (chosen). Outside this range the scale is wrong, or it shows a wall.

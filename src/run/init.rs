@@ -10,13 +10,13 @@ use crate::dataset::{DataPlace, Dataset, SceneArgs, SelectionArgs, SetArgs};
 use crate::error::{Error, Result};
 use crate::files::{reading, write};
 use crate::images::progress::Progress;
-use crate::images::questions::open_data;
+use crate::images::trials::questions::open_data;
 use crate::picture::ReadingRule;
 use crate::picture::png;
 use crate::runs::Outcome;
 use crate::text::words::counted;
-use crate::types::manifest::Status;
-use crate::types::question::letter;
+use crate::types::manifests::Status;
+use crate::types::questions::letter;
 use crate::types::{Choices, Decides, FrameId, Question, shell_word};
 use darkqa_questions::rules::Rules;
 

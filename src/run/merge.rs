@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
-use crate::images::thumbnail::MissingThumbnails;
+use crate::images::notes::thumbnail::MissingThumbnails;
 use crate::run_reports::{choice, open};
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
@@ -17,7 +17,7 @@ use crate::runs::run_parts::{MissingParts, RunParts, one_kind, runs_in};
 use crate::runs::stored::{ExperimentKind, StoredRun};
 use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The flags of `report merge`.
 #[derive(Debug, Args)]

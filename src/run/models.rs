@@ -14,7 +14,7 @@ use crate::images::progress::Progress;
 use crate::runs::Outcome;
 use crate::runs::shard::Shard;
 use crate::types::Decides;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// The flags of `models`.
 #[derive(Debug, Args)]

@@ -15,7 +15,7 @@ use crate::images::workers::{ThreadArgs, pool};
 use crate::picture::{exr, png};
 use crate::rooms::{self, Room, Rooms};
 use crate::runs::Outcome;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{Decides, FrameId, Labels, SegmentName};
 
 /// The flags of `rooms`.

@@ -17,7 +17,7 @@ use crate::run_reports::site as collected;
 use crate::runs::Outcome;
 use crate::runs::run_parts::any_run;
 use crate::types::Decides;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// The flags of `site`.
 #[derive(Debug, Args)]

@@ -14,10 +14,10 @@ use crate::tables::baseline;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::{first_names, name};
 use crate::types::{ChoiceDetail, TrialRef};
-use darkqa_score::baseline::{BaselineRow, baseline_rows};
+use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::{BaselineRow, baseline_rows};
 use darkqa_score::grid::Grid;
-use darkqa_score::health::healths;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::{Subject, is_control, is_observer};
 

@@ -20,7 +20,7 @@ use crate::runs::outcome::{StdoutFormat, Syntax};
 use crate::runs::stored::{ShownModels, StoredRun, name};
 use crate::store::Store;
 use crate::tables::{FLIPS, write_flips};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{ChoiceDetail, Truths};
 use darkqa_score::findings::Findings;
 

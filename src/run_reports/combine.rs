@@ -10,15 +10,15 @@ use super::listing::listing;
 use crate::error::{Error, Result};
 use crate::report::page::{self, PageInputs};
 use crate::runs::stored::StoredRun;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{
     ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word,
 };
-use darkqa_score::chance::OfferedChoices;
+use darkqa_score::accuracies::OfferedChoices;
 use darkqa_score::cluster::{ClusterUnit, Clusters, FrameTies};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
-use darkqa_score::photographed_set::PhotographedSet;
+use darkqa_score::photographs::PhotographedSet;
 use darkqa_score::subject::without_run;
 
 /// Several runs of questions with choices, joined.

@@ -6,7 +6,7 @@ use super::combine::Combined;
 use super::join::TrialPlaces;
 use crate::error::{Error, Result};
 use crate::types::{AskedItem, QuestionId};
-use darkqa_score::common::shared_items;
+use darkqa_score::accuracies::shared_items;
 
 /// Keeps the trials of the items to which every model with images has a reply in any condition; a model without any reply does not
 /// count.

@@ -8,9 +8,9 @@ use crate::ask::{Price, Prices};
 use crate::error::Result;
 use crate::report::forecast::money;
 use crate::text::words;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{TrialRef, Via};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// A run with the prices that it had.
 pub(super) struct PricedRun<'m> {

@@ -6,9 +6,7 @@ use super::join::JoinedRun;
 use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::counted;
-use crate::types::enhancer_note::{
-    ELSEWHERE, EnhancerNote, JudgedImages, ProbeOutcome, TRAINED_ON,
-};
+use crate::types::manifests::{ELSEWHERE, EnhancerNote, JudgedImages, ProbeOutcome, TRAINED_ON};
 
 /// A row for each enhancer; several runs that used it in the same way have one.
 pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {

@@ -8,12 +8,12 @@ use super::lights::Lights;
 use super::models::Names;
 use crate::error::Result;
 use crate::runs::stored::{RunLayout, RunTexts, StoredRun};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{
     Condition, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail, TrialKey,
     TrialRef, Trials,
 };
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The runs, with all trials, questions and thumbnails.
 pub(super) struct Joined<D: Detail> {

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::StoredRun;
 use crate::types::OpenDetail;
-use crate::types::manifest::{JUDGES, RunManifest, judge_flag};
+use crate::types::manifests::{JUDGES, RunManifest, judge_flag};
 
 /// Checks that all runs were marked by one judge and protocol.
 ///

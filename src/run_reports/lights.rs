@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{self, some};
 use crate::runs::stored::StoredRun;
-use crate::types::degradation::Kind;
-use crate::types::manifest::RunManifest;
+use crate::types::degradations::Kind;
+use crate::types::manifests::RunManifest;
 use crate::types::{Condition, Digest, EnhancerName, KindReading, LightGroup, TrialRef};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 use darkqa_score::subject::is_control;
 
 /// The conditions of one curve: a kind of degradation in a light reading, raw or with an enhancer, at all levels.

@@ -9,7 +9,7 @@ use super::settings::is_of_people;
 use crate::runs::renamed::ADAPTED_FOR;
 use crate::runs::training::training_data;
 use crate::types::{ModelColumn, ModelListing};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The order and the groups of the files of models of all runs, one after the other by the runs' names; and facts about each
 /// model.

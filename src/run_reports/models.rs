@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::settings::{Setting, Settings, differing, is_digest, parameters};
 use crate::runs::stored::StoredRun;
-use crate::types::keyed_flag::spelled_setting;
+use crate::types::flags::spelled_setting;
 use crate::types::{Condition, QuestionId, RunQuestion, TrialKey, TrialRef, View};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The most settings in the name of a model; with more, the run's name stands there.
 const MOST_SETTINGS: usize = 2;

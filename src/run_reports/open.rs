@@ -30,8 +30,8 @@ use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::outcome_words;
 use crate::text::table::Table;
-use crate::types::flag::read_word;
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::flags::read_word;
+use crate::types::manifests::{RunManifest, Status};
 use crate::types::{
     ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
 };

@@ -17,8 +17,8 @@ use crate::runs::stored::name;
 use crate::runs::{StdoutFormat, Syntax};
 use crate::text::alert::Alert;
 use crate::types::ChoiceDetail;
-use crate::types::manifest::RunManifest;
-use darkqa_score::self_agreement::SelfAgreement;
+use crate::types::manifests::RunManifest;
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
 
 /// The files of a report by name, and its text for standard output.
 pub(super) struct ReportOutput {

@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::runs::stored::RunLayout;
 use crate::store::{AddressChange, Store};
-use crate::types::manifest::RunManifest;
-use darkqa_score::record::Detail;
+use crate::types::manifests::RunManifest;
+use darkqa_score::answers::record::Detail;
 
 /// The folder that the report of one run is written into.
 pub(super) enum ReportFolder<'a, D: Detail> {

@@ -1,10 +1,10 @@
 //! Changes if stored replies are read by the rules of this version: [`LenientChange`].
 
 use crate::error::Result;
-use crate::types::manifest::{FIRST_REPLY_READING, RunManifest};
+use crate::types::manifests::{FIRST_REPLY_READING, RunManifest};
 use crate::types::{ChoiceDetail, Record};
+use darkqa_score::answers::record::reread;
 use darkqa_score::choice::LENIENT_VERSION;
-use darkqa_score::record::reread;
 
 /// How the lenient reading of stored replies changes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -29,10 +29,9 @@ use crate::runs::{StdoutFormat, Syntax};
 use crate::store::now;
 use crate::store::{AddressChange, Store};
 use crate::text::alert::Alert;
-use crate::types::manifest::Counts;
-use crate::types::manifest::Status;
+use crate::types::manifests::{Counts, Status};
 use crate::types::{ChoiceDetail, Decides, ModelColumn, OpenDetail, TrialRef, Truths};
-use darkqa_score::record::{self, Detail as _};
+use darkqa_score::answers::record::{self, Detail as _};
 
 /// The flags of `report`.
 #[derive(Debug, Args)]

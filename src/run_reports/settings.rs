@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
-use crate::types::degradation::Kind;
-use crate::types::keyed_flag::spelled_setting;
-use crate::types::manifest::{JUDGES, RunManifest};
+use crate::types::degradations::Kind;
+use crate::types::flags::spelled_setting;
+use crate::types::manifests::{JUDGES, RunManifest};
 
 /// Settings by flag, as text.
 pub(super) type Settings = BTreeMap<String, String>;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::error::{Error, Result};
 use crate::runs::stored::{ShownModels, StoredRun};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Name of the file with the rows of the summary.
 const SUMMARY_JSON: &str = "summary.json";

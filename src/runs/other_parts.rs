@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::runs::placed_trials::{append, trials_of};
 use crate::store::{self, Store};
-use crate::types::keyed_flag::spelled_setting;
-use crate::types::manifest::{RunManifest, differences};
+use crate::types::flags::spelled_setting;
+use crate::types::manifests::{RunManifest, differences};
 use crate::types::{FrameId, TextPlace, TrialKey};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The parts of a run in another number than now, as when a job array was stopped and goes on with another size.
 pub(crate) struct OtherParts(Vec<(PathBuf, RunManifest)>);

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::report::report_length::ReportLength;
 use crate::types::Decides;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// The status and output of a command that has ended.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use crate::report::forecast::money;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 
 /// The entry of a manifest's settings with the cost beyond `--max-cost`.
 const ENTRY: &str = "--max-cost exceeded";

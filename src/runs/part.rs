@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
-use crate::types::manifest::PartPlace;
+use crate::types::manifests::PartPlace;
 
 /// The questions about the sources of a shard, with the place of these sources; the place is `None` for everything.
 ///

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use crate::report::forecast::money;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 
 /// The entry of a manifest's settings with the share of a part, and what is spent and left of it, in US dollars.
 const ENTRY: &str = "--max-cost of this part";

@@ -7,10 +7,9 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::runs::renamed::rename;
 use crate::store::{RecordLog, Store, each_record};
-use crate::types::manifest::RunManifest;
-use crate::types::recorded_names::RecordedNames;
+use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{Record, TextPlace, TrialKey, Trials};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The bytes of records that are written at once. Chosen: fewer calls of the system than records.
 const CHUNK: usize = 1 << 20;

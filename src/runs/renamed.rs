@@ -8,12 +8,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 
 use crate::error::Result;
-use crate::types::control::OBSERVER;
-use crate::types::manifest::RunManifest;
-use crate::types::model_views::{Fit, StoredViews, Views};
-use crate::types::recorded_names::RecordedNames;
+use crate::types::manifests::{Fit, RecordedNames, RunManifest, StoredViews, Views};
+use crate::types::replies::OBSERVER;
 use crate::types::{Control, Digest, Record, Trials};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Prefix of the manifest settings that hold the changes to the requests to a model; the model's name follows.
 pub(crate) const ADAPTED_FOR: &str = "adapted for ";

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::error::{Error, Result};
 use crate::store::{RecordLog, each_question};
 use crate::types::{QuestionId, Record, RunQuestion, TextPlace};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Where the texts of a run's replies, and the evidence of its questions, are read.
 #[derive(Debug, Clone)]

@@ -10,12 +10,12 @@ use crate::runs::run_files::RunFiles;
 use crate::runs::run_texts::HeldTexts;
 pub(crate) use crate::runs::run_texts::RunTexts;
 use crate::store;
-use crate::types::manifest::{Counts, RunManifest, Status};
+use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
     ChoiceDetail, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record,
     RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
 };
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The models of a run that a report shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

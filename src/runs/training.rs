@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use darkqa_enhance::ModelFile;
 
 /// Data that each enhancer of a run was trained on, by its name: as the run noted them; of a run without a note, those of the

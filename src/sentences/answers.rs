@@ -3,11 +3,9 @@
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::alert::MAX_UNREAD;
 use crate::types::UnreadReason;
-use darkqa_score::claim::Claim;
-use darkqa_score::fidelity::{ConditionFidelity, FidelityFindings};
+use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::photographs::{ConditionFidelity, FidelityFindings};
 use darkqa_score::significance::ALPHA;
 
 /// Replies that could not be read, if they are few: an alert speaks of many, and of failed trials. Built-in models are not counted.

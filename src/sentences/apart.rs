@@ -7,10 +7,10 @@ use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
 use crate::types::{AxisLevel, KindReading, UnreadReason, View};
 use darkqa_score::choice::ReadingMode;
+use darkqa_score::comparisons::pool;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
-use darkqa_score::pooled::pool;
 use darkqa_score::subject::{Subject, is_reference};
 
 /// The accuracy of each of them at L0 and at its darkest level, and of the other models on the same questions.

@@ -1,11 +1,10 @@
 //! Sentences about new runs against an old one.
 
 use super::sentence::{Numbers, Sentence, Tone};
-use darkqa_score::baseline::BaselineRow;
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparison::MIN_PAIRS;
+use darkqa_score::comparisons::paired::POWER;
+use darkqa_score::comparisons::{BaselineRow, MIN_PAIRS};
 use darkqa_score::estimate::largest;
-use darkqa_score::paired::POWER;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::judged;
 

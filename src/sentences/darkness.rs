@@ -6,13 +6,11 @@ use super::pooled::{detail, mean_levels, reserved, runs, with_verdict};
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{KindReading, LightGroup};
-use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 
 /// The cost of darkness, or of another cause, in each topic.

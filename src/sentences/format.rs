@@ -2,10 +2,8 @@
 
 use super::sentence::{Numbers, Sentence, Tone, models};
 use crate::text::words::light;
-use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
+use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::significance::Significance;
 
 /// The finding that the strict parsing alone detects, if at least half of its difference is a difference in readable replies: of

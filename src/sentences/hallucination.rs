@@ -6,10 +6,10 @@ use super::pooled::{detail, runs, with_verdict};
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::words::family as family_name;
 use crate::types::{AxisLevel, Family, KindReading};
+use darkqa_score::answers::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
+use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::PooledFinding;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::Subject;
 

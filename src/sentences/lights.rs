@@ -4,10 +4,9 @@ use super::sample::is_impossible;
 use super::sentence::Sentence;
 use crate::text::words::light;
 use crate::types::KindReading;
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
+use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
 
 /// The variants that sentences speak of together: a kind and those that extend it.
 #[derive(Debug)]

@@ -40,9 +40,9 @@ use self::confidence::Confidence;
 use self::hallucination::TopAnswer;
 use self::lights::{findings_of_kind, in_each_light, means_of_set};
 use crate::types::{Family, KindReading};
-use darkqa_score::confusion::FalseAnswer;
+use darkqa_score::answers::confusion::FalseAnswer;
+use darkqa_score::comparisons::PooledKind;
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled_kind::PooledKind;
 
 /// The line below the sentences: how their signs, p-values and intervals are to be read.
 pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {

@@ -4,12 +4,9 @@ use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family;
 use crate::types::KindReading;
-use crate::types::degradation::{Axis, Kind};
-use darkqa_score::best::{BestInTheDark, Crossing};
-use darkqa_score::claim::Claim;
+use crate::types::degradations::{Axis, Kind};
+use darkqa_score::comparisons::{BestInTheDark, Claim, Crossing, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 
 /// The model that sees best in the dark, and those that it is not shown to be better than; if the order of the leaders in the light

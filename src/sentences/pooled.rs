@@ -3,9 +3,8 @@
 use super::format::format_alone;
 use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
 use crate::types::AxisLevel;
-use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::pooled::PooledFinding;
+use darkqa_score::comparisons::{Claim, PooledFinding};
 use darkqa_score::significance::Significance;
 use darkqa_score::subject;
 

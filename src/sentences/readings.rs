@@ -1,8 +1,8 @@
 //! The sentence about light readings: how many findings hold under all of them.
 
 use super::sentence::{Numbers, Sentence, Tone};
-use darkqa_score::by_reading::{FindingByReading, NoiseHypothesis, Robustness};
 use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::{FindingByReading, NoiseHypothesis, Robustness};
 
 /// How many findings about noise hold under which readings; `None` with one reading. The levels of one finding count once.
 pub(super) fn readings(found: &[FindingByReading], unit: ClusterUnit) -> Option<Sentence> {

@@ -2,11 +2,10 @@
 
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::words::light;
-use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparison::{Comparison, ComparisonKind};
+use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pair_darkness::PairDarkness;
+use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::judged;
 

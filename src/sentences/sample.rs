@@ -4,9 +4,8 @@ use super::sentence::{Numbers, Sentence, Tone, level_runs};
 use crate::text::words::light;
 use crate::types::{EnhancerName, KindReading};
 use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::{ModelsLeftOut, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::{ModelsLeftOut, PooledFinding};
-use darkqa_score::pooled_kind::PooledKind;
 
 /// Half-width of an interval in points above which the sample is called small.
 pub(super) const WIDE: f64 = 0.05;

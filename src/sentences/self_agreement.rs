@@ -5,11 +5,10 @@ use std::collections::BTreeSet;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::light;
 use crate::types::{AxisLevel, EnhancerName, KindReading, SetLight};
-use darkqa_score::claim::Claim;
-use darkqa_score::comparison::{Comparison, ComparisonKind};
-use darkqa_score::self_agreement::SelfAgreement;
-use darkqa_score::self_agreement::cell::{AgreementCell, CellRole};
-use darkqa_score::self_agreement::light::LightReplies;
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
+use darkqa_score::comparisons::self_agreement::light::LightReplies;
+use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::judged;
 

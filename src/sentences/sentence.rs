@@ -6,10 +6,9 @@ use serde::Serialize;
 
 use crate::text::words::{counted, p, points};
 use crate::types::{EnhancerName, ModelListing};
-use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::{Claim, PooledFinding};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::pooled::PooledFinding;
 use darkqa_score::significance::{Significance, SwapMethod};
 
 /// A finding in words.

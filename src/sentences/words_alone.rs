@@ -7,12 +7,9 @@ use super::pooled::{detail, runs, with_verdict};
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family as family_name;
 use crate::types::{Axis, AxisLevel, KindReading};
-use darkqa_score::claim::Claim;
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparison::{Comparison, ComparisonKind};
+use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 
 /// Second side of a comparison if the same models answered with images and without.

@@ -2,7 +2,7 @@
 
 use crate::text::table::ColumnKind::{Count, Ratio, Share, Text};
 use crate::text::table::{Table, TableBuilder};
-use darkqa_score::agreement::Agreement;
+use darkqa_score::comparisons::Agreement;
 
 pub(super) fn agreement(agreements: &[Agreement]) -> Table {
     TableBuilder::new("agreement", agreements)

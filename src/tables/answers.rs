@@ -2,7 +2,7 @@
 
 use crate::text::table::ColumnKind::{Count, Number, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder};
-use darkqa_score::confusion::{Collapse, Confusion, Hallucination};
+use darkqa_score::answers::confusion::{Collapse, Confusion, Hallucination};
 use darkqa_score::findings::Findings;
 
 pub(super) fn answers(findings: &Findings<'_>) -> Vec<Table> {

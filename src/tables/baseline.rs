@@ -3,8 +3,7 @@
 use crate::text::latex::escaped;
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
-use darkqa_score::baseline::{BaselineRow, BaselineSide};
-use darkqa_score::comparison::MIN_PAIRS;
+use darkqa_score::comparisons::{BaselineRow, BaselineSide, MIN_PAIRS};
 use darkqa_score::significance::Significance;
 
 /// Name of the table, and id of its section of the page.

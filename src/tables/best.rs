@@ -4,7 +4,7 @@ use crate::sentences::dark_levels;
 use crate::text::table::ColumnKind::{Number, P, Percent, Points, Significance, Text};
 use crate::text::table::{Table, TableBuilder};
 use crate::text::words::{light, points};
-use darkqa_score::best::{BestInTheDark, DarkAccuracy, DarkPair};
+use darkqa_score::comparisons::{BestInTheDark, DarkAccuracy, DarkPair};
 use darkqa_score::findings::Findings;
 
 /// Empty if there are fewer than two models.

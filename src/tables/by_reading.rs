@@ -5,12 +5,12 @@ use std::collections::BTreeSet;
 use crate::text::table::ColumnKind::{Count, Number, P, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::text::words::{self, ends_in_points, points, reach, stops};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, ReadingName};
-use darkqa_score::by_reading::{
+use darkqa_score::accuracies::Curve;
+use darkqa_score::comparisons::{
     EffectInReading, FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,
 };
-use darkqa_score::curve::Curve;
 use darkqa_score::findings::Findings;
 
 /// One row a claim and reading in the file; one row a claim, with a column a reading, for people. Empty with one reading.

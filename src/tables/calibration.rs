@@ -3,7 +3,7 @@
 use crate::text::table::ColumnKind::{Count, Number, Percent, Points, Ratio, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 use darkqa_score::auc::Auc;
 use darkqa_score::calibration::{Calibration, PositionShare, ReliabilityBin};
 use darkqa_score::estimate::Estimate;

@@ -7,7 +7,7 @@ use crate::text::table::{Column, Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::{counted, name};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparison::{Comparison, ComparisonKind, MIN_PAIRS};
+use darkqa_score::comparisons::{Comparison, ComparisonKind, MIN_PAIRS};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 

@@ -7,9 +7,8 @@ use crate::text::table::{ColumnHeads, Table, TableBuilder};
 use crate::text::words::{family as family_name, light, points};
 use crate::types::{AxisLevel, Family, FrameId, KindReading};
 use darkqa_score::choice::ReadingMode;
+use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 
 /// Most frames of a variant; chosen.

@@ -5,7 +5,7 @@ use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::View;
 use darkqa_score::auc::Auc;
-use darkqa_score::fidelity::{ConditionFidelity, FidelityFindings, Prediction};
+use darkqa_score::photographs::{ConditionFidelity, FidelityFindings, Prediction};
 use darkqa_score::subject::Subject;
 
 /// The measures in the order of [`ConditionFidelity::means`]: name in CSV files, and in text.

@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::text::csv;
 use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::{Table, TableBuilder};
+use darkqa_score::accuracies::FirstFailure;
 use darkqa_score::findings::Findings;
-use darkqa_score::flips::FirstFailure;
 
 /// The name of the file.
 pub(crate) const FLIPS: &str = "flips.csv";

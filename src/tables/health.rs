@@ -4,7 +4,7 @@ use crate::text::table::ColumnKind::{Count, Failures};
 use crate::text::table::{Table, TableBuilder};
 use crate::text::words::percent;
 use crate::types::{FailureKind, UnreadReason};
-use darkqa_score::health::Health;
+use darkqa_score::accuracies::Health;
 
 /// CSV columns of the reasons for unreadable replies, in the order of [`UnreadReason::ALL`].
 const UNREAD: [&str; UnreadReason::ALL.len()] = [

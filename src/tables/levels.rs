@@ -6,8 +6,8 @@ use crate::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::text::terminal::{differing, texts};
 use crate::text::words::{ends, percent};
 use crate::types::UnreadReason;
-use crate::types::degradation::Axis;
-use darkqa_score::accuracy::{AccuracyCell, AccuracySummary};
+use crate::types::degradations::Axis;
+use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::findings::Findings;
 

@@ -4,7 +4,7 @@ use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableFormat};
 use crate::text::words::percent;
 use crate::types::Control;
-use crate::types::control::OBSERVER;
+use crate::types::replies::OBSERVER;
 use darkqa_score::findings::Findings;
 use darkqa_score::observed::{ObserverCell, ObserverSummary};
 

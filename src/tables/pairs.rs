@@ -3,8 +3,8 @@
 use super::sections::REAL;
 use crate::text::table::ColumnKind::{Count, Number, Ratio, Share, Text};
 use crate::text::table::{Table, TableBuilder};
-use darkqa_score::agreement::Agreement;
-use darkqa_score::pair_darkness::PairDarkness;
+use darkqa_score::comparisons::Agreement;
+use darkqa_score::photographs::pair_darkness::PairDarkness;
 
 /// How dark the photographs are beside their frames, by name.
 pub(super) fn darkness(pairs: &[PairDarkness]) -> Table {

@@ -6,11 +6,10 @@ use crate::sentences::left_out;
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::text::table::{Table, TableBuilder};
 use crate::text::words::{counted, light, p};
+use darkqa_score::answers::confusion::FalseAnswer;
 use darkqa_score::choice::ReadingMode;
-use darkqa_score::confusion::FalseAnswer;
+use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::SwapMethod;
 
 /// All families together, then by family.

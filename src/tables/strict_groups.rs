@@ -4,10 +4,10 @@ use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::counted;
 use crate::types::{Family, KindReading, LightGroup};
+use darkqa_score::accuracies::{GroupCell, GroupChance, StrictScore};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::strict_score::{GroupCell, GroupChance, StrictScore};
 use darkqa_score::subject::{CHANCE, Subject};
 
 use super::summary::reading;

@@ -2,7 +2,7 @@
 
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
-use darkqa_score::accuracy::AccuracySummary;
+use darkqa_score::accuracies::AccuracySummary;
 use darkqa_score::choice::ReadingMode;
 
 pub(super) fn subjects(summary: &AccuracySummary) -> Table {

@@ -3,7 +3,7 @@
 use crate::text::table::ColumnKind::{Count, Share, Text};
 use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
 use crate::types::{LightGroup, ModelListing, PairDark};
-use darkqa_score::accuracy::{AccuracyCell, AccuracySummary};
+use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::subject::Subject;
 

@@ -6,9 +6,9 @@ use crate::text::table::ColumnKind::{Number, Share, Text, Threshold};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{counted, light};
 use crate::types::AxisLevel;
-use crate::types::degradation::Axis;
+use crate::types::degradations::Axis;
+use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ReadingMode;
-use darkqa_score::curve::Curve;
 use darkqa_score::findings::Findings;
 use darkqa_score::threshold::{CurveSummary, NoThreshold, ThinLevel};
 

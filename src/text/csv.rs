@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
 use crate::text::table::{SUMMARY, Table, TableCell};
-use crate::types::shown_text::{is_hidden, written_out};
+use crate::types::text::{is_hidden, written_out};
 
 /// One field of a row. A number has as many digits as are needed to read it back without loss.
 #[derive(Debug, Clone, Copy, Serialize)]

@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use crate::text::words::light;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{
     AxisLevel, EnhancerName, KindReading, LightGroup, ModelListing, SetLight, View,
 };
 use darkqa_score::findings::Findings;
-use darkqa_score::pair_darkness::PairDarkness;
+use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::subject::Subject;
 
 /// A model in one variant, raw or with one enhancer.

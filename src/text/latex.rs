@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use crate::text::words::{interval, percent, points, words};
-use crate::types::shown_text::shown;
+use crate::types::text::shown;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance;
 

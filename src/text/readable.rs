@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::types::shown_text::shown;
+use crate::types::text::shown;
 
 /// Maximum number of characters of a text on a page.
 const MAX_CHARS: usize = 4_000;

@@ -7,7 +7,7 @@ use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use crate::text::width;
 use crate::text::words::{interval, percent, points, reach, reach_of, stops, with_interval, words};
 use crate::text::wrapped::wrapped_to;
-use crate::types::manifest::{Counts, RunManifest, Status};
+use crate::types::manifests::{Counts, RunManifest, Status};
 
 /// The lenient number in brackets if it differs from the strict one; otherwise empty.
 pub(crate) fn differing(strict: &str, lenient: &str) -> String {

@@ -7,15 +7,12 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use darkqa_ground::types::{FrameId, Rgb, Severity};
-use darkqa_light::blur::blur;
-use darkqa_light::blur::blurred_codes;
 use darkqa_light::exposure::expose;
 use darkqa_light::exposure::expose_into;
-use darkqa_light::negative::Negative;
-use darkqa_light::negative::ladder as develop_ladder;
-use darkqa_light::noise::Term;
-use darkqa_light::noise::add as add_noise;
-use darkqa_light::unprocess::unprocess;
+use darkqa_light::movement::blur::{blur, blurred_codes};
+use darkqa_light::raw::negative::{Negative, ladder as develop_ladder};
+use darkqa_light::raw::noise::{Term, add as add_noise};
+use darkqa_light::raw::unprocess;
 use darkqa_light::{
     Amplify, AppliedDegradation, AutoExposure, CameraModel, Draws, Exposures, FrameView,
     LightReading, Motion, NoiseKey, Streak, Synthesis,
@@ -23,8 +20,8 @@ use darkqa_light::{
 use darkqa_picture::Payload;
 use darkqa_picture::PayloadFormat;
 use darkqa_picture::bilinear;
-use darkqa_score::realism::psnr;
-use darkqa_score::realism::ssim::ssim;
+use darkqa_score::photographs::realism::psnr;
+use darkqa_score::photographs::realism::ssim::ssim;
 
 /// A frame with edges, ramps and some texture, made by integer arithmetic.
 #[expect(clippy::unwrap_used, reason = "the size fits the samples")]

@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
 use std::path::Path;
 
-use crate::ask::secret::Scrub;
+use crate::ask::secrets::Scrub;
 use crate::files::{create_new, reading};
 
 /// Removes keys from the lines of a file. A file without any of them is not written again.

@@ -14,12 +14,10 @@ use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
 use super::batch::BatchLine;
-use super::bounded_json::parse;
-use super::complaint::Complaint;
-use super::connection::{Connection, Deadline, HttpReply};
-use super::failure::AskError;
+use super::endpoints::{Connection, Deadline, HttpReply};
+use super::failures::{AskError, Complaint, QuotaRefusal};
 use super::pace::asked_wait;
-use super::quota_refusal::QuotaRefusal;
+use super::replies::bounded_json::parse;
 use crate::types::FailureKind;
 
 use download::remove_secrets;

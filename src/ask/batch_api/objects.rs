@@ -2,9 +2,8 @@
 
 use serde_json::Value;
 
-use crate::ask::complaint::Complaint;
-use crate::ask::quota_refusal::QuotaRefusal;
-use crate::ask::secret::Scrub;
+use crate::ask::failures::{Complaint, QuotaRefusal};
+use crate::ask::secrets::Scrub;
 
 /// A file at a server.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! The fields of a chat completion's request that servers may refuse: [`fields`].
 
-use crate::ask::field::{AdaptableField, FieldState, RequestField, SentFields};
-use crate::ask::parameters::{Constrain, Temperature};
-use crate::ask::token_field::TokenField;
+use crate::ask::requests::{
+    AdaptableField, Constrain, FieldState, RequestField, SentFields, Temperature, TokenField,
+};
 use crate::ask::wire_kind::Wire;
 
 /// The remedy for a server that states no probabilities.

@@ -7,8 +7,7 @@ use super::json_body;
 use super::logprobs;
 use super::stream;
 use super::usage;
-use crate::ask::complaint::{Complaint, Unreadable, UnreadableReply};
-use crate::ask::wording::Wording;
+use crate::ask::failures::{Complaint, Unreadable, UnreadableReply, Wording};
 use crate::types::{Finish, Reply, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.

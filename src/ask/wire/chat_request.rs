@@ -4,14 +4,12 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::image_places::with_images;
-use crate::ask::body::Parts;
-use crate::ask::call::{Message, MessagePart, images};
-use crate::ask::constraint;
-use crate::ask::field::RequestFields;
-use crate::ask::parameters::{Constrain, ImageDetail, Parameters};
-use crate::ask::token_field::TokenField;
+use crate::ask::requests::{
+    Constrain, ImageDetail, Message, MessagePart, Parameters, Parts, RequestFields, TokenField,
+    constraint, images,
+};
 use crate::ask::wire_kind::Wire;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 
 /// The body of a request without its messages, which stand at its end.
 #[derive(Serialize)]

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use crate::ask::complaint::Unreadable;
+use crate::ask::failures::Unreadable;
 use crate::types::{Finish, Usage};
 
 /// The words of servers, by their meaning.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::ask::body::Parts;
+use crate::ask::requests::Parts;
 use crate::picture::Payload;
 
 /// A body of these fields and of one more of this name behind them, with the images in their places in it; their bytes are shared,

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
-use crate::ask::bounded_json::parse;
-use crate::ask::complaint::{Unreadable, UnreadableReply, page_title};
-use crate::ask::escapes;
+use crate::ask::failures::{Unreadable, UnreadableReply, page_title};
+use crate::ask::replies::bounded_json::parse;
+use crate::ask::replies::escapes;
 
 /// The reason why a body is not a reply, in words.
 pub(super) fn other(what: &str) -> UnreadableReply {

@@ -18,14 +18,10 @@ mod usage;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderName, HeaderValue};
 
-use super::body::Parts;
-use super::bounded_json::parse;
-use super::call::Message;
-use super::complaint::{Complaint, UnreadableReply};
-use super::field::{RequestField, RequestFields, SentFields};
-use super::key_header::KeyHeader;
-use super::parameters::Parameters;
-use super::secret::Secret;
+use super::failures::{Complaint, UnreadableReply};
+use super::replies::bounded_json::parse;
+use super::requests::{Message, Parameters, Parts, RequestField, RequestFields, SentFields};
+use super::secrets::{KeyHeader, Secret};
 use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::{Reply, Usage};

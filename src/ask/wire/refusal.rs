@@ -1,6 +1,6 @@
 //! Refusals of a wire: [`other_wire`], the one that the server asks for instead.
 
-use crate::ask::complaint::Complaint;
+use crate::ask::failures::Complaint;
 use crate::ask::wire_kind::Wire;
 
 /// The words by which servers state that they answer by event streams alone (Alibaba's model studio, ModelScope).

@@ -7,7 +7,7 @@ use super::json_body::{self, other};
 use super::logprobs;
 use super::stream;
 use super::usage;
-use crate::ask::complaint::{Complaint, Unreadable, UnreadableReply};
+use crate::ask::failures::{Complaint, Unreadable, UnreadableReply};
 use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.

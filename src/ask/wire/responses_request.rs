@@ -7,13 +7,11 @@ use serde_json::{Map, Value, json};
 
 use super::chat_fields::PROBABILITIES;
 use super::image_places::with_images;
-use crate::ask::body::Parts;
-use crate::ask::call::{Message, MessagePart, images};
-use crate::ask::constraint;
-use crate::ask::field::{AdaptableField, FieldState, RequestField, RequestFields, SentFields};
-use crate::ask::parameters::{Constrain, ImageDetail, Parameters, Temperature};
-use crate::ask::token_field::TokenField;
-use crate::types::question::letter;
+use crate::ask::requests::{
+    AdaptableField, Constrain, FieldState, ImageDetail, Message, MessagePart, Parameters, Parts,
+    RequestField, RequestFields, SentFields, Temperature, TokenField, constraint, images,
+};
+use crate::types::questions::letter;
 
 /// The body of a request without its input, which stands at its end.
 #[derive(Serialize)]

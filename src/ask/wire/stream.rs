@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::ask::bounded_json::{MOST_ITEMS, parse};
+use crate::ask::replies::bounded_json::{MOST_ITEMS, parse};
 
 /// Whether a body is an event stream, by its content type or its beginning.
 pub(super) fn is_stream(text: &str, content_type: &str) -> bool {

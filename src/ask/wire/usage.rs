@@ -96,7 +96,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::ask::prices::Price;
+    use crate::ask::costs::Price;
 
     /// Usages of seven vendors, with the prompt and the reply that their bill has.
     fn vendors() -> [(&'static str, Value, [u64; 2]); 8] {

@@ -2,7 +2,7 @@ use super::*;
 use crate::calibrate::hot_pixels::HotPixels;
 use crate::calibrate::layout::{Cfa, Layout};
 use crate::calibrate::sums::{Centres, PlaneSums, STEPS};
-use darkqa_light::quantile::tukey_lambda;
+use darkqa_light::draws::tukey_lambda;
 
 /// Residuals of a frame of 512 × 512 sites whose noise has these quantiles, in an order that looks random.
 fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {

@@ -11,7 +11,7 @@ use super::inputs::Inputs;
 use super::recording::SettingFiles;
 use super::sums::STEPS;
 use crate::error::{Error, Result};
-use darkqa_light::quantile::tukey_lambda;
+use darkqa_light::draws::tukey_lambda;
 use errors::Errors;
 pub(super) use fit::{FigurePoints, FrameCounts};
 pub(crate) use fit::{Measured, SettingFit};

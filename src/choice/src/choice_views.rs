@@ -2,12 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::clauses::Clauses;
-use super::clean;
-use super::plain::{fold, plain};
-use super::tokens::tokens;
-use super::words::Role;
-use darkqa_ground::types::question::Choices;
+use super::text::words::Role;
+use super::text::{Clauses, clean, fold, plain, tokens};
+use darkqa_ground::types::questions::Choices;
 
 /// Kind of thing that a choice names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,11 +4,10 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use super::clauses::Clauses;
-use super::clean::compiled;
 use super::names::{Delimiting, Name, NameState, continues_word, index_of, unspaced};
-use super::plain::RANGE;
-use super::words::Role;
+use super::text::clean::compiled;
+use super::text::words::Role;
+use super::text::{Clauses, RANGE};
 
 /// Words that can follow the letter A but not the article.
 pub(super) static AFTER_A: LazyLock<Regex> = LazyLock::new(|| {

@@ -14,44 +14,27 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod choice_views;
-mod clauses;
-mod clean;
-mod conditions;
-mod contradiction;
-mod denials;
-mod determiner;
-mod exclusions;
-mod first_line;
-mod image_words;
-mod lenient;
 mod letters;
 pub mod llm_match;
 mod markers;
 mod named;
 mod names;
 pub mod option_probabilities;
-mod plain;
-mod questions;
-mod ranges;
-mod reach;
-mod refusal;
-mod repetitions;
-mod stated;
-mod strict;
-mod structured;
+mod rules;
+mod states;
 #[cfg(test)]
 mod tests;
+mod text;
 mod texts;
-mod ticks;
-mod tokens;
 mod view;
-mod words;
-mod yes_no;
 
 use serde::Serialize;
 
-use darkqa_ground::types::question::{Answer, Choices, UnreadReason};
-use darkqa_ground::types::reply::{Finish, Reply};
+use darkqa_ground::types::questions::{Answer, Choices, UnreadReason};
+use darkqa_ground::types::replies::{Finish, Reply};
+
+use rules::{lenient, strict};
+use text::clean;
 
 /// The version of the lenient reading, raised whenever any reply may read differently. Records of another version are read again by
 /// `report --rescore`. The strict reading changed with `lenient/4` alone: marks of reasoning, and full-width signs around letters.

@@ -3,7 +3,7 @@
 
 use clap::ValueEnum;
 
-use darkqa_ground::types::flag::flag_words;
+use darkqa_ground::types::flags::flag_words;
 
 /// The rules by which answers are judged and a judge's reply is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -6,9 +6,9 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use super::clauses::Clauses;
-use super::clean::compiled;
-use super::words::Role;
+use super::text::Clauses;
+use super::text::clean::compiled;
+use super::text::words::Role;
 
 /// How strongly a marker announces an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use darkqa_ground::types::question::letter;
+use darkqa_ground::types::questions::letter;
 use darkqa_ground::types::{OptionProbabilities, Thought, TokenChances, TokenPosition};
 
 /// The number of tokens among which the first one of the answer is looked for; chosen.

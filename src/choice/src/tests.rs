@@ -10,8 +10,8 @@ use proptest::prelude::*;
 use serde::Deserialize;
 
 use super::{ReadingMode, read, readings};
-use darkqa_ground::types::question::{Answer, Choices, UnreadReason};
-use darkqa_ground::types::reply::{Finish, Reply};
+use darkqa_ground::types::questions::{Answer, Choices, UnreadReason};
+use darkqa_ground::types::replies::{Finish, Reply};
 
 /// One line of the table: the set of choices, the reply, and the expected answer in each mode.
 #[derive(Deserialize)]
@@ -346,7 +346,7 @@ proptest! {
     fn every_form_of_every_choice_is_read(set in 0..PLAIN_SETS, pick in 0..100usize, form in 0..8usize) {
         let choices = choices(SETS[set].0);
         let index = pick % choices.len();
-        let letter = darkqa_ground::types::question::letter(index);
+        let letter = darkqa_ground::types::questions::letter(index);
         let text = &choices.texts()[index];
         let (reply, strict) = match form {
             0 => (letter.to_string(), true),

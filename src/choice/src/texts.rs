@@ -1,11 +1,10 @@
 //! The texts of choices in a reply: [`texts`].
 
 use super::choice_views::{ChoiceViews, Naming};
-use super::determiner;
 use super::names::{Delimiting, Name, NameState, part_of_number, same_word};
-use super::plain::RANGE;
-use super::tokens::{Token, TokenKind};
-use super::words::{Role, phrase_at};
+use super::states::determiner;
+use super::text::words::{Role, phrase_at};
+use super::text::{RANGE, Token, TokenKind};
 
 /// A place where the text of a choice may stand.
 struct Candidate {

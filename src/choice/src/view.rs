@@ -1,19 +1,12 @@
 //! [`ReplyView`]: a plain text with every name of a choice in it, and the state of each.
 
 use super::choice_views::ChoiceViews;
-use super::clauses::Clauses;
-use super::conditions::conditional;
-use super::denials::denied;
-use super::exclusions::excluded;
-use super::image_words::image_colors;
 use super::letters::letters;
 use super::named::Names;
 use super::names::{Delimiting, Name, NameState};
-use super::questions::questioned;
-use super::ranges::Ranges;
-use super::repetitions::repetitions;
+use super::states::{conditional, denied, excluded, image_colors, questioned, repetitions};
+use super::text::{Clauses, Ranges, tokens};
 use super::texts::texts;
-use super::tokens::tokens;
 
 /// A plain text and the names of choices in it.
 pub(super) struct ReplyView<'a> {
@@ -56,7 +49,7 @@ impl Scopes {
 }
 
 impl<'a> ReplyView<'a> {
-    /// The view of a text; `folded` is [`fold`](super::plain::fold) of it.
+    /// The view of a text; `folded` is [`fold`](super::text::fold) of it.
     pub(super) fn new(text: &'a str, folded: &'a str, offered: &'a ChoiceViews) -> Self {
         let tokens = tokens(folded);
         let mut clauses = Clauses::new(folded, &tokens);

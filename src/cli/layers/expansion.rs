@@ -8,7 +8,7 @@ use clap::{Arg, ArgAction, Command};
 use super::layered_value::LayeredValue;
 use crate::cli::keyed::{name_of, with_value};
 use crate::error::{Error, Result};
-use crate::types::keyed_flag::{KEYED_FLAGS, KeyedFlag, KeyedSetting, spelled};
+use crate::types::flags::{KEYED_FLAGS, KeyedFlag, KeyedSetting, spelled};
 
 /// The keyed flags of a command, and the hidden flags that their keys set.
 pub(super) struct Expansion<'a>(pub(super) &'a Command);

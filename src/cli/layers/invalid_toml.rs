@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::error::Error;
-use crate::types::toml_fault::TomlFault;
+use crate::types::text::TomlFault;
 
 /// The error about invalid TOML, on one line and with its line number.
 pub(super) fn invalid_toml(path: &Path, text: &str, error: &toml::de::Error) -> Error {

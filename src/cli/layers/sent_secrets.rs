@@ -9,7 +9,7 @@ use std::path::Path;
 use super::layered_value::LayeredValue;
 use crate::ask::{BaseUrl, OPENAI_KEY, own_variables};
 use crate::error::{Error, Result};
-use crate::types::keyed_flag::spelled;
+use crate::types::flags::spelled;
 
 /// The flags that say where requests go, or who may read them on their way.
 const ADDRESSES: [&str; 3] = ["base-url", "judge-base-url", "ca-file"];

@@ -7,7 +7,7 @@ use clap::CommandFactory as _;
 
 use super::*;
 use crate::cli::{Cli, command};
-use crate::types::keyed_flag::spelled;
+use crate::types::flags::spelled;
 
 /// The command line, made once for all calls.
 static COMMAND: LazyLock<Command> = LazyLock::new(command::command);

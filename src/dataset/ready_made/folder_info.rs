@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use super::columns::map::Map;
 use super::container::Archive;
-use super::map::Map;
 use crate::error::{Error, Result};
 use crate::files::reading;
 

@@ -2,13 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::cell::Cell;
-use super::map::Map;
-use super::names::Role;
-use super::roles::{Column, column};
-use super::row::{Row, Table};
+use super::cells::{Cell, Row, Table};
+use super::choices::is_own;
+use super::columns::map::Map;
+use super::columns::names::Role;
+use super::columns::{Column, column};
 use super::summary::count;
-use super::truths::is_own;
 use crate::types::{Question, StrictGroup};
 
 /// How the group of a row follows from its cells.

@@ -1,18 +1,14 @@
 //! The rows of a set as questions without their truth: [`items`].
 
-use super::image_marks::ImageMarks;
-use super::images::ImagesAre;
-use super::left_out::{LeftOut, Why};
-use super::lettered::{Lettered, in_question};
-use super::map::flag;
-use super::names::{Role, without_endings};
-use super::offered::{AllOffered, Offered};
-use super::options::Options;
-use super::roles::{Asked, Column, InQuestion, Roles};
-use super::row::{Row, Table};
+use super::cells::{Row, Table, Turns};
+use super::choices::{AllOffered, Lettered, Offered, Options, in_question};
+use super::columns::map::flag;
+use super::columns::names::{Role, without_endings};
+use super::columns::{Asked, Column, InQuestion, Roles};
+use super::omissions::{LeftOut, Why};
+use super::pictures::{ImageMarks, ImagesAre};
 use super::settings::{SetArgs, SeveralImages};
-use super::turns::Turns;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -234,11 +230,11 @@ pub(super) enum AnswerCell {
 
 impl AnswerCell {
     pub(super) fn from_row(row: &Row, column: &Column) -> Self {
-        use super::cell::Cell;
+        use super::cells::Cell;
         let cell = column.cell(row);
         let items = match cell {
             Cell::List(cells) => cells.iter().map(Cell::text).collect(),
-            Cell::Text(text) => super::text_list::list(text),
+            Cell::Text(text) => super::cells::list(text),
             _ => None,
         };
         match (items.as_deref(), cell.text()) {

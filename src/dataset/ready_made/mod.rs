@@ -2,47 +2,26 @@
 //!
 //! 1. The files are found and opened (`container/`): TSV, CSV, JSON, JSON lines and Parquet; alone, in shards, or in a folder with or
 //!    without the card of a hub.
-//! 2. The columns are told by their names (`names.rs`, `roles.rs`), or by the user (`map.rs`).
-//! 3. Each row has its images (`images.rs`), its text and its options (`items.rs`, `options.rs`, `lettered.rs`).
-//! 4. The answers of all rows are read in one way (`answers.rs`, `truths.rs`). Where two ways fit and differ, nothing is guessed.
-//! 5. Rows that cannot be asked stop the reading, unless the user leaves them out (`left_out.rs`).
-//! 6. Questions get ids, families and frames (`frames.rs`), and the inferred mapping is printed (`summary.rs`).
+//! 2. The columns are told by their names, or by the user (`columns/`).
+//! 3. Each row (`cells/`) has its images (`pictures/`), its text and its options (`items.rs`, `choices/`).
+//! 4. The answers of all rows are read in one way (`choices/`). Where two ways fit and differ, nothing is guessed.
+//! 5. Rows that cannot be asked stop the reading, unless the user leaves them out (`omissions/`).
+//! 6. Questions get ids and frames (`pictures/`), and the inferred mapping is printed (`summary.rs`).
 //!
 //! No code is for one set alone; what well-known sets need beyond these rules stands in `sets.toml`.
 
-mod answer_column;
-mod answers;
-mod cell;
-mod column;
+mod cells;
+mod choices;
+mod columns;
 mod container;
-mod contradiction;
-mod family_column;
 mod folder_info;
-mod frames;
 mod groups;
-mod ids;
-mod image_marks;
-mod images;
 mod items;
-mod left_out;
-mod lettered;
-mod map;
-mod names;
-mod offered;
-mod options;
+mod omissions;
+mod pictures;
 mod preset;
-mod python_list;
-mod roles;
-mod row;
-mod scenes;
 mod settings;
-mod skip_bad;
-mod step;
 mod summary;
-mod template;
-mod text_list;
-mod truths;
-mod turns;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -54,33 +33,26 @@ use super::root::Root;
 use crate::error::{Error, Result};
 use crate::types::{Family, FrameId, Question};
 
+pub(super) use choices::one_line;
 pub(super) use container::{Archive, holds_files};
-pub(super) use frames::Series;
-pub(super) use images::EmbeddedImage;
-pub(super) use offered::one_line;
+pub(crate) use omissions::SkipBad;
+pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
-pub(super) use scenes::SceneNames;
 pub use settings::SetArgs;
-pub(crate) use skip_bad::SkipBad;
 pub(super) use summary::LEFT_OUT;
 
+use cells::Table;
+use choices::{Answered, is_own, truths};
+use columns::map::{How, Map};
+use columns::names::Role;
+use columns::{FamilyOf, Roles};
 use container::{FoundFiles, Joined, SetFile};
-use contradiction::leave_out;
-use family_column::FamilyOf;
 use folder_info::FolderInfo;
-use frames::Frames;
 use groups::{GroupRule, Groups};
-use ids::Ids;
-use images::ImagesAre;
 use items::{Cut, items};
-use left_out::{LeftOut, Why};
-use map::{How, Map};
-use names::Role;
-use roles::Roles;
-use row::Table;
-use scenes::Scenes;
+use omissions::{LeftOut, Why, leave_out};
+use pictures::{Frames, Ids, ImagesAre, Scenes};
 use summary::Summary;
-use truths::{Answered, is_own, truths};
 
 /// The set at a place: a file, a pattern of files, a folder, or several files.
 ///
@@ -455,7 +427,7 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     let are_there = table
         .rows
         .iter()
-        .any(|row| !images::images(row, roles).is_empty());
+        .any(|row| !pictures::images(row, roles).is_empty());
     if are_there {
         return problem;
     }
@@ -465,8 +437,8 @@ fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
         .unwrap_or("id");
     format!(
         "{problem}\n its columns:\n{}\n if files hold the images, say how they are named, e.g. {}",
-        roles::shown(table),
-        map::flag(Role::Image, &format!("images/{{{key}}}.jpg"), None)
+        columns::shown(table),
+        columns::map::flag(Role::Image, &format!("images/{{{key}}}.jpg"), None)
     )
 }
 

@@ -5,10 +5,10 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
+use super::cells::Table;
+use super::columns::map::Map;
+use super::columns::names::plain;
 use super::groups::columns;
-use super::map::Map;
-use super::names::plain;
-use super::row::Table;
 use super::settings::{LeaveOut, SetArgs, SeveralImages};
 
 /// The file of presets.

@@ -2,8 +2,8 @@
 
 use clap::{Args, ValueEnum};
 
-use super::map::Map;
-use super::skip_bad::SkipBad;
+use super::columns::map::Map;
+use super::omissions::SkipBad;
 use crate::dataset::root::RootArgs;
 use crate::types::Decides;
 

@@ -2,12 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::family_column::FamilyOf;
-use super::frames::Series;
+use super::cells::Table;
+use super::columns::{Asked, FamilyOf, Images, Roles};
 use super::items::Cut;
-use super::left_out::{LeftOut, Why};
-use super::roles::{Asked, Images, Roles};
-use super::row::Table;
+use super::omissions::{LeftOut, Why};
+use super::pictures::Series;
 use crate::dataset::image_source::ImageSource;
 use crate::types::{FrameId, Question};
 

@@ -6,7 +6,7 @@ use super::{Chart, LineItems, PanelContent, PlotLine};
 use crate::error::Result;
 use crate::text::script::embedded;
 use crate::text::words::{percent, with_interval};
-use crate::types::degradation::Axis;
+use crate::types::degradations::Axis;
 use darkqa_score::estimate::Estimate;
 
 /// A chart as data. Shares are between 0 and 1; texts are those of tables, so that the script rounds nothing.

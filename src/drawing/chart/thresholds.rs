@@ -1,6 +1,6 @@
 //! A figure of thresholds, a row for each curve: [`ThresholdChart`].
 
-use crate::types::degradation::Axis;
+use crate::types::degradations::Axis;
 use darkqa_score::threshold::Threshold;
 
 /// The scale of an axis: the exposure drops to L5, the darkest named level, or the exposure times of the ladder.

@@ -4,7 +4,7 @@ use super::Overview;
 use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
 use crate::text::words::family as family_name;
 use crate::types::Family;
-use darkqa_score::confusion::{Confusion, Hallucination};
+use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::estimate::Estimate;
 
 impl Overview<'_> {

@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, DarkMark, LineItems, LineStyle, Panel, PanelContent, PlotLine};
 use crate::text::words::{counted, family as family_name, light_with, names_enhancer};
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::estimate::Estimate;

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{ACCURACY, Names, Overview, horizontal_lines};
 use crate::drawing::chart::{Chart, LineItems, LineStyle, Panel, PanelContent, PlotLine};
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::CHANCE;

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use super::{Names, Overview};
 use crate::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
 use crate::text::words::family as family_name;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
 use darkqa_score::choice::ReadingMode;
+use darkqa_score::comparisons::PooledKind;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::subject::Subject;
 
 /// The words about marks in captions.

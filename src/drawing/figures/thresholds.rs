@@ -7,8 +7,8 @@ use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::thresholds::{Scale, ThresholdChart, ThresholdRow};
 use crate::tables::level_words;
 use crate::text::words::stops;
-use crate::types::degradation::Axis;
-use darkqa_score::curve::Curve;
+use crate::types::degradations::Axis;
+use darkqa_score::accuracies::Curve;
 use darkqa_score::findings::Findings;
 
 /// The names of the figures.

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use crate::drawing::paper::Palette;
     use crate::types::Severity;
-    use crate::types::degradation::Kind;
+    use crate::types::degradations::Kind;
 
     /// Names of the labelled levels of an axis with L0 and these drops in hundredths of an EV.
     fn labelled(drops: impl IntoIterator<Item = u16>) -> Vec<String> {

@@ -187,7 +187,7 @@ mod tests {
     use crate::drawing::paper::font::Font;
     use crate::drawing::paper::look::column_look as look;
     use crate::types::Severity;
-    use crate::types::degradation::Kind;
+    use crate::types::degradations::Kind;
 
     fn share(value: f64) -> Estimate {
         Estimate {

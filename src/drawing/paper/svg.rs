@@ -10,7 +10,7 @@ use super::sheet::{Colour, Mark, Place, Sheet, Stroke, Turn, Words};
 use crate::drawing::chart::INK;
 use crate::error::Result;
 use crate::types::Rgb;
-use crate::types::shown_text::shown;
+use crate::types::text::shown;
 
 /// How a picture is written as PNG.
 pub(crate) type Png<'a> = &'a dyn Fn(&Rgb) -> Result<Vec<u8>>;

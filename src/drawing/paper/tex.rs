@@ -9,7 +9,7 @@ use super::sheet::{Colour, Stroke};
 use crate::drawing::chart::{Chart, Panel, PanelContent, PlotLine};
 use crate::text::latex::escaped;
 use crate::types::AxisLevel;
-use crate::types::shown_text::shown;
+use crate::types::text::shown;
 
 /// Room left of the first axes, between axes, and right of the last ones, in heights of letters.
 const FIRST: f64 = 4.6;

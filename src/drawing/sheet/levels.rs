@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::{CELL, GAP, LINE, SheetCanvas, fitted, letter_width, lines, mean};
-use crate::types::degradation::Axis;
+use crate::types::degradations::Axis;
 use crate::types::{AxisLevel, Rgb};
 
 /// The images of a frame at the levels of one axis.
@@ -184,7 +184,7 @@ fn brightened(factor: u16) -> [u8; 256] {
 mod tests {
     use super::*;
     use crate::types::Severity;
-    use crate::types::degradation::Kind;
+    use crate::types::degradations::Kind;
 
     fn grey(height: usize, width: usize, code: u8) -> Rgb {
         Rgb::new(height, width, vec![code; height * width * 3]).unwrap()

@@ -252,7 +252,7 @@ fn write_labels(
 mod tests {
     use super::*;
     use crate::types::Severity;
-    use crate::types::degradation::Kind;
+    use crate::types::degradations::Kind;
     use darkqa_score::estimate::Estimate;
 
     fn level(severity: Severity) -> AxisLevel {

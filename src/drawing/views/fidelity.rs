@@ -6,11 +6,11 @@ use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
 use crate::drawing::figures::Drawing;
 use crate::text::words::light;
-use crate::types::degradation::{Axis, Kind};
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, KindReading};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::fidelity::ConditionFidelity;
 use darkqa_score::findings::Findings;
+use darkqa_score::photographs::ConditionFidelity;
 
 /// A light: a variant, raw or with an enhancer.
 type Light<'f> = (&'f KindReading, Option<&'f EnhancerName>);

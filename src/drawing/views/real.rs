@@ -5,7 +5,7 @@ use crate::drawing::chart::bars::{Bar, BarChart, BarPanel};
 use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::figures::Drawing;
 use darkqa_score::choice::ReadingMode;
-use darkqa_score::comparison::ComparisonKind;
+use darkqa_score::comparisons::ComparisonKind;
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::Subject;
 

@@ -12,7 +12,7 @@ use super::event::Event;
 use super::take_over::for_each_line;
 use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
 use crate::error::{Error, Result};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Bytes that a reply may have; chosen: far more than the longest reply of a reasoning model.
 const MOST_REPLY_BYTES: u64 = 4 << 20;

@@ -15,14 +15,14 @@ use super::settings::BatchRunArgs;
 use super::stopped::Stopped;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::{AskError, BaseUrl};
+use crate::engine::costs::MoneySettings;
 use crate::engine::models::ModelUnderTest;
-use crate::engine::money::MoneySettings;
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::store::Store;
 use crate::types::TrialKey;
-use crate::types::manifest::RunManifest;
-use darkqa_score::record::Detail;
+use crate::types::manifests::RunManifest;
+use darkqa_score::answers::record::Detail;
 
 /// Maximum wait between two checks of the batches, as a multiple of `--poll`; chosen: 5 minutes with the default of 10 s.
 const MAX_WAIT_POLLS: u32 = 30;

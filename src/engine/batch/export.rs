@@ -10,14 +10,13 @@ use crate::engine::dark_already;
 use crate::engine::experiment::Experiment;
 use crate::engine::open_run::{OpenRun, Remaining, every_model, limit, missing_notes, pipeline};
 use crate::error::{Error, Result};
-use crate::images::image_maker::Maker;
-use crate::images::plan::Plan;
-use crate::images::stored_images::StoredImages;
+use crate::images::recipes::Maker;
+use crate::images::stored::StoredImages;
 use crate::images::timings::Timings;
-use crate::images::trial::Item;
+use crate::images::trials::{Item, Plan};
 use crate::images::workers::pool;
 use crate::runs::outcome::Outcome;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// How input files are written.
 pub(super) struct Target<'a, I: Item> {

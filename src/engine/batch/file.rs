@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::files::create_new;
 use crate::store::Store;
 use crate::types::Record;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Extension of a file until it is complete.
 pub(super) const PART: &str = "part";

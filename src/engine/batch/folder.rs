@@ -19,8 +19,8 @@ use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::unstarted;
 use crate::store::Store;
-use crate::types::manifest::RunManifest;
-use darkqa_score::record::Detail;
+use crate::types::manifests::RunManifest;
+use darkqa_score::answers::record::Detail;
 
 /// The task for the batches of a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

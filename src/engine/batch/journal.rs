@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::store::{BATCH, BATCH_STATE, now};
 use crate::types::Digest;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 
 /// Number of digits of a run's hash.
 const HASH_DIGITS: usize = 16;

@@ -9,10 +9,9 @@ use super::event::{Event, PartFacts};
 use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
 use crate::ask::QuotaRefusal;
-use crate::engine::budget::{Answering, Budget};
-use crate::engine::in_flight_cost::InFlightCost;
+use crate::engine::costs::{Answering, Budget, InFlightCost};
 use crate::error::Result;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// How many looks long nothing is submitted after the first refusal; chosen: a minute with the default of 10 s.
 const FIRST_HOLD: u32 = 6;

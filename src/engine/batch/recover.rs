@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::files::create_new;
 use crate::store::Store;
 use crate::types::TrialKey;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Completes the files of parts whose requests the run has recorded, as far as it has; deletes the others.
 pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Result<()> {

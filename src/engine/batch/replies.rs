@@ -10,10 +10,10 @@ use crate::ask::{Constrain, TokenBound};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::store::Store;
-use crate::types::flag::read_word;
-use crate::types::manifest::RunManifest;
+use crate::types::flags::read_word;
+use crate::types::manifests::RunManifest;
 use crate::types::{Failure, FailureKind, LostAttempts, Record, Reply, TrialKey, Unstated, Usage};
-use darkqa_score::record::{Detail, answered};
+use darkqa_score::answers::record::{Detail, answered};
 
 /// Numbers of lines, by what they led to.
 #[derive(Debug, Default)]

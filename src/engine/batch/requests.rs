@@ -11,7 +11,7 @@ use super::servers::account;
 use crate::ask::BatchInterface;
 use crate::engine::models::ModelUnderTest;
 use crate::error::{Error, Result};
-use crate::images::trial::{Item, PreparedGroup, Stimulus, Trial};
+use crate::images::trials::{Item, PreparedGroup, Stimulus, Trial};
 use crate::store::BATCH;
 use crate::text::words::counted;
 

@@ -15,22 +15,21 @@ use super::servers::Servers;
 use super::settings::BatchRunArgs;
 use super::stopped::Stopped;
 use super::summary;
-use crate::engine::budget::{Answering, Budget};
-use crate::engine::budget_notes::BudgetNotes;
 use crate::engine::circuit_breaker::EndReason;
+use crate::engine::costs::{Answering, Budget, BudgetNotes};
 use crate::engine::experiment::Experiment;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::open_run::{OpenRun, Remaining, answered, every_model};
 use crate::error::{Error, Result};
-use crate::images::enhancers::{self, OpenEnhancers};
-use crate::images::trial::Item as _;
+use crate::images::enhancement::enhancers::{self, OpenEnhancers};
+use crate::images::trials::Item as _;
 use crate::images::workers::unstarted;
 use crate::report::forecast::money;
 use crate::runs::outcome::Outcome;
 use crate::store::StoredTrial;
 use crate::types::TrialKey;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// How often what a batch did not answer is asked again in another one; chosen.
 const MOST_REPEATS: usize = 3;
@@ -260,8 +259,8 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             BudgetNotes::new(models).say_unlimited(budget.spending());
         }
         let replies = reply_lengths(models, &remaining.stored);
-        let cost = |trial: &_, stimulus: &crate::images::trial::Stimulus| {
-            let trial: &crate::images::trial::Trial<E::Item> = trial;
+        let cost = |trial: &_, stimulus: &crate::images::trials::Stimulus| {
+            let trial: &crate::images::trials::Trial<E::Item> = trial;
             let model = &models[trial.model];
             let images = stimulus.images.iter().map(|image| image.facts());
             let tokens = budget.expected_tokens(model, trial, images.clone());

@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::types::Decides;
-use crate::types::flag::{positive, seconds};
+use crate::types::flags::{positive, seconds};
 
 /// Flags for looking after batches.
 #[derive(Debug, Clone, Args)]

@@ -11,7 +11,7 @@ use super::file::hexadecimal;
 use super::take_over::for_each_line;
 use crate::error::{Error, Result};
 use crate::files::create_new;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Extension of a piece until the journal has it.
 pub(super) const PIECE: &str = "split";

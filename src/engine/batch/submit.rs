@@ -6,7 +6,7 @@ use crate::ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
 use crate::ask::{AskError, BatchInterface};
 use crate::error::{Error, Result};
 use crate::report::forecast::money;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// How many uploads or creations in a row at which the server fails end the work for a model; chosen: 15 minutes by
 /// [`hold`](Driver::hold) with the default of `--poll`.

@@ -12,7 +12,7 @@ use crate::ask::Model;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::{Failure, FailureKind, TrialKey};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 impl<'a, D: Detail> Driver<'a, D> {
     /// Reads the replies of a part into the records of the run. What has no line may be asked again.

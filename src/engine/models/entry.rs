@@ -12,7 +12,7 @@ use super::name::ModelName;
 use crate::ask::Price;
 use crate::error::{Error, Result};
 use crate::types::View;
-use crate::types::near_name::{nearest, question};
+use crate::types::text::near_name::{nearest, question};
 
 /// Keys of a model that are no flags, or have another form than the flag.
 const OWN: [&str; 10] = [

@@ -9,7 +9,7 @@ use toml::{Spanned, Table, Value};
 use crate::ask::{is_secret_name, is_secret_value, looks_like_key};
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::types::toml_fault::{TomlFault, line_at};
+use crate::types::text::{TomlFault, line_at};
 
 /// The number of characters from which the value of a header with a telling name is taken for a secret; chosen.
 const LONG: usize = 20;

@@ -7,7 +7,7 @@ use crate::ask::Prices;
 use crate::engine::{observer, room_net};
 use crate::error::{Error, Result};
 use crate::types::Control;
-use crate::types::near_name::is_nearly;
+use crate::types::text::near_name::is_nearly;
 
 /// A model as flags and files name it.
 #[derive(Debug, Clone, PartialEq, Eq)]

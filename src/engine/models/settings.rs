@@ -17,8 +17,7 @@ use super::trust::{self, Trust};
 use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
-use crate::types::manifest::Columns;
-use crate::types::model_views::Views;
+use crate::types::manifests::{Columns, Views};
 use crate::types::{ListedModel, View};
 
 /// One model of a run, with all that its requests need.

@@ -10,27 +10,21 @@ use std::path::PathBuf;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::{Digest, EnhancerName, Rgb, SizeLog};
 
-use super::describe::Description;
+use super::conventions::{Description, sidecar};
 use super::failure::{RunFailure, by, unusable};
-use super::fed_image::DarkImage;
-use super::file::ModelFile;
-use super::frozen::traced_sizes;
-use super::graph::{Graph, LoadLimits, RunResult};
-use super::memory_check::{MemoryCheck, no_memory};
-use super::memory_limit::MemoryLimit;
+use super::files::{ModelFile, RandomOperators, traced_sizes};
+use super::graphs::{Graph, GraphSource, LoadLimits, RunResult, Stopper};
+use super::inputs::DarkImage;
+use super::libraries::Runtime;
+use super::limits::{MOST_ENDED, MemoryCheck, MemoryLimit, TimeLimit, no_memory};
+use super::outputs::OutOfRange;
 use super::planes::Planes;
-use super::random_operators::RandomOperators;
-use super::reach::{self, Context};
-use super::reading::OutOfRange;
-use super::runtime::Runtime;
-use super::session::{GraphSource, Stopper};
-use super::sidecar;
-use super::size_plan::{NoPlan, SeamRule, SizePlan, SizeRule, global, seams_differ};
-use super::size_search::{MULTIPLES, SizeSearch, TakenSizes, not_found};
-use super::sizes::{count_image, count_planned};
-use super::tiles::{TileWindow, TiledImage, Tiling};
-use super::time_limit::{MOST_ENDED, TimeLimit};
-use super::usage::Usage;
+use super::probes::Usage;
+use super::sizing::reach::{self, Context};
+use super::sizing::{
+    MULTIPLES, NoPlan, SeamRule, SizePlan, SizeRule, SizeSearch, TakenSizes, TileWindow,
+    TiledImage, Tiling, count_image, count_planned, global, not_found, seams_differ,
+};
 
 /// How an image of another size reaches a model of a fixed size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

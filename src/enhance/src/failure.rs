@@ -4,10 +4,10 @@
 
 use std::time::Duration;
 
-use super::convention::ValueRange;
-use super::library::PINNED;
-use super::memory_limit::MemoryLimit;
-use super::reading::OutOfRange;
+use super::conventions::ValueRange;
+use super::libraries::PINNED;
+use super::limits::MemoryLimit;
+use super::outputs::OutOfRange;
 
 /// Newest IR version of ONNX that ONNX Runtime 1.31.1 reads; measured with models of each version.
 const PINNED_IR: u32 = 13;

@@ -20,95 +20,48 @@
 //! [`ModelFile::read`] needs no runtime: a file that is not an ONNX model
 //! is refused before anything is searched or installed, and a resumed run knows its digest.
 //!
-//! [`Enhancer::enhance`] makes a plan for the size of an image (`size_plan`): whole, padded, in tiles, or resized if a flag allows it.
-//! Properties that a graph does not declare are found by trial: the multiple or the traced size that it accepts (`size_search`, `frozen`),
-//! and how far a pixel sees (`reach`). Memory is estimated before (`memory_check`), time is limited (`time_limit`), and a library is
-//! checked before it is loaded (`library_file`, `receipt`).
+//! [`Enhancer::enhance`] makes a plan for the size of an image (`sizing`): whole, padded, in tiles, or resized if a flag allows it.
+//! Properties that a graph does not declare are found by trial: the multiple or the traced size that it accepts (`sizing/size_search`,
+//! `files/frozen`), and how far a pixel sees (`sizing/reach`). Memory is estimated before and time is limited (`limits`), and a library is
+//! checked before it is loaded (`libraries`).
 //!
 //! A wrong convention gives a wrong image and no error. So a model is tried on dark frames before a run ([`Enhancer::probe`]), and its
-//! images are checked during it ([`Usage::judge`]), both by the rules in `plausible`. `doctor` shows the model's images with each
-//! convention.
+//! images are checked during it ([`Usage::judge`]), both by the rules in `probes/plausible`. `probes/doctor` shows the model's images with
+//! each convention.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
-mod built_in;
-mod channel_slice;
-mod composition;
-mod control_group;
-mod convention;
-mod describe;
-mod doctor;
+mod conventions;
 mod enhanced_folder;
 mod enhancer;
-mod expression;
-mod extra;
+mod expressions;
 mod failure;
-mod fed_image;
-mod feeding;
-mod file;
-mod findings;
-mod frozen;
-mod further_input;
-mod graph;
-mod install;
-mod library;
-mod library_file;
-mod memory;
-mod memory_check;
-mod memory_limit;
-mod network;
-mod noise;
-mod onnx_message;
-mod output;
-mod parser;
+mod files;
+mod graphs;
+mod inputs;
+mod libraries;
+mod limits;
+mod outputs;
 mod planes;
-mod plausible;
-mod port;
-mod preset;
-mod probe;
-mod probe_run;
-mod protobuf;
-mod random_operators;
-mod reach;
-mod reading;
-mod receipt;
-pub mod runtime;
-mod runtime_thread;
-mod search;
-mod session;
+mod probes;
 mod settings;
-mod sidecar;
-mod signature;
-mod size_plan;
-mod size_search;
-mod sizes;
-mod tensor;
-mod term;
-mod texture;
-mod tiles;
-mod time_limit;
-mod usage;
-mod weights;
+mod sizing;
 
+pub use conventions::preset::list_of_presets;
 pub use darkqa_models::ROOM_NET;
-pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
 pub use enhanced_folder::EnhancedFolder;
 pub use enhancer::twin::sets_in_memory;
 pub use enhancer::{Enhancer, Fitting};
-pub use file::ModelFile;
-pub use findings::Findings;
-pub use graph::LoadLimits;
-pub use memory_limit::MemoryLimit;
-pub use network::Network;
-pub use plausible::{DARK, brightness};
-pub use preset::list_of_presets;
-pub use probe::FRAMES;
-pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
-pub use session::Stopper;
+pub use files::ModelFile;
+pub use graphs::{LoadLimits, Network, Stopper};
+pub use libraries::{Install, Runtime, RuntimeSearch, forbid_telemetry};
+pub use limits::{MemoryLimit, TimeLimit};
+pub use probes::{
+    DARK, Examination, FRAMES, Findings, ImageOutput, ImageUse, Implausible, ProposedLine, Settled,
+    Usage, brightness,
+};
 pub use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
-pub use tiles::Tiling;
-pub use time_limit::TimeLimit;
-pub use usage::{ImageUse, Implausible, Usage};
+pub use sizing::Tiling;
 
 /// Version of feeding and reading models, raised whenever a pixel changes, so that results of an older version are not
 /// reused.

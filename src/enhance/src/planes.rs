@@ -3,8 +3,8 @@
 use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Luma};
 
-use super::convention::{Channels, Rounding};
-use super::term::Sample;
+use super::conventions::{Channels, Rounding};
+use super::expressions::Sample;
 use darkqa_ground::types::Rgb;
 
 /// Image of planes, one after the other, with samples in 0..1: red, green and blue, or a single one.

@@ -8,11 +8,10 @@ use clap::Args;
 
 use super::enhanced_folder::EnhancedFolder;
 use super::enhancer::Fitting;
-use super::memory_limit::MemoryLimit;
-use super::runtime::{Install, RuntimeSearch};
-use super::tiles::Tiling;
-use super::time_limit::TimeLimit;
-use super::usage::Implausible;
+use super::libraries::{Install, RuntimeSearch};
+use super::limits::{MemoryLimit, TimeLimit};
+use super::probes::Implausible;
+use super::sizing::Tiling;
 use darkqa_ground::types::{Decides, SetLight, TreatmentSet};
 
 /// The enhancers, and the images that they enhance.

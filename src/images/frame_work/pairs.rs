@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::FrameWork;
 use crate::error::{Error, Result};
-use crate::images::photograph::matched;
+use crate::images::frames::matched;
 use crate::images::timings::TimedStep;
 use crate::picture::Payload;
 use crate::types::{Condition, FrameId, PairDark, PairFacts, PhotoName, Treatment};

@@ -5,15 +5,13 @@ use std::time::Instant;
 
 use super::ImagePipeline;
 use crate::error::Result;
-use crate::images::dark_frames::{DarkFrames, dark_frames};
-use crate::images::enhanced_images::EnhancedImages;
-use crate::images::enhancers::{EnhancerRunArgs, Model};
+use crate::images::enhancement::enhancers::{EnhancerRunArgs, Model};
+use crate::images::enhancement::{DarkFrames, EnhancedImages, RestingEnhancer, dark_frames};
 use crate::images::frame_work::FrameWork;
-use crate::images::plan::SourcePlan;
-use crate::images::resting_enhancer::RestingEnhancer;
-use crate::images::source::Source;
-use crate::images::stored_findings::FindingsPlace;
+use crate::images::frames::Source;
+use crate::images::stored::FindingsPlace;
 use crate::images::timings::TimedStep;
+use crate::images::trials::SourcePlan;
 use crate::types::EnhancerName;
 use darkqa_enhance::{Enhancer, FRAMES, Findings, Stopper, Usage};
 

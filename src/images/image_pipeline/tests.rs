@@ -4,10 +4,10 @@ use std::num::NonZeroU32;
 
 use super::*;
 use crate::dataset::Dataset;
-use crate::images::image_notes::WantedNotes;
-use crate::images::recipe::Recipe;
+use crate::images::frames::{CameraOf, DegradedAt};
+use crate::images::notes::WantedNotes;
+use crate::images::recipes::Recipe;
 use crate::images::timings::Timings;
-use crate::images::walk::{CameraOf, DegradedAt};
 use crate::picture::PayloadFormat;
 use crate::picture::Scaling;
 use darkqa_light::KindSettings;
@@ -81,7 +81,7 @@ fn thumbnails_show_what_was_sent() {
         for how in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
             let (image, notes, _) = pipeline_output(condition, how, true);
             let thumbnail = notes.thumbnail.unwrap();
-            let of_file = crate::images::thumbnail::thumbnail(
+            let of_file = crate::images::notes::thumbnail::thumbnail(
                 &thumbnail.frame,
                 &thumbnail.condition,
                 &image,

@@ -11,7 +11,7 @@ use super::encoding::Encoding;
 use super::fields::FieldReader;
 use super::protobuf::fields;
 use crate::picture::raw_image::RawImage;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 
 /// An image with the facts of its message.
 #[derive(Debug)]

@@ -7,7 +7,7 @@ use super::channel::Content;
 use super::image_message::{ImageMessage, MessageImage};
 use super::mcap::{Event, LARGEST_MESSAGE, McapReader, Message};
 use super::{Nanoseconds, seconds};
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 
 /// Maximum number of characters of a form: names of encodings and formats are from the recording.
 const MAX_FORM: usize = 100;

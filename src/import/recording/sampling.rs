@@ -8,7 +8,7 @@ use super::stretches::Place;
 use super::thumbnail::Thumbnail;
 use super::{Nanoseconds, seconds};
 use crate::types::Decides;
-use crate::types::flag::positive;
+use crate::types::flags::positive;
 
 /// Seconds between two frames that are taken, if no flag chooses others: the interval of DarkQA.
 const INTERVAL: f64 = 2.0;

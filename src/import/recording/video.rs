@@ -11,7 +11,7 @@ use super::Nanoseconds;
 use crate::error::{Error, Result};
 use crate::picture::reading_rule::MOST_PIXELS;
 use crate::types::Rgb;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 
 /// The most lines of ffmpeg that are kept for a message.
 const LAST_LINES: usize = 2;

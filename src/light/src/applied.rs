@@ -1,12 +1,11 @@
 //! A degradation with all that decides the pixels of one frame: [`AppliedDegradation`].
 
 use super::auto::{AutoExposure, AutoShot};
-use super::motion::{FrameView, Motion};
-use super::random::NoiseKey;
+use super::draws::NoiseKey;
+use super::movement::{FrameView, Motion, Streak};
 use super::reading::Synthesis;
-use super::streak::Streak;
 use darkqa_ground::error::Result;
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Degradation, ExposureFacts, ReadingName, Severity};
 
 /// A degradation with all that decides the pixels of one frame, besides the frame itself and the key of its noise.

@@ -15,7 +15,7 @@ use super::camera::calibration::GAINS;
 use super::reading::{LightReading, Synthesis};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::Severity;
-use darkqa_ground::types::key_values::{number, pairs};
+use darkqa_ground::types::flags::key_values::{number, pairs};
 
 /// How automatic exposure answers less light.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

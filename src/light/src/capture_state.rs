@@ -1,20 +1,20 @@
 //! Every number that decides an image besides its frame and its noise key: [`CaptureState`], which can be written and replayed.
 
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::isa::Isa;
+use darkqa_ground::types::images::Isa;
 use darkqa_ground::types::{Image, Light, Rgb, Severity};
 use serde::{Deserialize, Serialize};
 
 use super::applied::AppliedDegradation;
-use super::blur::{blur, blurred_codes};
 use super::camera::CameraState;
 use super::clean::Clean;
+use super::draws::NoiseKey;
 use super::exposure::{expose, expose_by, expose_to_light};
-use super::negative::{Capture, Target};
-use super::noise::Term;
-use super::random::NoiseKey;
+use super::movement::Streak;
+use super::movement::blur::{blur, blurred_codes};
+use super::raw::negative::{Capture, Target};
+use super::raw::noise::Term;
 use super::reading::{Amplify, Coupling, Tone};
-use super::streak::Streak;
 
 /// Every number that decides an image besides its frame and its noise key. The images equal those of [`degrade`](super::degrade).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

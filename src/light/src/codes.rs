@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use super::curve;
-use darkqa_ground::types::isa::{Isa, Kernel};
+use darkqa_ground::types::images::{Isa, Kernel};
 
 /// Linear light of each 8-bit code on a display (DarkQA, eq. 1).
 static SHOWN_LIGHT: LazyLock<[f32; 256]> =

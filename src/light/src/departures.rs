@@ -4,16 +4,14 @@
 
 use rayon::prelude::*;
 
-use super::bayer::{Bayer, Plane};
 use super::camera::CameraState;
 use super::camera::tests::median;
 use super::curve;
-use super::isp::Developer;
-use super::noise::{self, Term};
-use super::random::{Component, NoiseKey};
+use super::draws::{Component, NoiseKey};
+use super::raw::noise::{self, Term};
+use super::raw::{Bayer, Developer, Plane, unprocess};
 use super::reading::{Amplify, Tone};
-use super::unprocess::unprocess;
-use darkqa_ground::types::isa::Isa;
+use darkqa_ground::types::images::Isa;
 use darkqa_ground::types::{FrameId, Rgb, Severity};
 
 const SIZE: usize = 512;

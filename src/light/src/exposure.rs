@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::clean::Clean;
 use super::codes::shown_light;
 use super::curve;
-use darkqa_ground::types::isa::{Isa, Kernel};
+use darkqa_ground::types::images::{Isa, Kernel};
 use darkqa_ground::types::{Codes16, Light, Rgb, Severity};
 
 /// Version of the exposure branch, raised whenever a pixel changes.

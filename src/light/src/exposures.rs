@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::applied::AppliedDegradation;
-use super::blur::{self, blur, blurred_codes};
 use super::clean::Clean;
+use super::draws::NoiseKey;
 use super::exposure::expose;
-use super::negative::{Negative, develop_by};
-use super::random::NoiseKey;
-use super::streak::Streak;
-use darkqa_ground::types::degradation::Kind;
+use super::movement::Streak;
+use super::movement::blur::{self, blur, blurred_codes};
+use super::raw::negative::{Negative, develop_by};
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Light, ReadingName, Rgb};
 
 /// The degraded images of one frame, with a cache of one [`Negative`] for each light reading, and of the blurred light.
@@ -85,10 +85,9 @@ pub fn version(kind: Kind) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bayer::Bayer;
-    use crate::noise::{Term, add};
+    use crate::raw::noise::{Term, add};
+    use crate::raw::{Bayer, unprocess};
     use crate::reading::{Amplify, LightReading, Synthesis};
-    use crate::unprocess::unprocess;
     use crate::{AutoSettings, CameraModel, CameraState, FrameView, Motion};
     use darkqa_ground::error::Result;
     use darkqa_ground::types::{Degradation, FrameId, Severity};

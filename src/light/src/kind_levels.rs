@@ -3,7 +3,7 @@
 use super::levels::{LIGHT, Levels, ladder};
 use super::reading::Readings;
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::degradation::{Axis, Kind};
+use darkqa_ground::types::degradations::{Axis, Kind};
 use darkqa_ground::types::{AxisLevel, KindSet, PairDark};
 
 impl Levels {

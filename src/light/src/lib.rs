@@ -11,7 +11,7 @@
 //! # Ok::<(), darkqa_ground::Error>(())
 //! ```
 //!
-//! [`negative::ladder`] makes several levels with less work. [`CaptureState`] holds every number that decides an image, can be
+//! [`raw::negative::ladder`] makes several levels with less work. [`CaptureState`] holds every number that decides an image, can be
 //! written and read, and makes the image again, its noise-free form, or its linear light.
 //!
 //! ```text
@@ -28,9 +28,9 @@
 //! contrast as well as in noise.
 //!
 //! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. Random numbers are
-//! addressed by where they are used (see [`random`]). Powers and logarithms come from `libm` and are tabulated (see
-//! [`piecewise`]). All else is IEEE sums, products, quotients and square roots in a fixed order. The camera's state is
-//! computed in double precision, samples in single precision, many at once (see [`lanes`] and [`isa`](darkqa_ground::types::isa)).
+//! addressed by where they are used (see [`draws`]). Powers and logarithms come from `libm` and are tabulated. All else is
+//! IEEE sums, products, quotients and square roots in a fixed order. The camera's state is computed in double precision,
+//! samples in single precision, many at once (see [`Isa`](darkqa_ground::types::images::Isa)).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 #![expect(
@@ -40,57 +40,43 @@
 
 mod applied;
 mod auto;
-pub mod bayer;
-pub mod blur;
 pub mod camera;
 mod capture_state;
 mod clean;
-mod clean_raw;
 mod codes;
-pub mod colour;
 pub mod curve;
+pub mod draws;
 pub mod exposure;
 mod exposures;
-mod isp;
 #[cfg(feature = "flags")]
 mod kind_levels;
-pub mod lanes;
 #[cfg(feature = "flags")]
 mod levels;
-mod motion;
-pub mod negative;
-pub mod noise;
+pub mod movement;
 mod pair_ev;
-pub mod piecewise;
-pub mod poisson;
-pub mod quantile;
-pub mod random;
+pub mod raw;
 mod reading;
 #[cfg(feature = "flags")]
 mod settings;
-mod streak;
-pub mod unprocess;
 
 pub use applied::AppliedDegradation;
 pub use auto::{AutoExposure, AutoSettings, AutoShot};
 pub use camera::{Calibration, CameraModel, CameraState, Sampling};
 pub use capture_state::{CaptureState, NoiseTerms, SensorState};
 pub use clean::Clean;
-pub use clean_raw::CleanRaw;
+pub use draws::{Component, NoiseKey, Site};
 pub use exposure::{expose, expose_by};
 pub use exposures::Exposures;
 pub use exposures::version;
-pub use motion::{FrameView, Motion, MotionAngle};
-pub use negative::{Negative, develop_with_state};
+pub use movement::{FrameView, Motion, MotionAngle, Streak, Tap};
 pub use pair_ev::{PairEv, mean_luminance};
-pub use random::NoiseKey;
-pub use random::{Component, Site};
+pub use raw::CleanRaw;
+pub use raw::negative::{Negative, develop_with_state};
 pub use reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 #[cfg(feature = "flags")]
 pub use settings::{
     CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings,
 };
-pub use streak::{Streak, Tap};
 
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Degradation, Rgb};

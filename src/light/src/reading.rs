@@ -235,7 +235,7 @@ impl Coupling {
 }
 
 #[cfg(feature = "flags")]
-darkqa_ground::types::flag::flag_words!(Amplify, Tone, Draws, Coupling);
+darkqa_ground::types::flags::flag_words!(Amplify, Tone, Draws, Coupling);
 
 #[cfg(test)]
 mod tests {

@@ -6,13 +6,13 @@ use serde::Serialize;
 
 use super::applied::AppliedDegradation;
 use super::auto::{AutoExposure, AutoSettings};
+use super::draws::NoiseKey;
 use super::levels::{LIGHT, Levels, ladder};
-use super::motion::{FrameView, Motion};
-use super::random::NoiseKey;
+use super::movement::{FrameView, Motion};
 use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 use super::{CameraModel, Sampling};
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
     AxisLevel, Decides, Degradation, KindSet, PairDark, ReadingName, SetLight,
 };

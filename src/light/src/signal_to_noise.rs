@@ -3,10 +3,9 @@
 //! With the sample y in ADU and v = σ_TL² · var(λ) + σ_row² + 1/12, the noise of a light reading has the variance r · K · y + v,
 //! and r · K · y + r² · v if r amplifies all terms; r is 2^ΔEV if light is photons.
 
-use super::bayer::Plane;
 use super::camera::{CameraModel, CameraState, Sampling};
-use super::noise::{self, Term};
-use super::unprocess::unprocess;
+use super::raw::noise::{self, Term};
+use super::raw::{Plane, unprocess};
 use super::{Amplify, LightReading, Negative, NoiseKey, Synthesis};
 use darkqa_ground::types::{FrameId, Rgb, Severity};
 

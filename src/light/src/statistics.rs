@@ -5,11 +5,10 @@ use rand_distr::Distribution;
 use rayon::prelude::*;
 
 use super::camera::tests::median;
-use super::lanes::{LANES, Lanes};
-use super::noise;
-use super::poisson;
-use super::quantile::{Quantile, tukey_lambda};
-use super::random::{Component, NoiseKey, RandomField, Site, Stream};
+use super::draws::{
+    Component, LANES, Lanes, NoiseKey, Quantile, RandomField, Site, Stream, poisson, tukey_lambda,
+};
+use super::raw::noise;
 use darkqa_ground::types::FrameId;
 
 const TEN_MILLION: usize = 10_000_000;

@@ -1,10 +1,10 @@
 //! Tests of the whole pipeline: its figures, and that pixels depend on its arguments alone.
 
 use super::camera::tests::median;
-use super::negative::ladder;
-use super::noise::Term;
+use super::raw::negative::ladder;
+use super::raw::noise::Term;
 use super::*;
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Digest, FrameId, Severity};
 
 fn key(seed: u64, frame: &str) -> NoiseKey {
@@ -392,13 +392,13 @@ fn a_state_is_serialised_with_all_its_numbers() {
 
 #[test]
 fn every_kind_of_degradation_is_made_described_and_tested() {
-    use darkqa_ground::types::degradation::Kind;
+    use darkqa_ground::types::degradations::Kind;
     use darkqa_ground::types::{Degradation, FrameId};
 
     let clean = ramps(32, 64);
     let key = super::NoiseKey::new(0, &FrameId("a".to_owned()));
     let described = include_str!("../../docs/files.md");
-    let tested = include_str!("../../../tests/program/synthesize.rs");
+    let tested = include_str!("../../../tests/program/images/synthesize.rs");
     let mut missing = Vec::new();
     for kind in Kind::ALL {
         let how = Degradation::new(kind, kind.ladder()[2], None).unwrap();
@@ -411,7 +411,7 @@ fn every_kind_of_degradation_is_made_described_and_tested() {
             missing.push(format!("{word} in src/docs/files.md"));
         }
         if !tested.contains(&format!("-{word}")) {
-            missing.push(format!("L…-{word} in tests/program/synthesize.rs"));
+            missing.push(format!("L…-{word} in tests/program/images/synthesize.rs"));
         }
     }
     assert!(missing.is_empty(), "{missing:?}");

@@ -18,7 +18,7 @@ use self::curve::ToneCurve;
 use self::icc::Profile;
 pub(super) use self::inks::Inks;
 use self::primaries::Primaries;
-use darkqa_ground::types::recent::Recent;
+use darkqa_ground::types::values::Recent;
 use darkqa_ground::types::{ColourHandling, ColourNote, Digest};
 
 /// The most bytes of an ICC profile; chosen. Profiles of curves and a matrix have a few thousand, tables for printers up to a

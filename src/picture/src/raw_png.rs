@@ -8,7 +8,7 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, DecodingError, Reader, Transformations};
 
-use darkqa_ground::types::words::words;
+use darkqa_ground::types::text::words::words;
 
 /// The form of the samples of a PNG file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

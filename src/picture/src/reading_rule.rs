@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use clap::ValueEnum;
 
-use darkqa_ground::types::flag::flag_words;
+use darkqa_ground::types::flags::flag_words;
 use darkqa_ground::types::{DepthNote, InputNote, Light};
 
 /// The default of the maximum number of pixels in an image (chosen).

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use darkqa_ground::types::degradation::{Axis, Kind};
+use darkqa_ground::types::degradations::{Axis, Kind};
 use darkqa_ground::types::{Degradation, FrameId, ReadingName, Severity};
 use darkqa_light::{
     AppliedDegradation, AutoExposure, AutoSettings, CameraModel, CaptureState, FrameView,

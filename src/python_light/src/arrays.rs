@@ -1,7 +1,7 @@
 //! NumPy arrays ↔ images: [`Batch`], [`to_numpy`].
 
 use darkqa_ground::types::Rgb;
-use darkqa_ground::types::image::Sample;
+use darkqa_ground::types::images::Sample;
 use numpy::{
     Element, IxDyn, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,

@@ -14,9 +14,10 @@ mod errors;
 mod pools;
 mod state;
 
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Image, Light, Rgb, Severity};
-use darkqa_light::{CaptureState, Exposures, NoiseKey, NoiseTerms, negative};
+use darkqa_light::raw::negative;
+use darkqa_light::{CaptureState, Exposures, NoiseKey, NoiseTerms};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::process;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Degradation, FrameId, Rgb, Severity};
 use darkqa_light::{
     AppliedDegradation, AutoExposure, CaptureState, FrameView, Motion, NoiseKey, NoiseTerms,

@@ -1,6 +1,6 @@
 //! The dictionary of a capture: [`Replay`], [`to_dict`], [`from_dict`].
 
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_light::{CameraState, CaptureState, SensorState, Streak, version};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 
 use super::rule_context::GeneratedQuestion;
 use super::rules::BalanceRule;
-use darkqa_ground::types::flag::flag_words;
+use darkqa_ground::types::flags::flag_words;
 use darkqa_ground::types::{Digest, Family};
 
 /// How far the answers are balanced.

@@ -28,7 +28,7 @@ use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
 use crate::text::terminal;
 use crate::text::wrapped::wrapped;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 
 /// Files of a run by name: numbers as CSV, the table as LaTeX, figures as SVG, answers and marks in upstream's format, and the
 /// HTML page.

@@ -3,7 +3,7 @@
 use crate::tables::EnhancerRow;
 use crate::text::alert::Alert;
 use crate::text::light_readings::LightReadings;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
 use darkqa_score::choice::llm_match::Protocol;
 use darkqa_score::open::{AnswerOutcome, OpenSummary};

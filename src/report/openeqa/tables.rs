@@ -9,7 +9,7 @@ use crate::text::table::SUMMARY;
 use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::text::terminal::texts;
 use crate::text::words::ends;
-use crate::types::degradation::Axis;
+use crate::types::degradations::Axis;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::open::{Baseline, Group, OpenCell, OpenSummary};
 use darkqa_score::subject::Subject;

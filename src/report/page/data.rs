@@ -11,7 +11,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::{Error, Result};
-use crate::types::outlines::PixelBox;
+use crate::types::questions::PixelBox;
 use crate::types::{Axis, AxisLevel, FrameId, ObjectCrop, Thumbnail};
 
 /// Codes of results that are not the index of a choice.

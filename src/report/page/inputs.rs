@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::run_usage::RunUsage;
 use crate::error::Result;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{QuestionId, RunQuestion, TextPlace, Thumbnail};
 
 /// A run on the page.

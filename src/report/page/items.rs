@@ -12,8 +12,8 @@ use crate::error::Result;
 use crate::text::outcome_words;
 use crate::text::words::family;
 use crate::types::{AxisLevel, FailureKind, QuestionId, RunQuestion, TrialRef, UnreadReason, View};
+use darkqa_score::answers::confusion;
 use darkqa_score::choice::ReadingMode;
-use darkqa_score::confusion;
 use darkqa_score::grid::{Grid, TrialResult};
 
 /// Everything that the script shows, as compressed JSON in base64.

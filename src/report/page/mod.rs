@@ -34,9 +34,9 @@ use crate::text::alert::Alert;
 use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
 use crate::types::Truths;
-use crate::types::keyed_flag::spelled_setting;
-use crate::types::manifest::RunManifest;
-use darkqa_score::confusion::Confusion;
+use crate::types::flags::spelled_setting;
+use crate::types::manifests::RunManifest;
+use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::grid::Grid;
 
 /// The template of the page, its style and its script.

@@ -9,7 +9,7 @@ use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::with_interval;
 use crate::types::Family;
-use darkqa_score::checks::{Checks, agreements, shares};
+use darkqa_score::answers::checks::{Checks, agreements, shares};
 use darkqa_score::estimate::Estimate;
 
 /// The table of each person's findings by family, with a line about each two people; empty without checks.

@@ -18,7 +18,7 @@ use crate::text::terminal;
 use crate::text::words::counted;
 use crate::types::Family;
 use darkqa_questions::summary::{Baselines, CandidateCounts, QuestionSummary};
-use darkqa_score::checks::Checks;
+use darkqa_score::answers::checks::Checks;
 
 /// Maximum number of reasons in a line of the table.
 const REASONS: usize = 3;

@@ -9,8 +9,8 @@ use crate::text::csv::csv;
 use crate::text::table::ColumnKind::{Count, Number, Text};
 use crate::text::table::TableBuilder;
 use crate::types::Rgb;
-use darkqa_score::realism::residual::Residuals;
-use darkqa_score::realism::{
+use darkqa_score::photographs::realism::residual::Residuals;
+use darkqa_score::photographs::realism::{
     CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison,
 };
 

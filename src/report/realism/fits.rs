@@ -5,8 +5,8 @@ use crate::text::csv;
 use crate::text::table::ColumnKind::{Number, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
-use darkqa_score::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
-use darkqa_score::realism::mean::Mean;
+use darkqa_score::photographs::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
+use darkqa_score::photographs::realism::mean::Mean;
 
 /// The definition of a picture's gain, printed beside every gain.
 pub(crate) const AS_SAVED: &str =

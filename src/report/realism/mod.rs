@@ -15,10 +15,10 @@ use crate::text::table::ColumnKind::{Count, Text};
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::counted;
-use darkqa_score::realism::gain::ReadingFit;
-use darkqa_score::realism::mean::{LEAST_VALUES, Mean};
-use darkqa_score::realism::residual::{Bins, EmptyBins};
-use darkqa_score::realism::{ImageComparison, PairComparison};
+use darkqa_score::photographs::realism::gain::ReadingFit;
+use darkqa_score::photographs::realism::mean::{LEAST_VALUES, Mean};
+use darkqa_score::photographs::realism::residual::{Bins, EmptyBins};
+use darkqa_score::photographs::realism::{ImageComparison, PairComparison};
 
 /// Summary over all pairs.
 #[derive(Debug, Serialize)]

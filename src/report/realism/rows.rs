@@ -2,8 +2,10 @@
 
 use serde::Serialize;
 
-use darkqa_score::realism::mean::Mean;
-use darkqa_score::realism::{ImageComparison, NoiseComparison, NoiseMethod, PairComparison};
+use darkqa_score::photographs::realism::mean::Mean;
+use darkqa_score::photographs::realism::{
+    ImageComparison, NoiseComparison, NoiseMethod, PairComparison,
+};
 
 /// Means over pairs for one way of making the low-light images.
 #[derive(Debug, Serialize)]

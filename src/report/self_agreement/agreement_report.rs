@@ -5,7 +5,7 @@ use crate::sentences::{Sentence, self_agreement};
 use crate::tables::{EnhancerRow, enhancers, with_training};
 use crate::text::alert::Alert;
 use crate::text::table::Table;
-use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
 
 /// All that a report without true answers shows.
 pub(crate) struct AgreementReport<'a> {

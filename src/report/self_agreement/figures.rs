@@ -6,9 +6,9 @@ use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::types::AxisLevel;
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::self_agreement::SelfAgreement;
-use darkqa_score::self_agreement::cell::{AgreementCell, CellRole};
 
 /// Agreement by level with its floor, and the evidence kept, for each light. Empty if only one level was asked.
 ///

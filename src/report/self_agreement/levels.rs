@@ -8,10 +8,10 @@ use crate::text::table::ColumnKind::{Accuracy, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{percent, with_interval};
 use crate::types::{Axis, AxisLevel};
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
+use darkqa_score::comparisons::self_agreement::evidence::{MIN_DISTANCE, NoEvidence};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::self_agreement::SelfAgreement;
-use darkqa_score::self_agreement::cell::{AgreementCell, CellRole};
-use darkqa_score::self_agreement::evidence::{MIN_DISTANCE, NoEvidence};
 
 /// A measure of a series: a row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -25,7 +25,7 @@ use crate::text::alert::Alert;
 use crate::text::light_readings::LightReadings;
 use crate::text::table::Table;
 use crate::text::words::counted;
-use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
 
 pub(crate) use agreement_report::AgreementReport;
 pub(crate) use text::text;

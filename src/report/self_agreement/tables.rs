@@ -10,13 +10,13 @@ use crate::text::table::SUMMARY;
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{counted, light};
 use crate::types::LightGroup;
+use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::choice::ReadingMode;
-use darkqa_score::confusion::{Confusion, Hallucination};
-use darkqa_score::self_agreement::SelfAgreement;
-use darkqa_score::self_agreement::cell::{AgreementCell, CellRole};
-use darkqa_score::self_agreement::evidence::{EvidenceCurve, NoHalf};
-use darkqa_score::self_agreement::models_in_light::ModelsInLight;
-use darkqa_score::self_agreement::question_in_light::QuestionInLight;
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
+use darkqa_score::comparisons::self_agreement::evidence::{EvidenceCurve, NoHalf};
+use darkqa_score::comparisons::self_agreement::models_in_light::ModelsInLight;
+use darkqa_score::comparisons::self_agreement::question_in_light::QuestionInLight;
 
 /// Name of the table of all agreements.
 pub(super) const OWN_ANSWERS: &str = "own_answers";

@@ -13,8 +13,8 @@ use crate::text::light_readings::LightReadings;
 use crate::text::terminal::{render, table};
 use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
-use crate::types::manifest::RunManifest;
-use darkqa_score::health::Health;
+use crate::types::manifests::RunManifest;
+use darkqa_score::accuracies::Health;
 
 /// The report as text. `runs` are the runs with their folders.
 #[must_use]

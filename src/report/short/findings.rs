@@ -9,7 +9,7 @@ use crate::text::alert::{Alert, lines};
 use crate::text::terminal::line;
 use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
-use crate::types::shown_text::shown;
+use crate::types::text::shown;
 
 /// Width of the column of groups, in characters.
 const GROUP: usize = 15;

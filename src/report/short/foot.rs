@@ -6,8 +6,8 @@ use crate::tables::{unread, what_it_is};
 use crate::text::ladder::Ladder;
 use crate::text::words::{percent, with_interval};
 use crate::text::wrapped::wrapped;
-use crate::types::control::OBSERVER;
-use darkqa_score::accuracy::AccuracyCell;
+use crate::types::replies::OBSERVER;
+use darkqa_score::accuracies::AccuracyCell;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::subject::{CHANCE, is_observer, without_run};
 

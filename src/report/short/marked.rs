@@ -9,7 +9,7 @@ use super::foot::BELOW;
 use crate::sentences::{Sentence, Tone};
 use crate::text::alert::Alert;
 use crate::text::wrapped::wrapped;
-use crate::types::shown_text::shown;
+use crate::types::text::shown;
 
 /// An alert, wrapped.
 pub(super) fn alert(alert: &Alert) -> String {

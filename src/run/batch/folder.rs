@@ -15,9 +15,9 @@ use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
 use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
 use crate::store::{AddressChange, Store};
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The flags of `batch status`.
 #[derive(Debug, Args)]

@@ -15,10 +15,9 @@ use crate::runs::StdoutFormat;
 use crate::runs::record_table;
 use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
 use crate::store::{AddressChange, Store};
-use crate::types::manifest::Counts;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::{Counts, RunManifest};
 use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 pub(crate) use folder::{BatchFolderArgs, BatchStatusArgs, cancel, fetch, status};
 

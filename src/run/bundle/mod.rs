@@ -18,7 +18,7 @@ use crate::runs::Outcome;
 use crate::runs::record_table::RECORDS_PARQUET;
 use crate::runs::stored::name;
 use crate::types::Decides;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 use archive::{is_bundle, zipped};
 use parts::RunParts;

@@ -13,9 +13,9 @@ use crate::report::page::shown_thumbnails;
 use crate::runs::run_files::RunFiles;
 use crate::runs::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
 use crate::store;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{Record, Thumbnail};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The small images that a bundle has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

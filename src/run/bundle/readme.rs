@@ -6,11 +6,11 @@ use std::fmt::Write;
 use serde_json::{Value, json};
 
 use crate::runs::stored::AnyRun;
-use crate::types::keyed_flag::keyed_form;
-use crate::types::manifest::{RunManifest, judge_flag};
-use crate::types::shown_text::shown;
+use crate::types::flags::keyed_form;
+use crate::types::manifests::{RunManifest, judge_flag};
+use crate::types::text::shown;
 use crate::types::{AxisLevel, Trials, shell_word};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Inputs of a README.
 pub(super) struct ReadmeInputs<'a> {

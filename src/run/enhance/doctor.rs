@@ -11,7 +11,7 @@ use crate::files::write;
 use crate::picture::{Payload, PayloadFormat, png};
 use crate::report::doctor::{DoctorCell, DoctorColumn, DoctorPage, page};
 use crate::runs::Outcome;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{Decides, Rgb};
 use darkqa_enhance::{Enhancer, Examination, ImageOutput, Settled};
 

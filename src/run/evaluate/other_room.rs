@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use crate::images::source::first_asked;
+use crate::images::frames::first_asked;
 use crate::types::{FrameId, Question};
 
 /// The frame whose image is shown in place of each frame's own.

@@ -10,8 +10,7 @@ use crate::ask::{ImagePlaces, Query};
 use crate::engine::key_facts::KeyFacts;
 use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::error::Result;
-use crate::images::plan::{SourcePlan, TrialGroup};
-use crate::images::trial::{Item, Prompt, Stimulus, Trial};
+use crate::images::trials::{Item, Prompt, SourcePlan, Stimulus, Trial, TrialGroup};
 use crate::picture::Payload;
 use crate::types::{
     ChoiceDetail, Condition, Digest, FrameId, Question, Record, TrialOutcome, View,

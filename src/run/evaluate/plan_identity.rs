@@ -6,10 +6,10 @@ use super::settings::Evaluation;
 use crate::dataset::{DataPlace, Dataset};
 use crate::engine::identity;
 use crate::error::Result;
-use crate::images::questions::ASK;
-use crate::images::recipe::Recipe;
+use crate::images::recipes::Recipe;
+use crate::images::trials::questions::ASK;
 use crate::picture::ReadingRule;
-use crate::types::manifest::Identity;
+use crate::types::manifests::Identity;
 use crate::types::{AxisLevel, Family, SetLight};
 use darkqa_questions::rules::Rules;
 

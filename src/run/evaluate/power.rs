@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::dataset::Dataset;
 use crate::report::power::PowerForecast;
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{Condition, KindReading, Question};
 use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::tested_sentences::AskedSets;

@@ -13,7 +13,7 @@ use crate::dataset::{
 use crate::engine::models::{ModelName, TextBaseline};
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
-use crate::images::questions::{QuestionBank, rules};
+use crate::images::trials::questions::{QuestionBank, rules};
 use crate::picture::ReadingRule;
 use crate::runs::run_plan::RunPlan;
 use crate::types::{Decides, SetLight, Truths, View};

@@ -4,16 +4,16 @@ use super::plan_identity::plan_identity;
 use super::settings::EvaluateArgs;
 use super::setup::ChoiceSetup;
 use crate::engine::Job;
+use crate::engine::costs::plan_costs::costs;
 use crate::engine::experiment::Experiment as _;
-use crate::engine::plan_costs::costs;
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
-use crate::images::plan::Plan;
 use crate::images::progress::Progress;
+use crate::images::trials::Plan;
 use crate::runs::Outcome;
 use crate::runs::run_plan::{NewPlan, PlannedFrame, recorded_command};
 use crate::text::words::counted;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// Writes the plan of a run into its folder. Nothing is asked.
 ///

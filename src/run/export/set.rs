@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::error::{Error, Result};
 use crate::files::{create_new, write};
 use crate::runs::shard::Shard;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 use crate::types::{Choices, Condition, Question};
 
 /// The form of a ready-made set.

@@ -21,8 +21,8 @@ use crate::run_reports::FigureRuns;
 use crate::runs::Outcome;
 use crate::text::table::Table;
 use crate::types::Decides;
-use crate::types::manifest::Status;
-use crate::types::shown_text::shown;
+use crate::types::manifests::Status;
+use crate::types::text::shown;
 
 use width::{TEX, Width};
 

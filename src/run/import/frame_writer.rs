@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::dataset::frame_folder::{self, FramePaths};
 use crate::error::{Error, Result};
-use crate::images::input_tally::InputTally;
+use crate::images::frames::InputTally;
 use crate::import::recording::{
     Channel, Content, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
 };
@@ -18,7 +18,7 @@ use crate::picture::ImageFile;
 use crate::picture::raw_image::RawPixels;
 use crate::picture::reading_rule::ReadingRule;
 use crate::text::words::counted;
-use crate::types::shown_text::excerpt;
+use crate::types::text::excerpt;
 use crate::types::{FrameId, Labels, Rgb};
 
 /// The most bytes of frames that wait to be written (chosen). Writing takes two to three times as many.

@@ -27,7 +27,7 @@ use crate::picture::reading_rule::ReadingRule;
 use crate::runs::Outcome;
 use crate::text::words::{counted, first_names};
 use crate::types::Decides;
-use crate::types::flag::positive;
+use crate::types::flags::positive;
 
 /// Number of topics that a message names.
 const MAX_NAMED: usize = 3;

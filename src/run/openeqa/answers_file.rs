@@ -14,7 +14,7 @@ use crate::dataset::openeqa::OpenQuestion;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::text::words::first_names;
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{
     Condition, Degradation, Digest, KindSet, OpenDetail, Record, Step, TrialKey, Via,
 };

@@ -11,7 +11,7 @@ use crate::engine::models::ModelName;
 use crate::engine::settings::JobArgs;
 use crate::error::Result;
 use crate::types::Decides;
-use crate::types::manifest::{Columns, JUDGES};
+use crate::types::manifests::{Columns, JUDGES};
 use darkqa_score::choice::llm_match::Protocol;
 
 /// The flags of the judge, the model that marks the answers.

@@ -5,12 +5,11 @@ use std::sync::Arc;
 
 use super::record::OpenItem;
 use super::setup::OpenSetup;
-use crate::ask::openeqa::judge_prompt;
+use crate::ask::prompts::openeqa::judge_prompt;
 use crate::dataset::openeqa::OpenQuestion;
 use crate::engine::models::ModelUnderTest;
 use crate::error::Result;
-use crate::images::plan::{SourcePlan, TrialGroup};
-use crate::images::trial::{Prompt, Trial};
+use crate::images::trials::{Prompt, SourcePlan, Trial, TrialGroup};
 use crate::runs::predictions::{AnswerState, predictions};
 use crate::types::{Digest, OpenDetail, QuestionId, Record, TrialKey};
 

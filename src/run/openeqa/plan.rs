@@ -6,13 +6,12 @@ use std::sync::Arc;
 use super::record::OpenItem;
 use super::setup::OpenSetup;
 use crate::ask::ImagePlaces;
-use crate::ask::openeqa::{blind, vision};
+use crate::ask::prompts::openeqa::{blind, vision};
 use crate::dataset::openeqa::OpenQuestion;
 use crate::engine::key_facts::KeyFacts;
 use crate::engine::models::asked_in;
 use crate::error::Result;
-use crate::images::plan::{SourcePlan, TrialGroup};
-use crate::images::trial::{Prompt, Trial};
+use crate::images::trials::{Prompt, SourcePlan, Trial, TrialGroup};
 use crate::types::{Condition, Digest, View};
 
 /// The trials of all answers, grouped by walk: first those without images, then those of each condition.

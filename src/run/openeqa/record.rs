@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::ask::Query;
 use crate::dataset::openeqa::OpenQuestion;
-use crate::images::trial::{Item, Stimulus, Trial};
+use crate::images::trials::{Item, Stimulus, Trial};
 use crate::picture::Payload;
 use crate::types::{ExposureFacts, OpenDetail, Record, Step, WalkFacts};
 

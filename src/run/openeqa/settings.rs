@@ -12,7 +12,7 @@ use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::engine::models::ModelName;
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
-use crate::images::walk::Walk;
+use crate::images::frames::Walk;
 use crate::picture::ReadingRule;
 use crate::types::Decides;
 use darkqa_score::choice::llm_match::Protocol;

@@ -11,14 +11,13 @@ use crate::ask::Parameters;
 use crate::dataset::openeqa::{self, OpenQuestion};
 use crate::engine::models::{self, ModelUnderTest};
 use crate::error::{Error, Result};
-use crate::images::conditions::{check_enhanced, conditions};
+use crate::images::frames::{Source, WalkFolder};
 use crate::images::progress::Progress;
-use crate::images::recipe::Recipe;
-use crate::images::source::Source;
-use crate::images::walk::WalkFolder;
+use crate::images::recipes::Recipe;
+use crate::images::trials::{check_enhanced, conditions};
 use crate::runs::part::part;
 use crate::text::words::{counted, first_names};
-use crate::types::manifest::PartPlace;
+use crate::types::manifests::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 use darkqa_enhance::ModelFile;
 

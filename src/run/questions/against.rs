@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
-use crate::images::input_tally::InputTally;
+use crate::images::frames::InputTally;
 use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::report::questions::against::LookComparison;

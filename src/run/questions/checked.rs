@@ -13,7 +13,7 @@ use crate::report::questions::review::{ReviewItem, page};
 use crate::types::{Family, FrameId, QuestionId};
 use darkqa_questions::GeneratedQuestion;
 use darkqa_questions::statistics::FrameStatistics;
-use darkqa_score::checks::{Check, CheckFinding, Checks};
+use darkqa_score::answers::checks::{Check, CheckFinding, Checks};
 
 /// A line of a file of verdicts.
 #[derive(Deserialize)]

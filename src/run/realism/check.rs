@@ -6,13 +6,13 @@ use super::settings::RealismArgs;
 use super::workers::PairWorkers;
 use crate::dataset::pairs::Pair;
 use crate::error::{Error, Result};
-use crate::images::input_tally::InputTally;
+use crate::images::frames::InputTally;
 use crate::picture::ImageFile;
 use crate::report::realism::LeftOut;
 use crate::types::Rgb;
 use crate::types::{FrameId, Pixels};
-use darkqa_score::realism::scene::{LEAST_CORRELATION, SceneMatch};
-use darkqa_score::realism::{exposure_drop, same_size};
+use darkqa_score::photographs::realism::scene::{LEAST_CORRELATION, SceneMatch};
+use darkqa_score::photographs::realism::{exposure_drop, same_size};
 
 /// Exposure drop in EV, up or down, below which a pair is hardly one in normal and low light (chosen).
 const SMALL_DROP: f32 = 0.5;

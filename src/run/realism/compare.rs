@@ -6,12 +6,12 @@ use super::settings::RealismArgs;
 use super::workers::PairWorkers;
 use crate::error::Result;
 use crate::types::{FrameId, Rgb};
-use darkqa_light::noise::Term;
+use darkqa_light::raw::noise::Term;
 use darkqa_light::{Negative, NoiseKey, SensorSettings, Synthesis, expose_by};
-use darkqa_score::realism::gain::ReadingFit;
-use darkqa_score::realism::residual::{Residuals, divergence};
-use darkqa_score::realism::ssim::ssim;
-use darkqa_score::realism::{
+use darkqa_score::photographs::realism::gain::ReadingFit;
+use darkqa_score::photographs::realism::residual::{Residuals, divergence};
+use darkqa_score::photographs::realism::ssim::ssim;
+use darkqa_score::photographs::realism::{
     CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison, psnr,
 };
 

@@ -12,9 +12,9 @@ use crate::picture::png;
 use crate::report::realism as report;
 use crate::report::realism::{PooledResiduals, RealismSummary};
 use darkqa_light::{SensorSettings, Synthesis};
-use darkqa_score::realism::PairComparison;
-use darkqa_score::realism::gain::{PooledGain, ReadingFit};
-use darkqa_score::realism::residual::Residuals;
+use darkqa_score::photographs::realism::PairComparison;
+use darkqa_score::photographs::realism::gain::{PooledGain, ReadingFit};
+use darkqa_score::photographs::realism::residual::Residuals;
 
 /// Writes the numbers of each pair, the summary and the figures into a folder.
 pub(super) fn write_files(out: &Path, works: &[PairWork], summary: &RealismSummary) -> Result<()> {

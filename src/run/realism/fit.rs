@@ -8,8 +8,10 @@ use crate::types::{FrameId, Pixels, ReadingName, Rgb};
 use darkqa_light::{
     CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorSettings, Synthesis,
 };
-use darkqa_score::realism::gain::{GAINS, GainFit, LADDER_STEPS, PairFit, ReadingFit, ladder};
-use darkqa_score::realism::smooth::SmoothBlocks;
+use darkqa_score::photographs::realism::gain::{
+    GAINS, GainFit, LADDER_STEPS, PairFit, ReadingFit, ladder,
+};
+use darkqa_score::photographs::realism::smooth::SmoothBlocks;
 
 /// The fits of all pairs, light reading by light reading. A pair that cannot be read is logged and left out.
 ///

@@ -25,8 +25,8 @@ use crate::images::workers::pool;
 use crate::report::realism::{ComparedData, RealismSummary, ResidualRules};
 use crate::runs::Outcome;
 use darkqa_light::SensorSettings;
-use darkqa_score::realism::PairComparison;
-use darkqa_score::realism::gain::ReadingFit;
+use darkqa_score::photographs::realism::PairComparison;
+use darkqa_score::photographs::realism::gain::ReadingFit;
 
 /// Compares all pairs.
 ///

@@ -8,7 +8,7 @@ use crate::dataset::DecodeArgs;
 use crate::images::workers::ThreadArgs;
 use crate::types::Decides;
 use darkqa_light::SensorArgs;
-use darkqa_score::realism::residual::{Bins, EmptyBins};
+use darkqa_score::photographs::realism::residual::{Bins, EmptyBins};
 
 /// The minimum and maximum of `--ev`, in EV.
 const DROPS: [f32; 2] = [-20.0, 20.0];

@@ -33,7 +33,7 @@ use crate::engine::observer::Observer;
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::runs::Outcome;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
 use darkqa_questions::rules::Rules;
 

@@ -6,7 +6,7 @@ use hyper::StatusCode;
 use regex::Regex;
 
 use super::completion::RequestFault;
-use crate::types::question::letter;
+use crate::types::questions::letter;
 
 /// A question with its choices.
 #[derive(Debug, PartialEq, Eq)]

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use crate::error::Result;
 use crate::runs::stored::AnyRun;
 use crate::text::outcome_words;
-use crate::types::manifest::RunManifest;
-use crate::types::question::letter;
+use crate::types::manifests::RunManifest;
+use crate::types::questions::letter;
 use crate::types::{Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
 
 /// The reply of one model to the item, in one condition.

@@ -10,14 +10,14 @@ use crate::drawing::figures::StoryCurves;
 use crate::drawing::sheet::{Story, StoryCell, StoryMark, StoryRow, story};
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::images::montage::montage;
+use crate::images::notes::montage;
 use crate::picture::{Payload, PayloadFormat};
 use crate::run_reports::story_curves;
 use crate::runs::Outcome;
 use crate::runs::rebuild::ImageRebuilder;
 use crate::runs::run_parts::choice_run;
-use crate::types::degradation::Kind;
-use crate::types::manifest::{RunManifest, Status};
+use crate::types::degradations::Kind;
+use crate::types::manifests::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, KindReading, Record, Rgb, TrialOutcome};
 use darkqa_score::subject::is_control;
 

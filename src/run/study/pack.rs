@@ -15,7 +15,7 @@ use crate::runs::Outcome;
 use crate::runs::rebuild::{ImageRebuilder, RebuildArgs};
 use crate::runs::stored::StoredRun;
 use crate::text::words::counted;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{
     ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials,
 };

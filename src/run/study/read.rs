@@ -19,12 +19,12 @@ use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
-use crate::types::manifest::{Counts, RunManifest, Status};
+use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Decides, Digest, QuestionId, Record, Reply,
     StoredDetail as _, TrialKey, TrialRef, Trials, UnreadReason,
 };
-use darkqa_score::record::{Detail, answered};
+use darkqa_score::answers::record::{Detail, answered};
 
 /// The flags of `study read`.
 #[derive(Debug, Args)]

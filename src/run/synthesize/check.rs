@@ -9,7 +9,7 @@ use serde::Deserialize;
 use crate::dataset::image_names::is_image;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::images::placed_image::OutputFile;
+use crate::images::stored::OutputFile;
 use crate::runs::Outcome;
 use crate::text::words::first_names;
 

@@ -12,12 +12,11 @@ use crate::dataset::Picture;
 use crate::drawing::sheet::{self, LevelBlock, LevelImage, LevelRow, Signal};
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
-use crate::images::placed_image::ImageOrigin;
-use crate::types::degradation::{Axis, Kind};
+use crate::images::stored::ImageOrigin;
+use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, Degradation, FrameId, KindReading, Rgb, Severity};
-use darkqa_light::bayer::Bayer;
-use darkqa_light::noise::{self, Term};
-use darkqa_light::unprocess::unprocess_up_to;
+use darkqa_light::raw::noise::{self, Term};
+use darkqa_light::raw::{Bayer, unprocess_up_to};
 use darkqa_light::{Coupling, Draws, LightSettings, NoiseKey, Synthesis, version};
 
 /// The kind of a figure of one frame.

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use crate::run_reports::combine::Combined;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::{Digest, QuestionId, RunQuestion, SetLight};
-use darkqa_score::image_dependence::{Independence, LitReply};
+use darkqa_score::answers::{Independence, LitReply};
 use darkqa_score::subject::without_run;
 
 /// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Photographs taken in the dark

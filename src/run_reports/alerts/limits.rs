@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::run_reports::join::{Joined, JoinedRun};
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::plural;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 use darkqa_score::subject::without_run;
 
 /// One line for each model some of whose replies have a larger limit than the first ones, with the number of replies by limit.

@@ -23,15 +23,15 @@ use super::join::{Joined, JoinedRun};
 use crate::runs::over_budget::OverBudget;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::{counted, plural};
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 use crate::types::{FrameId, InputSummary};
+use darkqa_score::answers::record::Detail;
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
-use darkqa_score::comparison::compares_models;
+use darkqa_score::comparisons::compares_models;
+use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::findings::Findings;
-use darkqa_score::pair_darkness::PairDarkness;
-use darkqa_score::photographed_set::PhotographedSet;
-use darkqa_score::record::Detail;
-use darkqa_score::self_agreement::SelfAgreement;
+use darkqa_score::photographs::PhotographedSet;
+use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::suggested_scenes::SuggestedScenes;
 
 /// All alerts of a report on questions with choices, in the order of their kinds.

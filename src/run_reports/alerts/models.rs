@@ -7,7 +7,7 @@ use crate::run_reports::join::{Joined, JoinedRun};
 use crate::run_reports::models::ModelApart;
 use crate::run_reports::settings::{Setting, listed};
 use crate::text::alert::{Alert, AlertKind};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The fields of a built-in model in a manifest, in words.
 const FIELDS: [(&str, &str); 3] = [

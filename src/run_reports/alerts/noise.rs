@@ -7,9 +7,9 @@ use serde_json::Value;
 
 use crate::run_reports::join::Joined;
 use crate::text::alert::{Alert, AlertKind};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{Condition, Degradation, Severity, TrialRef};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The exposure drop in hundredths of EV above which at most nine codes are left: white has code
 /// 255 · 2^(−EV/2.2) = 8 there.

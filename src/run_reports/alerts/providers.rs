@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::plural;
 use crate::types::Trials;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// One alert for each model whose replies name several providers, with the number of replies of each.
 pub(super) fn provider_alerts<D: Detail>(trials: &Trials<D>) -> Vec<Alert> {

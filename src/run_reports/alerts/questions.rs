@@ -8,8 +8,8 @@ use crate::run_reports::settings::{is_of_people, listed};
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::counted;
 use crate::types::{QuestionId, RunQuestion, TrialRef};
+use darkqa_score::answers::record::Detail;
 use darkqa_score::findings::Findings;
-use darkqa_score::record::Detail;
 use darkqa_score::subject::is_control;
 
 /// Differences between the questions of the runs, and between the files that they are about.

@@ -7,7 +7,7 @@ use crate::run_reports::settings::is_of_people;
 use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
 use crate::text::words::counted;
 use crate::types::{TrialRef, UnreadReason};
-use darkqa_score::health::Health;
+use darkqa_score::accuracies::Health;
 
 /// Replies that could not be read, with what they count as, and trials without a reply.
 pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {

@@ -6,7 +6,7 @@ use super::words::{names, sentence};
 use crate::run_reports::join::Joined;
 use crate::run_reports::settings::{Settings, address, differing, is_of_people, listed};
 use crate::text::alert::{Alert, AlertKind};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The names that servers gave for a model, and the addresses, if there are several.
 pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {

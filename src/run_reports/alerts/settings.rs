@@ -8,8 +8,8 @@ use crate::run_reports::settings::{
     ENCODING, Setting, Settings, differing, light, listed, parameter_flags, some, without_repeated,
 };
 use crate::text::alert::{Alert, AlertKind};
-use crate::types::manifest::RunManifest;
-use darkqa_score::record::Detail;
+use crate::types::manifests::RunManifest;
+use darkqa_score::answers::record::Detail;
 
 /// The flags that decide the orders in which choices are shown.
 const ORDERS: [&str; 2] = ["--shuffle-options", "--circular"];

@@ -11,7 +11,7 @@ use crate::run_reports::settings::{ENCODING, readings_and_variants};
 use crate::run_reports::settings::{Settings, differing, identity, pixels, short, some};
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::StoredRun;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{AxisLevel, Digest, KindReading, OpenDetail, RunQuestion};
 
 /// The field of an identity with the digest of the words around the questions.

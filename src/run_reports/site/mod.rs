@@ -17,7 +17,7 @@ use crate::report::choice_report::ChoiceReport;
 use crate::report::products::{PAGE, products};
 use crate::report::site::{GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows};
 use crate::runs::stored::{AnyRun, StoredRun};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{ChoiceDetail, KindReading, OpenDetail, Trials, Truths};
 
 use group::{GroupKey, grouped};

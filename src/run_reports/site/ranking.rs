@@ -7,10 +7,9 @@ use super::member::ChoiceMember;
 use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::run_reports::combine::clusters;
 use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
-use darkqa_score::best::{BestInTheDark, best_in_the_dark};
 use darkqa_score::choice::ReadingMode;
+use darkqa_score::comparisons::{BestInTheDark, best_in_the_dark, rank_ranges};
 use darkqa_score::grid::Grid;
-use darkqa_score::ranks::rank_ranges;
 
 /// The rows of runs that can be compared, in the order of their ranks. Models are compared by mean accuracy in the dark on the items that all of
 /// them answered at all levels, as in the report; those that stand for comparison only are not.

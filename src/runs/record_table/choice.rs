@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::store::CellKind::{Bool, Int8, Int32, Text};
 use crate::store::Presence::{Always, MayBeNull};
 use crate::store::{Cell, Column};
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 use crate::types::{AnswerReading, ChoiceDetail, Record, RunQuestion};
 
 impl Tabled for ChoiceDetail {

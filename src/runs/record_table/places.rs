@@ -6,8 +6,7 @@ use std::path::Path;
 
 use crate::error::Result;
 use crate::store::{LinePlace, each_trial};
-use crate::types::manifest::RunManifest;
-use crate::types::recorded_names::RecordedNames;
+use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{Condition, ModelListing, QuestionId, RunQuestion, TrialKey};
 
 /// A record by its place and what its order follows from: 48 bytes, so that the records themselves need not be held.

@@ -10,7 +10,7 @@ use super::row::{Row, Tabled};
 use crate::error::{Error, Result};
 use crate::runs::stored::ExperimentKind;
 use crate::store::{Cell, CellKind};
-use crate::types::near_name::suggestion;
+use crate::types::text::near_name::suggestion;
 use crate::types::{ChoiceDetail, OpenDetail};
 
 /// A run in its folder, of questions with choices or open ones.

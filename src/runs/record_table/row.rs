@@ -6,12 +6,11 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::store::Column;
-use crate::types::manifest::RunManifest;
-use crate::types::recorded_names::RecordedNames;
+use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{
     Condition, ConditionColumns, Digest, QuestionId, Record, RunQuestion, Severity,
 };
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The detail of a record that has a table of its own.
 pub(super) trait Tabled: Detail + Sync + 'static {

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
-use crate::types::manifest::RunManifest;
+use crate::types::manifests::RunManifest;
 
 /// The sources (frames or walks) of a run that some parts have, which may be of several divisions.
 pub(super) struct Coverage {

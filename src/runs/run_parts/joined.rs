@@ -12,8 +12,8 @@ use crate::error::Result;
 use crate::runs::placed_trials::read_part;
 use crate::runs::stored::sort;
 use crate::types::Trials;
-use crate::types::manifest::{Counts, RunManifest, Status};
-use darkqa_score::record::Detail;
+use crate::types::manifests::{Counts, RunManifest, Status};
+use darkqa_score::answers::record::Detail;
 
 /// The parts of one run, of any divisions of it.
 pub(crate) struct RunParts<D: Detail> {

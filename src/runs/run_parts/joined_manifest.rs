@@ -7,8 +7,8 @@ use super::part::{StoredPart, no_part};
 use crate::error::{Error, Result};
 use crate::runs::part_cost::PartCost;
 use crate::types::InputSummary;
-use crate::types::keyed_flag::spelled_setting;
-use crate::types::manifest::{RunManifest, differences};
+use crate::types::flags::spelled_setting;
+use crate::types::manifests::{RunManifest, differences};
 
 /// Checks that all parts belong to the same run.
 ///

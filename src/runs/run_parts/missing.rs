@@ -5,7 +5,7 @@ use super::part::StoredPart;
 use crate::error::{Error, Result};
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
-use crate::types::manifest::Status;
+use crate::types::manifests::Status;
 
 /// Whether sources of a run may be in no part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
 use crate::runs::stored::manifest;
-use crate::types::manifest::{RunManifest, RunPart};
+use crate::types::manifests::{RunManifest, RunPart};
 
 /// One shard, as read from its folder.
 pub(super) struct StoredPart {

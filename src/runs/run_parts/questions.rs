@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::Result;
 use crate::store::{LinePlace, QuestionFile, Store, each_placed_question};
 use crate::types::{FrameId, QuestionId, RunQuestion};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The questions of several parts in the order of the data, each once.
 pub(crate) struct PartQuestions(Vec<PartQuestion>);

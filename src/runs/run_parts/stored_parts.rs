@@ -7,12 +7,12 @@ use super::joined::RunParts;
 use super::missing::MissingParts;
 use super::part::no_part;
 use crate::error::{Error, Result};
-use crate::images::thumbnail::MissingThumbnails;
+use crate::images::notes::thumbnail::MissingThumbnails;
 use crate::runs::run_texts::RunTexts;
 use crate::runs::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, manifest, open_questions};
 use crate::store;
 use crate::types::{ChoiceDetail, Trials};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The run in a folder; that of all parts in it if the folder itself holds none. What is in no part is said.
 ///

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::runs::placed_trials::PartLogs;
 use crate::types::{KeptTrial, Record, TrialRef, Trials};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// Keeps each trial of these parts once, whose folders are numbered as the places of the trials: of a trial in two parts the one with a
 /// reply, and of two replies that of the first part. Returns the number of trials with different replies in two parts, which were paid

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::report::forecast::Forecast;
 use crate::types::Digest;
-use crate::types::manifest::Identity;
+use crate::types::manifests::Identity;
 
 /// The schema of a plan.
 pub(super) const SCHEMA: &str = "darkqa.plan/1";

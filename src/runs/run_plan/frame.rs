@@ -7,7 +7,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::Dataset;
-use crate::images::source::Source;
+use crate::images::frames::Source;
 use crate::types::{Digest, FrameId};
 
 /// The estimated cost of all that is made and asked about a frame. It follows from the plan alone, so that every shard divides a run

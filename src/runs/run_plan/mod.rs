@@ -17,13 +17,12 @@ use serde::de::DeserializeOwned;
 use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::files::reading;
-use crate::images::source::Source;
+use crate::images::frames::Source;
 use crate::runs::part::{Divided, own_sources};
 use crate::runs::shard::Shard;
 use crate::store::PLAN;
-use crate::types::keyed_flag::spelled_setting;
-use crate::types::manifest::Identity;
-use crate::types::manifest::differences;
+use crate::types::flags::spelled_setting;
+use crate::types::manifests::{Identity, differences};
 use crate::types::{Digest, FrameId, Question, RunQuestion, shell_word};
 
 pub(crate) use file::recorded_command;

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::files::{UNFINISHED, reading};
 use crate::report::forecast::Forecast;
 use crate::store::{self, PLAN};
-use crate::types::manifest::Identity;
+use crate::types::manifests::Identity;
 use crate::types::{Digest, RunQuestion};
 
 /// All that a plan is written from.

@@ -46,7 +46,7 @@ pub use self::settings::Rooms;
 use self::viewpoint::Height;
 use darkqa_ground::error::Result;
 use darkqa_ground::labels;
-use darkqa_ground::types::recent::Recent;
+use darkqa_ground::types::values::Recent;
 use darkqa_ground::types::{Digest, Frame, FrameId, Labels, Light, Pixels, Rgb, SegmentName};
 
 /// The version of the generator. Any change of a pixel or a name needs another version.

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use darkqa_ground::types::flag::flag_words;
+use darkqa_ground::types::flags::flag_words;
 
 /// Encoding of the pixels of the rooms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]

@@ -1,29 +1,24 @@
 //! All results of a run: [`Findings`].
 
-use super::accuracy::{AccuracySummary, summarize};
-use super::agreement::{Agreement, agreements, light_agreements};
-use super::best::{BestInTheDark, best_in_the_dark};
+use super::accuracies::{
+    AccuracySummary, CommonItems, Curve, FirstFailure, Health, OfferedChoices, StrictScore, curves,
+    first_failures, healths, summarize,
+};
+use super::answers::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::bootstrap::Resamples;
-use super::by_reading::{FindingByReading, by_reading};
 use super::calibration::{Calibration, calibrations};
-use super::chance::OfferedChoices;
 use super::choice::ReadingMode;
 use super::cluster::{ClusterUnit, Clusters, FrameTies};
-use super::common::CommonItems;
-use super::comparison::{Comparison, ComparisonKind, comparisons, lights_between};
-use super::confusion::{Confusion, Hallucination, confusions, hallucinations};
-use super::curve::{Curve, curves};
-use super::fidelity::FidelityFindings;
-use super::flips::{FirstFailure, first_failures};
+use super::comparisons::{
+    Agreement, BestInTheDark, Comparison, ComparisonKind, FindingByReading, ModelsLeftOut,
+    PooledFinding, PooledKind, agreements, best_in_the_dark, by_reading, comparisons,
+    light_agreements, lights_between, models_left_out, pool, pooled,
+};
 use super::grid::Grid;
-use super::health::{Health, healths};
 use super::observed::ObserverSummary;
-use super::pair_darkness::{self, PairDarkness};
-use super::photographed_set::PhotographedSet;
-use super::pooled::{ModelsLeftOut, PooledFinding, models_left_out, pool, pooled};
-use super::pooled_kind::PooledKind;
+use super::photographs::pair_darkness::{self, PairDarkness};
+use super::photographs::{FidelityFindings, PhotographedSet};
 use super::significance::Significance;
-use super::strict_score::StrictScore;
 use super::subject::{Subject, is_control, is_observer};
 use darkqa_ground::types::{
     ChoiceDetail, Family, ImageFidelity, KindReading, ModelListing, RunQuestion, Trials,

@@ -6,7 +6,7 @@ use super::choice::ReadingMode;
 use super::cluster::Clusters;
 use super::estimate::ClusterCount;
 use super::subject::Subject;
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
     AnswerReading, AskedItem, ChoiceDetail, Family, KindReading, ModelListing, TrialOutcome,
     TrialRef, Trials,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::cluster::Clusters;
 use super::estimate::Estimate;
 use super::subject::{Subject, is_control, is_observer};
-use darkqa_ground::types::control::OBSERVER;
+use darkqa_ground::types::replies::OBSERVER;
 use darkqa_ground::types::{
     AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef,
     Trials,

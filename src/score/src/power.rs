@@ -11,7 +11,7 @@
 
 use serde::Serialize;
 
-use super::paired::POWER;
+use super::comparisons::paired::POWER;
 use super::significance::least_p;
 use darkqa_statistics::quantiles::quantile;
 
@@ -135,7 +135,7 @@ mod tests {
     use rand::rngs::StdRng;
     use rand::{RngExt as _, SeedableRng as _};
 
-    use super::super::paired::{ClusterNet, PairedTest};
+    use super::super::comparisons::paired::{ClusterNet, PairedTest};
     use super::*;
 
     #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use darkqa_ground::types::control::OBSERVER;
+use darkqa_ground::types::replies::OBSERVER;
 use darkqa_ground::types::{
     AxisLevel, Condition, Control, EnhancerName, KindReading, LightGroup, TrialRef, View,
 };

@@ -2,20 +2,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::best::BestInTheDark;
+use super::answers::confusion::{AgainstClean, Confusion, FalseAnswer};
 use super::calibration::LEAST_CONFIDENT_REPLIES;
 use super::choice::ReadingMode;
 use super::cluster::MIN_SCENES;
-use super::comparison::{Comparison, ComparisonKind};
-use super::confusion::{AgainstClean, Confusion, FalseAnswer};
+use super::comparisons::{BestInTheDark, Comparison, ComparisonKind, PooledFinding, PooledKind};
 use super::findings::Findings;
 use super::grid::Grid;
 use super::head::{TestTree, adjusted};
-use super::pooled::PooledFinding;
-use super::pooled_kind::PooledKind;
 use super::significance::ALPHA;
 use super::subject::{Subject, judged};
-use darkqa_ground::types::degradation::Kind;
+use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, KindReading};
 
 /// A test, by its place in the findings.

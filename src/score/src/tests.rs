@@ -1,14 +1,12 @@
-//! Tests of the findings over all models, [`super::pooled`] and [`super::best`], on synthetic records.
+//! Tests of the findings over all models, [`super::comparisons`], on synthetic records.
 
-use super::best::best_in_the_dark;
+use super::answers::confusion::{FalseAnswer, confusions};
 use super::choice::ReadingMode;
 use super::cluster::{Clusters, FrameTies};
-use super::confusion::{FalseAnswer, confusions};
+use super::comparisons::paired::PairedComparison;
+use super::comparisons::{PooledFinding, PooledKind, best_in_the_dark, pooled};
 use super::findings::Findings;
 use super::grid::Grid;
-use super::paired::PairedComparison;
-use super::pooled::{PooledFinding, pooled};
-use super::pooled_kind::PooledKind;
 use super::significance::Significance;
 use super::subject::Subject;
 use darkqa_ground::types::{

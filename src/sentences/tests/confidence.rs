@@ -2,7 +2,7 @@
 
 use super::checked;
 use crate::sentences::confidence::{Confidence, confidence};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, KindReading, Severity};
 use darkqa_score::calibration::{Calibration, RiskCoverage, TestedConfidence};
 use darkqa_score::cluster::ClusterUnit;

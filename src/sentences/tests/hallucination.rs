@@ -2,14 +2,13 @@
 
 use super::{checked, findings};
 use crate::sentences::hallucination::{self, TopAnswer};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Family, Severity};
+use darkqa_score::answers::confusion::{AgainstClean, Collapse, FalseAnswer};
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::confusion::{AgainstClean, Collapse, FalseAnswer};
+use darkqa_score::comparisons::paired::{PairedComparison, Spread};
+use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::paired::{PairedComparison, Spread};
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
 
 #[test]

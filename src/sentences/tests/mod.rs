@@ -8,12 +8,11 @@ mod words_alone;
 
 use super::sentence::{Sentence, level_runs};
 use super::{darkness, pooled, sample, words_alone as below};
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, EnhancerName, KindReading, Severity};
 use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::{PooledDifference, PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::pooled::{PooledDifference, PooledFinding};
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance::{self, Better, NotShown, TooFewClusters, Worse};
 use darkqa_score::significance::SwapMethod;
 

@@ -12,12 +12,11 @@ use crate::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, OptionProbabilities,
     QuestionId, Record, TrialOutcome,
 };
-use darkqa_score::baseline::baseline_rows;
+use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::{Clusters, FrameTies};
+use darkqa_score::comparisons::{PooledKind, baseline_rows};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
-use darkqa_score::health::healths;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::Subject;
 

@@ -2,14 +2,14 @@
 
 use super::{checked, finding};
 use crate::sentences::words_alone;
-use crate::types::degradation::Kind;
+use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Family, KindReading, Severity};
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparison::{Comparison, ComparisonKind, TestedComparison};
+use darkqa_score::comparisons::paired::{PairedComparison, Spread};
+use darkqa_score::comparisons::{
+    Comparison, ComparisonKind, PooledFinding, PooledKind, TestedComparison,
+};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::paired::{PairedComparison, Spread};
-use darkqa_score::pooled::PooledFinding;
-use darkqa_score::pooled_kind::PooledKind;
 use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
 use darkqa_score::subject::Subject;
 

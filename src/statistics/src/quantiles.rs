@@ -27,7 +27,7 @@ pub fn beyond(distance: f64, degrees: f64) -> f64 {
 ///
 /// The variance of a variance grows with the kurtosis (Satterthwaite 1946, Biometrics Bull. 2:110, gives 2C / (κ − 1)). κ comes from the
 /// same clusters and is too small where a few of them make the variance; in simulation half of that number holds the truth where
-/// shares are near 0 or 1 and clusters are strongly correlated (`tests/program/coverage/`).
+/// shares are near 0 or 1 and clusters are strongly correlated (`tests/program/scores/coverage/`).
 #[must_use]
 pub fn degrees_of_freedom(residuals: &[f64]) -> f64 {
     let c = residuals.len() as f64;

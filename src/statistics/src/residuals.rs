@@ -6,7 +6,7 @@
 /// A cluster draws the mean towards itself by h, which makes r too small; the sum of the squares of these residuals is the variance of
 /// the sum over all (Bell and McCaffrey 2002, Surv. Methodol. 28:169, CR2 for a mean). With C clusters of one size it is
 /// C / (C − 1) Σr². Where one cluster holds a third of the replies, the plain sum holds the truth less often
-/// (`tests/program/coverage/unequal.rs`).
+/// (`tests/program/scores/coverage/unequal.rs`).
 ///
 /// `clusters` holds, for each cluster, a sum and a number. The only cluster of all has an infinite residual.
 #[must_use]

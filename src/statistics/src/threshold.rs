@@ -320,7 +320,7 @@ fn non_increasing(values: &[f64], weights: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
     use darkqa_ground::types::Severity;
-    use darkqa_ground::types::degradation::Kind;
+    use darkqa_ground::types::degradations::Kind;
 
     const DROPS: [f64; 6] = [0.0, 2.0, 4.0, 6.0, 7.5, 9.0];
 

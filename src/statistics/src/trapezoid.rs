@@ -20,7 +20,7 @@ pub fn weights(levels: &[AxisLevel]) -> Vec<u64> {
 mod tests {
     use super::*;
     use darkqa_ground::types::Severity;
-    use darkqa_ground::types::degradation::Kind;
+    use darkqa_ground::types::degradations::Kind;
 
     #[test]
     fn weights_are_those_of_the_trapezoid_rule() {

@@ -1,8 +1,8 @@
 //! Questions of a run that are no longer the ones stored in it: [`ChangedQuestions`].
 
 use darkqa_ground::types::RunQuestion;
-use darkqa_ground::types::run_question::QuestionPart;
-use darkqa_ground::types::shown_text::excerpt;
+use darkqa_ground::types::questions::QuestionPart;
+use darkqa_ground::types::text::excerpt;
 
 /// The most characters of a text in the message.
 const SHOWN: usize = 60;

@@ -18,13 +18,12 @@ use serde_json::Value;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::folder_access::FolderAccess;
 use darkqa_ground::files::{self, is_unfinished, reading};
-use darkqa_ground::types::keyed_flag::spelled_setting;
-use darkqa_ground::types::manifest::{
-    ColumnDifference, Columns, JUDGES, RunManifest, differences, judge_flag,
+use darkqa_ground::types::flags::spelled_setting;
+use darkqa_ground::types::manifests::{
+    ColumnDifference, Columns, JUDGES, RecordedNames, RunManifest, differences, judge_flag,
 };
-use darkqa_ground::types::recorded_names::RecordedNames;
 use darkqa_ground::types::{Distinct, ImageFidelity, Record, RunQuestion, Thumbnail, TrialKey};
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The current time in UTC, to the second, as a manifest states it.
 pub fn now() -> String {

@@ -33,13 +33,12 @@ use std::time::{Duration, Instant};
 
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::write_with;
-use darkqa_ground::types::manifest::RunManifest;
-use darkqa_ground::types::recorded_names::RecordedNames;
+use darkqa_ground::types::manifests::{RecordedNames, RunManifest};
 use darkqa_ground::types::{
     ChoiceDetail, Distinct, FrameId, ImageFidelity, InputSummary, QuestionId, Record, RunQuestion,
     Thumbnail, TrialKey, Via,
 };
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 use changed_questions::ChangedQuestions;
 use damaged_file::{each_readable_line, lacks_notes, set_file_aside};

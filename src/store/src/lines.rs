@@ -16,7 +16,7 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::reading;
 use darkqa_ground::files::write_synced;
 use darkqa_ground::types::{ImageFidelity, Record, RunQuestion, Thumbnail, Usage};
-use darkqa_score::record::{Detail, reread};
+use darkqa_score::answers::record::{Detail, reread};
 
 /// Appends lines to a file, which is created if it does not exist.
 pub(super) fn append<T: Serialize + StoredLine>(path: &Path, values: &[T]) -> Result<File> {

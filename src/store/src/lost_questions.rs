@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::record_log::each_trial;
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::shown_text::excerpt;
+use darkqa_ground::types::text::excerpt;
 use darkqa_ground::types::{QuestionId, RunQuestion, TrialKey};
 
 /// The most characters of a question's name in the message.

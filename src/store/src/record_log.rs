@@ -11,7 +11,7 @@ use super::reread_record::RereadRecord;
 use super::trial_line::TrialLine;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::Record;
-use darkqa_score::record::Detail;
+use darkqa_score::answers::record::Detail;
 
 /// The bytes that are read at once for a single line. Chosen: most lines are shorter.
 const LINE_BYTES: usize = 2048;

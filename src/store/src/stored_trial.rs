@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer};
 
-use darkqa_ground::types::small_number::{SmallNumber, Tokens};
+use darkqa_ground::types::records::{SmallNumber, Tokens};
 use darkqa_ground::types::{Finish, LostAttempts, Shared, TrialKey, Usage, Via};
 
 /// A trial of a run, without question and answer: 56 bytes.

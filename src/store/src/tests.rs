@@ -2,7 +2,7 @@ use super::*;
 use std::collections::BTreeMap;
 use std::fs;
 
-use darkqa_ground::types::manifest::{Counts, Status};
+use darkqa_ground::types::manifests::{Counts, Status};
 use darkqa_ground::types::{Digest, Family, FrameId, QuestionId, StoredDetail as _, TrialOutcome};
 
 type Store = super::Store;

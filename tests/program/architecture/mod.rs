@@ -74,16 +74,16 @@ const MOST_LINES: usize = 600;
 const CIRCLES: [(&[&str], &str); 4] = [
     (
         &[
-            "choice/src/lenient.rs",
-            "choice/src/stated.rs",
-            "choice/src/structured.rs",
+            "choice/src/rules/lenient.rs",
+            "choice/src/rules/stated.rs",
+            "choice/src/rules/structured.rs",
         ],
         "it stays: a reply within a reply is read by the reader that found it",
     ),
     (
         &[
-            "ground/src/types/trials/mod.rs",
-            "ground/src/types/trials/trial_ref.rs",
+            "ground/src/types/records/trials/mod.rs",
+            "ground/src/types/records/trials/trial_ref.rs",
         ],
         "it stays: a trial is read through the tables of all, which hand it out",
     ),
@@ -101,7 +101,7 @@ const CIRCLES: [(&[&str], &str); 4] = [
 const DEBUG_IN_MESSAGES: [(&str, &str); 3] = [
     ("run/questions/mod.rs", "measure_frame"),
     ("run/serve/mod.rs", "answer"),
-    ("ground/src/types/digest.rs", "from_str"),
+    ("ground/src/types/values/digest.rs", "from_str"),
 ];
 
 /// The files of the program, read once for all tests.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use crate::{ReadingMode, read};
-use darkqa_ground::types::question::{Answer, Choices};
+use darkqa_ground::types::questions::{Answer, Choices};
 
 /// One line of the table: the rule, the set of choices, the reply, and the choice that a person reads in it.
 #[derive(Deserialize)]

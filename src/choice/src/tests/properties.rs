@@ -6,9 +6,9 @@ use proptest::prelude::*;
 
 use super::by_rule::choices;
 use super::reply;
-use crate::words::{Role, lists};
+use crate::text::words::{Role, lists};
 use crate::{ReadingMode, read};
-use darkqa_ground::types::question::Answer;
+use darkqa_ground::types::questions::Answer;
 
 const SETS: [&str; 6] = ["home", "yes_no", "colors", "things", "sofas", "numbers"];
 
@@ -52,7 +52,7 @@ proptest! {
             format!("{denial} the {name}."),
             format!("It is {denial} a {name}."),
             format!("I think that this is {denial} a {name}!"),
-            format!("{denial} {}", darkqa_ground::types::question::letter(pick % texts.len())),
+            format!("{denial} {}", darkqa_ground::types::questions::letter(pick % texts.len())),
         ] {
             prop_assert!(matches!(lenient(&reply, set), Answer::Unparsed(_)), "{}", reply);
         }

@@ -3,11 +3,10 @@
 use super::by_rule::choices;
 use super::choices_of;
 use crate::choice_views::{ChoiceViews, Naming};
-use crate::plain::fold;
-use crate::tokens::tokens;
-use crate::words::{Role, Roles, lists, phrase_at};
+use crate::text::words::{Role, Roles, lists, phrase_at};
+use crate::text::{fold, tokens};
 use crate::{ReadingMode, read};
-use darkqa_ground::types::question::Answer;
+use darkqa_ground::types::questions::Answer;
 
 /// For each role: a set of choices, a reply with an entry in place of `{}` and the choice in it, and a reply without an entry and the
 /// choice in that.

@@ -4,7 +4,7 @@ use clap::CommandFactory as _;
 
 use super::*;
 use crate::cli::Cli;
-use crate::types::keyed_flag::KEYED_FLAGS;
+use crate::types::flags::KEYED_FLAGS;
 
 /// The sample values of all keys of an evaluation by their hidden flags, and the words that set the same by keyed flags.
 #[test]

@@ -7,8 +7,7 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
-use super::super::cell::Cell;
-use super::super::row::{JsonUnit, RowPlace, Table};
+use super::super::cells::{Cell, JsonUnit, RowPlace, Table};
 use super::json_scan::{Found, JsonScan, Kind, LONGEST_ROW};
 use crate::error::{Error, Result};
 use crate::files::reading;

@@ -17,9 +17,7 @@ mod yaml;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use super::cell::Cell;
-use super::row::{FileLabel, RowPlace, Table};
-use super::step::Step;
+use super::cells::{Cell, FileLabel, RowPlace, Step, Table};
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};

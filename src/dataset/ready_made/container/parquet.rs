@@ -17,10 +17,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
 
-use super::super::cell::Cell;
-use super::super::row::{MOST_ROWS, RowPlace, Table, too_many_rows};
-use super::super::step::Step;
-use super::super::text_list::list;
+use super::super::cells::{Cell, MOST_ROWS, RowPlace, Step, Table, list, too_many_rows};
 use super::json_scan::LONGEST_ROW;
 use crate::error::{Error, Result};
 use crate::files::guarded::guarded;

@@ -6,8 +6,7 @@ use std::path::Path;
 
 use csv::{ByteRecord, Position, Reader, ReaderBuilder};
 
-use super::super::cell::Cell;
-use super::super::row::{RowPlace, Table};
+use super::super::cells::{Cell, RowPlace, Table};
 use crate::error::{Error, Result};
 use crate::files::reading;
 

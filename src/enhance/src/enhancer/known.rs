@@ -3,15 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::Enhancer;
-use crate::convention::{Channels, ElementType, ValueRange, ValueScale};
-use crate::graph::{Graph, RunResult};
+use crate::conventions::sidecar::{self, ModelSidecar};
+use crate::conventions::{Channels, ElementType, ValueRange, ValueScale};
+use crate::graphs::{Graph, RunResult};
 use crate::planes::Planes;
-use crate::probe::RangePair;
-use crate::sidecar::{self, ModelSidecar};
-use crate::size_search::TakenSizes;
-use crate::usage::Usage;
+use crate::probes::{RangePair, Usage};
+use crate::sizing::TakenSizes;
 use darkqa_ground::error::Result;
-use darkqa_ground::types::enhancer_note::{ProbeNote, ProbeOutcome};
+use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
 use darkqa_ground::types::{Rgb, SizeLog};
 
 /// Maximum mean output for a white image, in 0..1, at which the output may be a residual. Chosen: models that return the image itself

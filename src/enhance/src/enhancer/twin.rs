@@ -3,9 +3,9 @@
 use std::num::NonZeroUsize;
 
 use super::{Enhancer, SizeLog};
-use crate::file::ModelFile;
-use crate::graph::LoadLimits;
-use crate::memory;
+use crate::files::ModelFile;
+use crate::graphs::LoadLimits;
+use crate::limits::memory;
 use darkqa_ground::error::{Error, Result};
 
 impl Enhancer {

@@ -1,117 +1,52 @@
 //! The types that all rooms share, without input or output. The only arithmetic on pixels is how more than 8 bits are shown;
-//! [`isa`] names the instruction sets that loops over pixels are compiled for.
+//! [`images::Isa`] names the instruction sets that loops over pixels are compiled for.
 
-pub mod axis_level;
-#[cfg(feature = "program")]
-mod canonical;
-pub mod condition;
-mod condition_columns;
-pub mod control;
-#[cfg(feature = "program")]
-pub mod decides;
-pub mod degradation;
-pub mod detail;
-pub mod digest;
-pub mod enhancer_note;
-mod experiment_detail;
-pub mod exposure_facts;
-#[cfg(feature = "program")]
-pub mod flag;
-mod flaw;
-pub mod frame;
-pub mod image;
-#[cfg(feature = "program")]
-pub mod image_mark;
-pub mod image_notes;
-mod input_note;
-pub mod isa;
-pub mod key_values;
-pub mod keyed_flag;
-pub mod kind_set;
-pub mod labels;
-pub mod light_group;
-pub mod manifest;
-pub mod model_listing;
-pub mod model_views;
-pub mod near_name;
-pub mod observed;
-pub mod option_probabilities;
-pub mod outlines;
-pub mod pair_dark;
-mod pair_facts;
-pub mod pixels;
-pub mod question;
-pub mod recent;
-pub mod record;
-pub mod recorded_names;
-pub mod reply;
-pub mod run_question;
-mod set_light;
-pub mod severity;
-pub mod shared;
-mod shell;
-mod shown_codes;
-pub mod shown_text;
-mod size_log;
-pub mod small_number;
-mod strict_group;
-pub mod toml_fault;
-pub mod treatment;
-pub mod treatment_set;
-pub mod trial_key;
-pub mod trials;
-pub mod words;
+pub mod degradations;
+pub mod flags;
+pub mod images;
+pub mod manifests;
+pub mod questions;
+pub mod records;
+pub mod replies;
+pub mod text;
+pub mod values;
 
-pub use axis_level::{AxisLevel, KindReading};
-pub use condition::{Condition, EnhancerName};
-pub use condition_columns::ConditionColumns;
-pub use control::Control;
-#[cfg(feature = "program")]
-pub use decides::Decides;
-pub use degradation::{Degradation, ReadingName};
-pub use detail::{
-    AnswerReading, ChoiceDetail, ImageFacts, OpenDetail, Step, TrialOutcome, WalkFacts,
+pub use degradations::{
+    Axis, AxisLevel, Condition, ConditionColumns, Degradation, EnhancerName, ExposureFacts,
+    KindReading, KindSet, LightGroup, PairDark, PairFacts, PhotoName, ReadingName, SetLight,
+    Severity, Treatment, TreatmentSet,
 };
-pub use digest::Digest;
-pub use exposure_facts::ExposureFacts;
-pub use flaw::Flaw;
 #[cfg(feature = "program")]
-pub use frame::Frame;
-pub use frame::{DepthKind, FrameId, Intrinsics, Segmentation};
-pub use image::{Codes16, Image, Light, Rgb, Sample};
-pub use image_notes::{ImageFidelity, ObjectCrop, Thumbnail};
-pub use input_note::{ColourHandling, ColourNote, DepthNote, InputNote, InputSummary};
-pub use kind_set::KindSet;
-pub use labels::{Label, Labels, SegmentName};
-pub use light_group::LightGroup;
-pub use model_listing::{ListedModel, ModelColumn, ModelListing};
-pub use observed::{AnswerSource, Observed};
-pub use option_probabilities::{OptionProbabilities, Thought, TokenChances, TokenPosition};
-pub use outlines::PixelBox;
-pub use pair_dark::{PairDark, PhotoName};
-pub use pair_facts::PairFacts;
-pub use pixels::Pixels;
-pub use question::Truths;
-pub use question::{Answer, Choices, Family, Question, QuestionId, UnreadReason};
-pub use record::{Failure, FailureKind, StoredDetail, Via, View};
-pub use reply::{Finish, LostAttempts, Reply, Unstated, Usage};
-pub use run_question::RunQuestion;
-pub use set_light::SetLight;
-pub use severity::{Axis, Severity};
-pub use shared::{Distinct, Shared};
-pub use shell::shell_word;
-pub use size_log::{SeamCounts, SizeLog};
-pub use strict_group::StrictGroup;
-pub use treatment::Treatment;
-pub use treatment_set::TreatmentSet;
-pub use trial_key::TrialKey;
-pub use trials::{
-    AskedItem, AskedParts, ChoiceFacts, ChoiceTables, KeptTrial, SentImages, TextPlace, TrialRef,
-    Trials,
+pub use flags::Decides;
+#[cfg(feature = "program")]
+pub use images::Frame;
+pub use images::{
+    Codes16, DepthKind, FrameId, Image, Intrinsics, Label, Labels, Light, Pixels, Rgb, Sample,
+    SegmentName, Segmentation,
 };
+pub use manifests::{
+    ColourHandling, ColourNote, DepthNote, Flaw, InputNote, InputSummary, ListedModel, ModelColumn,
+    ModelListing, SeamCounts, SizeLog,
+};
+pub use questions::{
+    Answer, Choices, Family, PixelBox, Question, QuestionId, RunQuestion, StrictGroup, Truths,
+    UnreadReason,
+};
+pub use records::{
+    AnswerReading, AskedItem, AskedParts, ChoiceDetail, ChoiceFacts, ChoiceTables, Failure,
+    FailureKind, ImageFacts, ImageFidelity, KeptTrial, ObjectCrop, OpenDetail, SentImages, Step,
+    StoredDetail, TextPlace, Thumbnail, TrialKey, TrialOutcome, TrialRef, Trials, Via, View,
+    WalkFacts,
+};
+pub use replies::{
+    AnswerSource, Control, Finish, LostAttempts, Observed, OptionProbabilities, Reply, Thought,
+    TokenChances, TokenPosition, Unstated, Usage,
+};
+pub use text::shell_word;
+pub use values::{Digest, Distinct, Shared};
 
 /// The record of a trial; by default of a question with choices.
-pub type Record<D = ChoiceDetail> = record::Record<D>;
+pub type Record<D = ChoiceDetail> = records::Record<D>;
 
 #[cfg(test)]
 mod tests {
@@ -119,7 +54,7 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::degradation::Kind;
+    use super::degradations::Kind;
     use super::*;
 
     fn degradation() -> impl Strategy<Value = Option<Degradation>> {

@@ -5,7 +5,7 @@ use std::fmt::Display;
 use serde::{Deserialize, Serialize};
 
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::toml_fault::TomlFault;
+use darkqa_ground::types::text::TomlFault;
 
 /// Names and files of the five built-in calibrations, the paper's camera first.
 const PRESETS: [(&str, &str); 5] = [

@@ -12,8 +12,8 @@ use rand_distr::{Distribution as _, Open01};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::colour::{self, Matrix};
-use super::random::{Component, NoiseKey, Site, SiteWords, Stream};
+use super::draws::{Component, NoiseKey, Site, SiteWords, Stream};
+use super::raw::colour::{self, Matrix};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::reading;
 use darkqa_ground::types::Digest;

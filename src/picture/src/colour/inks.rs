@@ -8,7 +8,7 @@ use self::table::InkTable;
 use super::icc::InkProfile;
 use super::{CACHED, ColourTag, MOST_PROFILE, REMEDY, too_large};
 use crate::reading_rule::ColourRule;
-use darkqa_ground::types::recent::Recent;
+use darkqa_ground::types::values::Recent;
 use darkqa_ground::types::{ColourHandling, ColourNote, Digest};
 
 /// Name of the colours of an image file without a profile, for its note.

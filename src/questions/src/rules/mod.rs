@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::Digest;
-use darkqa_ground::types::toml_fault::TomlFault;
+use darkqa_ground::types::text::TomlFault;
 
 pub use entries::*;
 

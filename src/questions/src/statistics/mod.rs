@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use super::colors::{BINS, Color, NONE};
 use super::reason::Reason;
 use super::rules::{ClassFlag, RuleBook};
-use darkqa_ground::types::labels::OTHER_PLACES;
+use darkqa_ground::types::images::OTHER_PLACES;
 use darkqa_ground::types::{Digest, FrameId};
 
 pub use measure::measure;

@@ -23,7 +23,7 @@ use crate::engine::dark_already::DarkImages;
 use crate::error::{Error, Result};
 use crate::files::write;
 use crate::images::progress::Progress;
-use crate::images::questions::{QuestionBank, open_data, rules, select};
+use crate::images::trials::questions::{QuestionBank, open_data, rules, select};
 use crate::runs::Outcome;
 use crate::text::words::counted;
 use crate::types::Decides;

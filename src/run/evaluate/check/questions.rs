@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 use super::findings::{Findings, Mark};
 use crate::text::words::{counted, first_names};
 use crate::types::Question;
-use crate::types::question::letter;
-use crate::types::shown_text::excerpt;
+use crate::types::questions::letter;
+use crate::types::text::excerpt;
 
 /// The share of one answer or letter from which on a model that always says it scores well.
 const COMMON: f64 = 0.6;

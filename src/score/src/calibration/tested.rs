@@ -1,7 +1,7 @@
 //! Confidence less accuracy with its test: [`TestedConfidence`].
 
+use crate::comparisons::paired::tested_difference;
 use crate::estimate::Estimate;
-use crate::paired::tested_difference;
 use crate::significance::ALPHA;
 
 /// A mean of confidence less accuracy, or of its change, with the test of 0 by Student's t that belongs to its interval.

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::answer::ScoredAnswer;
 use super::group::Group;
+use crate::comparisons::paired::difference;
 use crate::estimate::Estimate;
-use crate::paired::difference;
 use crate::subject::Subject;
 use darkqa_ground::types::{AxisLevel, View};
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use crate::types::labels::OTHER_PLACES;
+use crate::types::images::OTHER_PLACES;
 
 /// Table of the words of HM3D-Sem.
 const HM3D: &str = include_str!("hm3d.tsv");

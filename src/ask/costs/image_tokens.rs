@@ -1,0 +1,272 @@
+//! The number of tokens that a model counts for an image: [`image_tokens`].
+//!
+//! It is used only for estimates before anything is sent; the server states what a reply was charged. The families and the sources
+//! of their rules are in `image_tokens.toml`.
+
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use crate::ask::requests::ImageDetail;
+
+/// The table that comes with the program.
+static TABLE: LazyLock<Table> = LazyLock::new(|| {
+    let text = include_str!("../image_tokens.toml");
+    toml::from_str(text).unwrap_or_else(|e| unreachable!("a test reads image_tokens.toml: {e}"))
+});
+
+/// The families of models, with the date of the table.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct Table {
+    #[expect(dead_code, reason = "for readers of the table")]
+    as_of: String,
+    family: Vec<Family>,
+}
+
+/// Models that count in the same way.
+#[derive(Debug, Deserialize)]
+struct Family {
+    /// Beginnings of their names.
+    begins: Vec<String>,
+    #[serde(flatten)]
+    rule: Rule,
+}
+
+/// The rule by which a family of models counts the tokens of an image; `image_tokens.toml` states what each is.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(
+    deny_unknown_fields,
+    tag = "rule",
+    rename_all = "kebab-case",
+    rename_all_fields = "kebab-case"
+)]
+enum Rule {
+    Tiles {
+        base: u64,
+        tile: u64,
+    },
+    FittedPatches {
+        most: f64,
+        #[serde(default = "any")]
+        side: f64,
+        high_most: Option<f64>,
+        high_side: Option<f64>,
+        original_most: Option<f64>,
+        original_side: Option<f64>,
+        factor: f64,
+    },
+    Patches {
+        patch: f64,
+        side: f64,
+        most: f64,
+    },
+    Crops,
+    Fixed {
+        tokens: u64,
+    },
+    Resized {
+        patch: f64,
+    },
+    Merged {
+        patch: f64,
+        #[serde(default = "any")]
+        side: f64,
+    },
+}
+
+/// No limit on a side.
+fn any() -> f64 {
+    f64::MAX
+}
+
+/// The number of tokens that a model counts for an image of this size in pixels; `None` if its family is unknown.
+pub(in crate::ask) fn image_tokens(
+    model: &str,
+    detail: Option<ImageDetail>,
+    width: u64,
+    height: u64,
+) -> Option<u64> {
+    let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();
+    let family = TABLE
+        .family
+        .iter()
+        .find(|family| family.begins.iter().any(|begin| name.starts_with(begin)))?;
+    Some(family.rule.count(detail, width as f64, height as f64))
+}
+
+impl Rule {
+    fn count(self, detail: Option<ImageDetail>, width: f64, height: f64) -> u64 {
+        let (longer, shorter) = (width.max(height), width.min(height));
+        let count = match self {
+            Self::Fixed { tokens } => return tokens,
+            Self::Tiles { base, .. } if detail == Some(ImageDetail::Low) => return base,
+            Self::Tiles { base, tile } => {
+                let scale = (2048.0 / longer).min(1.0);
+                let scale = scale * (768.0 / (shorter * scale)).min(1.0);
+                let tiles = |side: f64| (side * scale / 512.0).ceil().max(1.0);
+                return base + tile * (tiles(width) * tiles(height)) as u64;
+            }
+            Self::FittedPatches {
+                most,
+                side,
+                high_most,
+                high_side,
+                original_most,
+                original_side,
+                factor,
+            } => {
+                let (own_side, own_most) = match detail {
+                    Some(ImageDetail::High) => (high_side, high_most),
+                    Some(ImageDetail::Original) => (original_side, original_most),
+                    _ => (None, None),
+                };
+                let (side, most) = (own_side.unwrap_or(side), own_most.unwrap_or(most));
+                fitted(width, height, side, most) * factor
+            }
+            Self::Patches { patch, side, most } => largest([width, height], patch, side, most),
+            Self::Crops if longer <= 384.0 => 258.0,
+            Self::Crops => {
+                let unit = (shorter / 1.5).floor().max(1.0);
+                258.0 * (width / unit).ceil() * (height / unit).ceil()
+            }
+            Self::Resized { patch } => resized(width, height, patch),
+            Self::Merged { patch, side } => {
+                let scale = (side / longer).min(1.0);
+                let patches = |length: f64| (length * scale / patch).round().max(1.0);
+                patches(width) * patches(height)
+            }
+        };
+        count.ceil() as u64
+    }
+}
+
+/// The number of patches that cover an image scaled by a factor. A side that is a millionth of a patch too long is rounding.
+fn cover(width: f64, height: f64, patch: f64, scale: f64) -> f64 {
+    let patches = |side: f64| ((side * scale / patch * 1e6).round() / 1e6).ceil().max(1.0);
+    patches(width) * patches(height)
+}
+
+/// The number of patches of 32 × 32 that cover an image after it is reduced to a longer side and to at most `most` patches. The scale
+/// makes the sides whole numbers of patches (OpenAI).
+fn fitted(width: f64, height: f64, side: f64, most: f64) -> f64 {
+    let scale = (side / width.max(height)).min(1.0);
+    if cover(width, height, 32.0, scale) <= most {
+        return cover(width, height, 32.0, scale);
+    }
+    let scale = (32.0 * 32.0 * most / (width * height)).sqrt();
+    let whole = |side: f64| (side * scale / 32.0).floor().max(1.0) / (side * scale / 32.0);
+    cover(width, height, 32.0, scale * whole(width).min(whole(height))).min(most)
+}
+
+/// The number of patches that cover the largest size of the same aspect within both limits (Anthropic), by bisection of the scale.
+fn largest([width, height]: [f64; 2], patch: f64, side: f64, most: f64) -> f64 {
+    let at = |scale: f64| cover(width, height, patch, scale);
+    let top = (side / width.max(height)).min(1.0);
+    if at(top) <= most {
+        return at(top);
+    }
+    let (mut low, mut high) = (0.0, top);
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        if at(middle) <= most {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    at(low)
+}
+
+/// The number of patches after Qwen's smart_resize.
+fn resized(width: f64, height: f64, patch: f64) -> f64 {
+    const LEAST: f64 = 4.0;
+    const MOST: f64 = 16_384.0;
+    let sides = |of: fn(f64) -> f64, scale: f64| {
+        let patches = |side: f64| of(side * scale / patch).max(1.0);
+        patches(width) * patches(height)
+    };
+    let (plain, area) = (
+        sides(f64::round_ties_even, 1.0),
+        width * height / (patch * patch),
+    );
+    if plain > MOST {
+        sides(f64::floor, (MOST / area).sqrt())
+    } else if plain < LEAST {
+        sides(f64::ceil, (LEAST / area).sqrt())
+    } else {
+        plain
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_match_the_published_ones() {
+        let high = Some(ImageDetail::High);
+        for (model, detail, width, height, tokens) in [
+            // platform.openai.com/docs/guides/images-vision
+            ("gpt-4o", high, 1024, 1024, 765),
+            ("gpt-4o", high, 2048, 4096, 1105),
+            ("gpt-4o", Some(ImageDetail::Low), 4096, 8192, 85),
+            ("o4-mini", None, 1024, 1024, 1762),
+            ("gpt-4.1-mini", None, 1024, 1024, 1659),
+            // community.openai.com/t/1262691, without the text: 128 × 64
+            ("openai/gpt-4.1-2025-04-14", high, 128, 64, 255),
+            ("gpt-4o-mini", high, 128, 64, 8500),
+            ("gpt-5.4", high, 2560, 1440, 2765),
+            ("gpt-5.4", Some(ImageDetail::Original), 2560, 1440, 4320),
+            ("gpt-5.5", high, 2560, 1440, 2765),
+            ("gpt-5.5", None, 2560, 1440, 4320),
+            // ai.google.dev/gemini-api/docs/tokens
+            ("gemini-2.5-flash", None, 384, 384, 258),
+            ("gemini-2.5-flash", None, 960, 540, 1548),
+            ("gemini-3-flash", None, 2560, 1440, 1120),
+            // platform.claude.com/docs, vision: the two sizes that it states, and one at the limit
+            ("claude-opus-4-7", None, 1000, 1000, 1296),
+            ("claude-opus-5-5", None, 1920, 1080, 2691),
+            ("anthropic/claude-sonnet-5", None, 2560, 1440, 4784),
+            // users' counts with the words: 1558 to 1561
+            ("claude-sonnet-4-5", None, 2560, 1440, 1560),
+            ("Qwen/Qwen2.5-VL-7B-Instruct", None, 1288, 728, 1196),
+            ("Qwen/Qwen2.5-VL-7B-Instruct", None, 2560, 1440, 4641),
+            ("Qwen/Qwen3-VL-8B-Instruct", None, 2560, 1440, 3600),
+            // 22.5 rows: half to even is 22, not 23.
+            ("qwen3-vl-plus", None, 1280, 720, 880),
+            ("qwen3-vl-plus", None, 10, 10, 4),
+        ] {
+            let counted = image_tokens(model, detail, width, height);
+            assert_eq!(counted, Some(tokens), "{model} {width} × {height}");
+        }
+        // 1800 × 2400 is more than 1536 patches: 33 × 44 of them.
+        assert_eq!(image_tokens("gpt-4.1-mini", None, 1800, 2400), Some(2353));
+        assert_eq!(image_tokens("my-model", None, 640, 480), None);
+    }
+
+    #[test]
+    fn no_family_hides_behind_a_shorter_name_before_it() {
+        let mut before: Vec<&String> = Vec::new();
+        for begin in TABLE.family.iter().flat_map(|family| &family.begins) {
+            let hides = before
+                .iter()
+                .find(|earlier| begin.starts_with(earlier.as_str()));
+            assert_eq!(hides, None, "{begin} is never reached");
+            before.push(begin);
+        }
+        assert!(before.len() > 30);
+    }
+
+    #[test]
+    fn more_pixels_never_count_fewer_tokens_beyond_rounding() {
+        for family in &TABLE.family {
+            let count = |side: f64| family.rule.count(None, side, side);
+            let counts: Vec<u64> = (1..40).map(|step| count(f64::from(step) * 100.0)).collect();
+            let falls = counts
+                .windows(2)
+                .find(|pair| (pair[1] as f64) < 0.9 * pair[0] as f64);
+            assert_eq!(falls, None, "{:?}", family.begins);
+        }
+    }
+}

@@ -1,0 +1,12 @@
+//! Costs of requests: prices, counted tokens, and the sum that a run may spend.
+
+mod image_tokens;
+mod prices;
+mod spending;
+mod token_bound;
+
+pub(super) use image_tokens::image_tokens;
+pub(crate) use prices::{Price, Prices};
+pub(super) use spending::Charge;
+pub(crate) use spending::{PricedRequest, ReplyExcess, Reservation, Spending};
+pub(crate) use token_bound::TokenBound;

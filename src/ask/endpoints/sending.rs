@@ -1,0 +1,63 @@
+//! The settings for sending and retrying requests: [`Sending`].
+
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::ask::pace::{Bounds, Quota};
+use crate::types::Decides;
+use crate::types::flags::{positive, seconds};
+
+/// The settings for sending and retrying requests.
+#[derive(Debug, Clone, Copy, PartialEq, Args)]
+#[command(next_help_heading = "Sending")]
+pub struct Sending {
+    /// Requests in flight at once: N, fewer if the server is overloaded; MIN-MAX, from MIN up as far as replies come no
+    /// slower; or auto, from 8 up to 32, down to 1
+    #[arg(long, value_name = "N|MIN-MAX|auto", default_value = "auto", add = Decides::Nothing)]
+    pub concurrency: Bounds,
+    /// The user's limits per minute.
+    #[command(flatten)]
+    pub quota: Quota,
+    /// Seconds until a try is given up, reply included
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
+    pub timeout: Duration,
+    /// Retries after a temporary failure
+    #[arg(long, value_name = "N", default_value_t = 5, add = Decides::Nothing)]
+    pub retries: u32,
+    /// Retries of a trial after an attempt that was charged and gave no reply, in all calls together
+    #[arg(long, value_name = "N", default_value_t = 1, add = Decides::Nothing)]
+    pub paid_retries: u32,
+    /// The wait before the first retry if the server asks for none. Each further wait doubles, and each is extended at random
+    /// by up to its length.
+    #[arg(skip = FIRST_DELAY)]
+    pub first_delay: Duration,
+    /// Seconds for which an endpoint may turn all requests away (status 429) before the run stops; these refusals do not count as retries
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "1800", add = Decides::Nothing)]
+    pub patience: Duration,
+    /// The longest wait, in seconds, that a server may ask for; beyond it the request is given up
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
+    pub max_wait: Duration,
+    /// The largest image file that is sent, in MB; default: what is known of the endpoint, else 20
+    #[arg(long, value_name = "MB", value_parser = positive, add = Decides::Nothing)]
+    pub max_image: Option<f64>,
+}
+
+/// The wait before the first retry; chosen.
+const FIRST_DELAY: Duration = Duration::from_millis(500);
+
+impl Default for Sending {
+    fn default() -> Self {
+        Self {
+            concurrency: Bounds::DEFAULT,
+            quota: Quota::default(),
+            timeout: Duration::from_mins(2),
+            retries: 5,
+            paid_retries: 1,
+            first_delay: FIRST_DELAY,
+            patience: Duration::from_mins(30),
+            max_wait: Duration::from_mins(2),
+            max_image: None,
+        }
+    }
+}

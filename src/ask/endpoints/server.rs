@@ -1,0 +1,297 @@
+//! The server at which models are asked: its flags ([`AccessArgs`]), and its settings with the key ([`Server`]).
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::access::{Access, Authorities};
+use super::own_headers::OwnHeaders;
+use super::sending::Sending;
+use super::url::BaseUrl;
+use super::variable::variable;
+use crate::ask::secrets::{KeyHeader, Secret, check_owner, looks_like_key};
+use crate::ask::vendors::{Vendor, VendorTable};
+use crate::error::{Error, Result};
+use crate::types::Decides;
+
+/// The endpoint if neither `--base-url` nor `OPENAI_BASE_URL` names one.
+const BASE_URL: &str = "https://api.openai.com/v1";
+
+/// The variable that names the endpoint if `--base-url` does not.
+const BASE_URL_VARIABLE: &str = "OPENAI_BASE_URL";
+
+/// The variable that holds the key of endpoints that the table of vendors does not have.
+pub(crate) const OPENAI_KEY: &str = "OPENAI_API_KEY";
+
+/// The value of `--api-key-env` for an endpoint without keys.
+const NO_KEY: &str = "none";
+
+/// The address of an endpoint, its key and its headers.
+///
+/// The address and the headers are parsed when they are used: the parser of the command line would print an invalid one, with its
+/// password.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+#[command(next_help_heading = "Model")]
+pub(crate) struct AccessArgs {
+    /// The endpoint; /chat/completions is appended; repeatable for several replicas of one server; default: OPENAI_BASE_URL, else
+    /// OpenAI's own
+    #[arg(long, value_name = "URL", add = Decides::Reply)]
+    pub base_url: Vec<String>,
+    /// The variable that holds the API key, or none for an endpoint without keys; default: that of the vendor's own tools
+    /// (ANTHROPIC_API_KEY, GEMINI_API_KEY …), else OPENAI_API_KEY, which goes to no other vendor of the table by itself
+    #[arg(long, value_name = "NAME|none", conflicts_with = "api_key_file", add = Decides::Nothing)]
+    pub api_key_env: Option<String>,
+    /// A file that holds the API key; default: none, a variable holds it
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
+    pub api_key_file: Option<PathBuf>,
+    /// A TOML file of vendors that adds to the built-in table or overrides it, in the same form; default: the built-in table alone
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
+    pub vendor: Option<PathBuf>,
+    /// Send a key to an address although it looks like a key of another vendor
+    #[arg(long, add = Decides::Nothing)]
+    pub key_anyway: bool,
+    /// The header that carries the key; auto is what is known of the vendor (api-key at Azure), else bearer
+    #[arg(long, value_name = "HEADER", value_enum, default_value_t, add = Decides::Nothing)]
+    pub key_header: KeyHeader,
+    /// A header that is added to every request; repeatable; default: none
+    #[arg(long, value_name = "NAME: VALUE", add = Decides::Nothing)]
+    pub header: Vec<String>,
+    /// A header that is added to every request, with a variable that holds its value, which is kept secret; repeatable; default: none
+    #[arg(long, value_name = "NAME=VARIABLE", add = Decides::Nothing)]
+    pub header_env: Vec<String>,
+    /// A PEM file of certificate authorities to trust besides the system's; default: none
+    #[arg(long, value_name = "FILE", add = Decides::Nothing)]
+    pub ca_file: Option<PathBuf>,
+    /// Send a key over unencrypted http to another machine
+    #[arg(long, add = Decides::Nothing)]
+    pub allow_http: bool,
+}
+
+/// The address of a server, and how requests are sent to it.
+#[derive(Debug, Clone)]
+pub(crate) struct Server {
+    /// The address, the key and the certificates of each replica; at least one.
+    pub replicas: Vec<Access>,
+    /// The timeouts, retries and rate limits of requests.
+    pub sending: Sending,
+}
+
+impl Server {
+    /// The maximum number of requests in flight, at all replicas together.
+    pub(crate) fn most_in_flight(&self) -> usize {
+        let replicas = self.replicas.len();
+        self.sending.concurrency.share(replicas).most() * replicas
+    }
+
+    /// The addresses of all replicas, as text without secrets.
+    pub(crate) fn addresses(&self) -> Vec<String> {
+        self.replicas
+            .iter()
+            .map(|replica| replica.base.to_string())
+            .collect()
+    }
+}
+
+impl AccessArgs {
+    /// The same endpoint without a key.
+    #[must_use]
+    pub(crate) fn without_key(&self) -> Self {
+        Self {
+            api_key_env: Some(NO_KEY.to_owned()),
+            api_key_file: None,
+            header_env: Vec::new(),
+            ..self.clone()
+        }
+    }
+
+    /// Another endpoint: nothing that authenticates at this one is sent there.
+    #[must_use]
+    pub(crate) fn elsewhere(&self, base_url: String) -> Self {
+        Self {
+            base_url: vec![base_url],
+            ca_file: self.ca_file.clone(),
+            allow_http: self.allow_http,
+            key_anyway: self.key_anyway,
+            vendor: self.vendor.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// Reads the key, the headers and the certificates.
+    ///
+    /// # Errors
+    /// If the address is not valid, or a key, header or certificate cannot be read.
+    pub(crate) fn server(&self, sending: Sending) -> Result<Server> {
+        let authorities = self.ca_file.as_deref().map(Authorities::load).transpose()?;
+        let authorities = authorities.unwrap_or_default();
+        let vendors = self.vendors()?;
+        let mut replicas: Vec<Access> = Vec::new();
+        for base in self.addresses()? {
+            if replicas.iter().any(|other| other.base == base) {
+                let problem = format_args!("{base} is named twice");
+                return Err(Error::usage("--base-url", problem));
+            }
+            let vendor = vendors.at_host(base.host());
+            vendor.map_or(Ok(()), |vendor| vendor.check_address(&base))?;
+            let key = self.key(&base, vendor)?;
+            match &key {
+                Some(key) if !self.key_anyway => check_owner(key, &base, vendors)?,
+                _ => {}
+            }
+            replicas.push(Access {
+                vendor,
+                key,
+                key_header: self.key_header,
+                account: account_headers(vendor),
+                headers: OwnHeaders::read(&self.header, &self.header_env)?,
+                authorities: authorities.clone(),
+                allow_http: self.allow_http,
+                ..Access::new(base)
+            });
+        }
+        Ok(Server { replicas, sending })
+    }
+
+    /// The user's own vendors.
+    fn vendors(&self) -> Result<VendorTable> {
+        let own = self.vendor.as_deref().map(VendorTable::read);
+        Ok(own.transpose()?.unwrap_or_default())
+    }
+
+    /// The addresses that flags or the environment name, else OpenAI's.
+    ///
+    /// # Errors
+    /// If one is not valid.
+    pub(crate) fn addresses(&self) -> Result<Vec<BaseUrl>> {
+        if self.base_url.is_empty() {
+            let named = variable(BASE_URL_VARIABLE);
+            return Ok(vec![named.as_deref().unwrap_or(BASE_URL).parse()?]);
+        }
+        self.base_url.iter().map(|text| text.parse()).collect()
+    }
+
+    /// Where the key comes from, for people: never the key itself.
+    pub(crate) fn key_source(&self, replica: &Access) -> String {
+        if let Some(path) = &self.api_key_file {
+            return format!("the file {}", path.display());
+        }
+        let names = match self.api_key_env.as_deref() {
+            Some(NO_KEY) => return "none".to_owned(),
+            Some(name) => vec![name],
+            None => key_variables(&replica.base, replica.vendor),
+        };
+        match names.iter().find(|name| variable(name).is_some()) {
+            Some(name) => format!("the variable {name}"),
+            None => format!("none: {} is not set", names.join(" or ")),
+        }
+    }
+
+    /// Checks that no key and no header goes to an address that only a run folder names, unless it is that of a vendor of the built-in
+    /// table: the folder may be a stranger's.
+    ///
+    /// # Errors
+    /// If one would.
+    pub(crate) fn check_address_of_run(&self, base: &BaseUrl) -> Result<()> {
+        if Vendor::has_host(base.host()) && !base.is_plain() {
+            return Ok(());
+        }
+        let has_headers = !self.header.is_empty() || !self.header_env.is_empty();
+        if base.is_loopback() && !has_headers && self.key(base, None)?.is_none() {
+            return Ok(());
+        }
+        let problem = format_args!(
+            "only the run folder names the address {base}, and it may be a stranger's: to send your key there, name it with --base-url \
+             {base}"
+        );
+        Err(Error::usage("--base-url", problem))
+    }
+
+    /// The key from a file or a variable. For an endpoint on another machine a key is required, except with `none`.
+    fn key(&self, base: &BaseUrl, vendor: Option<&'static Vendor>) -> Result<Option<Secret>> {
+        if let Some(path) = &self.api_key_file {
+            return Secret::read(path).map(Some);
+        }
+        if let Some(name) = self.api_key_env.as_deref() {
+            let wrong = |problem: String| Error::usage("--api-key-env", problem);
+            if name == NO_KEY {
+                return Ok(None);
+            }
+            if looks_like_key(name) {
+                return Err(wrong(
+                    "the name of a variable expected; this value looks like a key and is not shown here: put it into a variable, and name \
+                     that variable"
+                        .to_owned(),
+                ));
+            }
+            let text = variable(name);
+            let text = text.ok_or_else(|| wrong(format!("the variable {name} is not set")))?;
+            return Secret::new(&text, name).map(Some);
+        }
+        let names = key_variables(base, vendor);
+        let mut set = names
+            .iter()
+            .filter_map(|name| Some((*name, variable(name)?)));
+        match set.next() {
+            Some((name, text)) => Secret::new(&text, name).map(Some),
+            None if base.is_loopback() || base.has_credentials() => Ok(None),
+            // A header from a variable authenticates, too.
+            None if !self.header_env.is_empty() => Ok(None),
+            None => Err(no_key(base, &names)),
+        }
+    }
+}
+
+/// The variables that may hold the key of an endpoint, in order. OpenAI's key goes to another vendor only if `OPENAI_BASE_URL`
+/// names the host.
+fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'static str> {
+    let Some(vendor) = vendor else {
+        return vec![OPENAI_KEY];
+    };
+    let mut names: Vec<&str> = vendor.key.iter().map(String::as_str).collect();
+    let named = variable(BASE_URL_VARIABLE).and_then(|text| text.parse::<BaseUrl>().ok());
+    let is_named = named.is_some_and(|named| named.host() == base.host());
+    if is_named && !names.contains(&OPENAI_KEY) {
+        names.push(OPENAI_KEY);
+    }
+    names
+}
+
+/// The variables of the tools of a host's vendor; none if the built-in table does not have the host.
+pub(crate) fn own_variables(host: &str) -> Vec<&'static str> {
+    Vendor::at_host(host)
+        .into_iter()
+        .flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()))
+        .map(String::as_str)
+        .collect()
+}
+
+/// The error about an endpoint without a key.
+fn no_key(base: &BaseUrl, names: &[&str]) -> Error {
+    let foreign = !names.contains(&OPENAI_KEY) && variable(OPENAI_KEY).is_some();
+    let foreign = if foreign {
+        " (OPENAI_API_KEY is set, and is not sent to another vendor unless --api-key-env names it)"
+    } else {
+        ""
+    };
+    let these = if names.len() == 1 {
+        "this variable"
+    } else {
+        "one of these variables"
+    };
+    Error::usage(
+        names.join(", "),
+        format_args!(
+            "no key for {base}: set {these}{foreign}, or name another with --api-key-env NAME or a file with --api-key-file FILE; \
+             name your own server with --base-url URL; --api-key-env none sends no key"
+        ),
+    )
+}
+
+/// The headers for accounts with several organizations or projects, from the variables that the vendor's clients use.
+fn account_headers(vendor: Option<&Vendor>) -> Vec<(String, String)> {
+    vendor
+        .into_iter()
+        .flat_map(|vendor| &vendor.account)
+        .filter_map(|(header, name)| Some((header.clone(), variable(name)?)))
+        .collect()
+}

@@ -1,0 +1,13 @@
+//! Models: those at an endpoint, and those that answer in this process.
+
+mod local;
+mod model;
+mod random;
+mod remote;
+mod script;
+
+pub(crate) use local::{Local, LocalAnswer};
+pub use model::Model;
+pub use random::Random;
+pub use remote::Remote;
+pub use script::Script;

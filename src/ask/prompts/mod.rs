@@ -1,0 +1,6 @@
+//! Prompts: the text of questions, of this program and of OpenEQA.
+
+pub(crate) mod openeqa;
+mod prompt;
+
+pub use prompt::Prompts;

@@ -1,0 +1,216 @@
+//! The prompts of OpenEQA for models and the judge, byte for byte those of `facebookresearch/open-eqa` at cfa3fce.
+
+use std::sync::LazyLock;
+
+use regex::Regex;
+
+/// Upstream's templates (MIT, Meta Platforms). They are stripped before use, as upstream does.
+const VISION: &str = include_str!("../../../prompts/openeqa/vision.txt");
+const BLIND: &str = include_str!("../../../prompts/openeqa/blind.txt");
+const MATCH: &str = include_str!("../../../prompts/openeqa/match.txt");
+const MATCH_EXTRA: &str = include_str!("../../../prompts/openeqa/match-extra.txt");
+
+/// The prompt for a model with images: the text before the images, and the text after them.
+#[must_use]
+pub(crate) fn vision(question: &str) -> (String, String) {
+    const QUERY: &str = "User Query:";
+    let template = VISION.trim();
+    let (before, behind) = template.split_once(QUERY).unwrap_or((template, ""));
+    let behind = formatted(behind, &[("question", question)]);
+    (before.to_owned(), format!("{QUERY}{behind}"))
+}
+
+/// The prompt for a model without images.
+#[must_use]
+pub(crate) fn blind(question: &str) -> String {
+    formatted(BLIND.trim(), &[("question", question)])
+}
+
+/// The answer in a blind model's reply (`parse_output`): the line after the first "A:", without any further "A:". `None` if
+/// there is none, which is an error upstream.
+#[must_use]
+pub(crate) fn blind_answer(reply: &str) -> Option<String> {
+    let (_, behind) = reply.split_once("A:")?;
+    let line = behind.split('\n').next().unwrap_or(behind);
+    Some(line.replace("A:", "").trim().to_owned())
+}
+
+/// The prompt for the judge about an answer. A list of extra answers selects another template, even if it is empty.
+#[must_use]
+pub(crate) fn judge_prompt(
+    question: &str,
+    answer: &str,
+    extra: Option<&[String]>,
+    prediction: &str,
+) -> String {
+    let values = [
+        ("question", question),
+        ("answer", answer),
+        ("prediction", prediction),
+    ];
+    match extra {
+        None => formatted(MATCH.trim(), &values),
+        Some(extra) => {
+            let list = python_list(extra);
+            let values = [values[0], values[1], values[2], ("extra_answers", &*list)];
+            formatted(MATCH_EXTRA.trim(), &values)
+        }
+    }
+}
+
+/// A template filled with values, as by Python's `str.format`: braces within a value are plain text.
+fn formatted(template: &str, values: &[(&str, &str)]) -> String {
+    let mut text = String::new();
+    let mut rest = template;
+    while let Some((before, behind)) = rest.split_once('{') {
+        text += before;
+        let Some((name, behind)) = behind.split_once('}') else {
+            rest = behind;
+            break;
+        };
+        let value = values.iter().find(|(known, _)| *known == name);
+        text += value.map_or("", |(_, value)| value);
+        rest = behind;
+    }
+    text + rest
+}
+
+/// A list of texts as Python prints it: `['a', "it's"]`.
+fn python_list(texts: &[String]) -> String {
+    let texts: Vec<String> = texts.iter().map(|text| python_repr(text)).collect();
+    format!("[{}]", texts.join(", "))
+}
+
+/// The characters that Python's `str.isprintable` rejects: the categories "Other" and "Separator" except the space.
+static UNPRINTABLE: LazyLock<Option<Regex>> =
+    LazyLock::new(|| Regex::new(r"^[\p{C}\p{Z}--\x20]$").ok());
+
+/// A text as Python's `repr` prints it: in single quotes, or in double quotes if it has a single quote and no double quote.
+fn python_repr(text: &str) -> String {
+    let quote = if text.contains('\'') && !text.contains('"') {
+        '"'
+    } else {
+        '\''
+    };
+    let mut printed = String::from(quote);
+    for c in text.chars() {
+        match c {
+            '\\' => printed += "\\\\",
+            '\n' => printed += "\\n",
+            '\r' => printed += "\\r",
+            '\t' => printed += "\\t",
+            _ if c == quote => {
+                printed.push('\\');
+                printed.push(c);
+            }
+            _ if !unprintable(c) => printed.push(c),
+            _ => printed += &escape(u32::from(c)),
+        }
+    }
+    printed.push(quote);
+    printed
+}
+
+/// The escape of a character, with as few digits as Python uses.
+fn escape(code: u32) -> String {
+    match code {
+        0..0x100 => format!("\\x{code:02x}"),
+        0x100..0x1_0000 => format!("\\u{code:04x}"),
+        _ => format!("\\U{code:08x}"),
+    }
+}
+
+fn unprintable(c: char) -> bool {
+    let mut buffer = [0; 4];
+    let text: &str = c.encode_utf8(&mut buffer);
+    !c.is_ascii_graphic()
+        && UNPRINTABLE
+            .as_ref()
+            .is_some_and(|pattern| pattern.is_match(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::Digest;
+
+    /// Texts and their `repr` in Python 3.11.7.
+    const GOLDEN: [(&str, &str); 20] = [
+        ("", "''"),
+        ("plain", "'plain'"),
+        ("it's", "\u{22}it's\u{22}"),
+        ("\u{22}q\u{22}", "'\u{22}q\u{22}'"),
+        ("both ' and \u{22}", "'both \u{5c}' and \u{22}'"),
+        ("back\u{5c}slash", "'back\u{5c}\u{5c}slash'"),
+        ("tab\u{9}nl\u{a}cr\u{d}", "'tab\u{5c}tnl\u{5c}ncr\u{5c}r'"),
+        ("Gr\u{f6}\u{df}e", "'Gr\u{f6}\u{df}e'"),
+        ("\u{65e5}\u{672c}\u{8a9e}", "'\u{65e5}\u{672c}\u{8a9e}'"),
+        ("\u{a0}nbsp", "'\u{5c}xa0nbsp'"),
+        ("\u{200b}zero", "'\u{5c}u200bzero'"),
+        ("\u{ad}", "'\u{5c}xad'"),
+        (
+            "\u{0}\u{1f}\u{7f}\u{85}",
+            "'\u{5c}x00\u{5c}x1f\u{5c}x7f\u{5c}x85'",
+        ),
+        ("\u{1f600}", "'\u{1f600}'"),
+        ("\u{e0001}", "'\u{5c}U000e0001'"),
+        ("\u{2028}", "'\u{5c}u2028'"),
+        ("\u{d7ff}", "'\u{5c}ud7ff'"),
+        ("\u{e9}'\u{22}", "'\u{e9}\u{5c}'\u{22}'"),
+        ("\u{feff}", "'\u{5c}ufeff'"),
+        ("\u{378}", "'\u{5c}u0378'"),
+    ];
+
+    #[test]
+    fn templates_are_those_of_upstream() {
+        // Bytes of the files at cfa3fce, stripped.
+        for (template, bytes) in [
+            (VISION, 321),
+            (BLIND, 613),
+            (MATCH, 669),
+            (MATCH_EXTRA, 997),
+        ] {
+            assert_eq!(
+                template.trim().len(),
+                bytes,
+                "{}",
+                Digest::from_bytes(template.as_bytes())
+            );
+        }
+        assert!(UNPRINTABLE.is_some());
+    }
+
+    #[test]
+    fn prompts_are_split_and_filled_as_upstream_does() {
+        let (before, behind) = vision("Where is {answer}?");
+        assert!(before.ends_with("answer to the question asked by the user.\n"));
+        assert_eq!(behind, "User Query: Where is {answer}?");
+        let blind = blind("Is it?");
+        assert!(blind.starts_with("You are an intelligent") && blind.ends_with("\n\nQ: Is it?"));
+        for (reply, answer) in [
+            ("A: a bed \nExplanation: x", Some("a bed")),
+            ("Q: Is it?\nA: A: a bed", Some("a bed")),
+            ("Answer: a bed", None),
+        ] {
+            assert_eq!(blind_answer(reply).as_deref(), answer);
+        }
+        let plain = judge_prompt("Q {prediction}", "it's", None, "{answer}");
+        assert!(
+            plain.ends_with(
+                "Your Turn:\nQuestion: Q {prediction}\nAnswer: it's\nResponse: {answer}"
+            )
+        );
+        let extra = ["Next to the stairs", "it's here", "\"both\" it's"].map(str::to_owned);
+        let prompt = judge_prompt("Q", "A", Some(&extra), "P");
+        let list = r#"Extra Answers: ['Next to the stairs', "it's here", '"both" it\'s']"#;
+        assert!(prompt.contains(list), "{prompt}");
+        assert!(judge_prompt("Q", "A", Some(&[]), "P").contains("Extra Answers: []\n"));
+    }
+
+    #[test]
+    fn texts_are_printed_as_python_prints_them() {
+        for (text, printed) in GOLDEN {
+            assert_eq!(python_repr(text), printed);
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! JSON from a server, of which a bounded number of values is kept: [`parse`].
+//!
+//! A body of 16 MB of small objects takes 1.5 GB as a tree of values. No reply needs so many: lists and objects are read to their
+//! end, and what is beyond the bounds is left out, so that a field behind a long list is still found.
+
+use std::cell::Cell;
+use std::fmt;
+
+use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map, Number, Value};
+
+/// The maximum number of values of one text; chosen: they take at most 150 MB.
+const MOST_VALUES: usize = 200_000;
+
+/// The maximum number of items of one list, and of fields of one object; chosen.
+pub(in crate::ask) const MOST_ITEMS: usize = 10_000;
+
+/// The JSON value of a text.
+///
+/// # Errors
+/// If the text is not one whole JSON value.
+pub(in crate::ask) fn parse(text: &str) -> serde_json::Result<Value> {
+    let mut json = serde_json::Deserializer::from_str(text);
+    let value = bounded(&mut json)?;
+    json.end()?;
+    Ok(value)
+}
+
+/// The JSON value that a text begins with.
+///
+/// # Errors
+/// If the text begins with none.
+pub(in crate::ask) fn parse_start(text: &str) -> serde_json::Result<Value> {
+    bounded(&mut serde_json::Deserializer::from_str(text))
+}
+
+fn bounded<'j>(
+    json: impl Deserializer<'j, Error = serde_json::Error>,
+) -> serde_json::Result<Value> {
+    let left = Cell::new(MOST_VALUES);
+    Bounded { left: &left }.deserialize(json)
+}
+
+/// Reads a value of which at most `left` values are kept.
+struct Bounded<'l> {
+    left: &'l Cell<usize>,
+}
+
+impl Bounded<'_> {
+    /// Takes room for a value beside `kept` others of its list; `None` if there is none.
+    fn take(&self, kept: usize) -> Option<Self> {
+        let left = self.left.get().checked_sub(1)?;
+        (kept < MOST_ITEMS).then(|| {
+            self.left.set(left);
+            Self { left: self.left }
+        })
+    }
+}
+
+impl<'j> DeserializeSeed<'j> for Bounded<'_> {
+    type Value = Value;
+
+    fn deserialize<D: Deserializer<'j>>(self, json: D) -> Result<Value, D::Error> {
+        json.deserialize_any(self)
+    }
+}
+
+impl<'j> Visitor<'j> for Bounded<'_> {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("any JSON value")
+    }
+
+    fn visit_unit<E: Error>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E: Error>(self, value: bool) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E: Error>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<Value, E> {
+        Ok(Number::from_f64(value).map_or(Value::Null, Value::Number))
+    }
+
+    fn visit_str<E: Error>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_string<E: Error>(self, value: String) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'j>>(self, mut list: A) -> Result<Value, A::Error> {
+        let mut items = Vec::new();
+        while let Some(seed) = self.take(items.len()) {
+            match list.next_element_seed(seed)? {
+                Some(item) => items.push(item),
+                None => return Ok(items.into()),
+            }
+        }
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(items.into())
+    }
+
+    fn visit_map<A: MapAccess<'j>>(self, mut object: A) -> Result<Value, A::Error> {
+        let mut fields = Map::new();
+        while let Some(seed) = self.take(fields.len()) {
+            match object.next_key::<String>()? {
+                Some(name) => fields.insert(name, object.next_value_seed(seed)?),
+                None => return Ok(fields.into()),
+            };
+        }
+        while object.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
+        Ok(fields.into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn small_values_are_those_of_serde() {
+        for text in [
+            r#"{"a":[1,-2,3.5,1e300,true,null,"x\n\ud83d\ude00"],"b":{},"c":[[]],"a ":18446744073709551615}"#,
+            "[]",
+            "\"x\"",
+            " 7 ",
+            r#"{"a":1,"a":2}"#,
+        ] {
+            assert_eq!(
+                parse(text).unwrap(),
+                serde_json::from_str::<Value>(text).unwrap()
+            );
+        }
+        for text in ["", "{", "[1,]", "{} x", "[1e999]", "nul"] {
+            let expected = serde_json::from_str::<Value>(text).unwrap_err();
+            assert_eq!(parse(text).unwrap_err().to_string(), expected.to_string());
+        }
+        assert_eq!(parse_start("{\"a\":1} and more").unwrap(), json!({"a": 1}));
+        assert!(parse(&"[".repeat(1000)).is_err());
+    }
+
+    #[test]
+    fn a_field_behind_a_long_list_is_found() {
+        let items = "{\"a\":1},".repeat(50_000);
+        let text = format!("{{\"x\":[{items}1],\"y\":2}}");
+        let value = parse(&text).unwrap();
+        assert_eq!(value["y"], 2);
+        assert_eq!(value["x"].as_array().unwrap().len(), MOST_ITEMS);
+        // What is beyond the bounds must be JSON, too.
+        assert!(parse(&text.replace(",1]", ",]")).is_err());
+    }
+
+    #[test]
+    fn no_more_values_are_kept_than_the_bound() {
+        fn count(value: &Value) -> usize {
+            match value {
+                Value::Array(items) => 1 + items.iter().map(count).sum::<usize>(),
+                Value::Object(fields) => 1 + fields.values().map(count).sum::<usize>(),
+                _ => 1,
+            }
+        }
+        let list = format!("[{}1]", "[1],".repeat(1_000));
+        let text = format!("[{}1]", format!("{list},").repeat(300));
+        assert!(count(&parse(&text).unwrap()) <= 1 + MOST_VALUES);
+    }
+}

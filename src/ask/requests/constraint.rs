@@ -1,0 +1,62 @@
+//! Replies that are constrained to one letter: the JSON schema in the request, and [`letter_of`] a reply.
+
+use serde_json::{Value, json};
+
+use super::parameters::Constrain;
+use crate::types::questions::letter;
+
+/// The name of the only field in a reply with `--request constrain=json`.
+pub(in crate::ask) const ANSWER: &str = "answer";
+
+/// The JSON schema of an object whose only field is one of the letters.
+pub(in crate::ask) fn schema(letters: &[char]) -> Value {
+    json!({
+        "type": "object", "additionalProperties": false, "required": [ANSWER],
+        "properties": {ANSWER: {"type": "string", "enum": letters}},
+    })
+}
+
+/// The letter in a constrained reply; `None` without a constraint, or if the server did not follow it.
+pub(in crate::ask) fn letter_of(
+    constrain: Constrain,
+    choices: usize,
+    reply: &str,
+) -> Option<String> {
+    let object: Option<Value> = match constrain {
+        Constrain::None => return None,
+        Constrain::Json => serde_json::from_str(reply).ok(),
+        Constrain::Choice => None,
+    };
+    let text = match &object {
+        Some(object) if object.as_object()?.len() == 1 => object.get(ANSWER)?.as_str()?,
+        Some(_) => return None,
+        None => reply,
+    };
+    (0..choices)
+        .map(|index| letter(index).to_string())
+        .find(|letter| letter == text.trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_letter_of_a_constrained_reply_is_found() {
+        use Constrain::{Choice, Json};
+        for (constrain, reply, letter) in [
+            (Json, "{\"answer\": \"B\"}", Some("B")),
+            (Json, " {\n\"answer\" : \"A\" }\n", Some("A")),
+            (Json, "{\"answer\":\"C\"}", None),
+            (Json, "{\"answer\":\"B", None),
+            (Json, "{\"answer\":\"B\",\"why\":\"x\"}", None),
+            (Json, "The answer is B", None),
+            (Choice, "B", Some("B")),
+            (Choice, " A\n", Some("A")),
+            (Choice, "a", None),
+            (Choice, "B. yes", None),
+        ] {
+            assert_eq!(letter_of(constrain, 2, reply).as_deref(), letter, "{reply}");
+        }
+    }
+}

@@ -1,0 +1,315 @@
+//! The model's name and sampling settings in a request: [`Parameters`].
+
+use std::fmt;
+use std::num::NonZeroU32;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::extra_fields::ExtraFields;
+use super::thinking::Thinking;
+use super::token_field::TokenField;
+use crate::ask::wire_kind::WireSetting;
+use crate::error::{Error, Result};
+use crate::types::Decides;
+use crate::types::flags::flag_words;
+use crate::types::text::words::written_as_text;
+
+/// The name of a model and the settings of its replies; a setting that is `None` is left out of the request.
+///
+/// The JSON form has everything that can change a reply, and is part of the key of each trial. Settings that are not set are not
+/// written or null, so that a new setting changes no earlier key.
+#[derive(Debug, Clone, PartialEq, Args, Serialize)]
+#[command(next_help_heading = "Model")]
+pub struct Parameters {
+    /// The model, by the endpoint's name.
+    #[arg(skip)]
+    pub model: String,
+    /// Sampling temperature; default for the server's own; auto for 0, or the server's own if the model refuses any other
+    #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto, add = Decides::Reply)]
+    pub temperature: Temperature,
+    /// Draw only from the likeliest tokens that together have this probability; default: not sent
+    #[arg(long, value_name = "P", value_parser = probability, add = Decides::Reply)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub top_p: Option<f64>,
+    /// The maximum number of tokens of a reply, hidden reasoning included
+    ///
+    /// A letter needs 16; a reasoning model uses hundreds before it.
+    #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
+    pub max_tokens: NonZeroU32,
+    /// The smaller limit that the run began with, which stays in the keys of its trials; `None` if it has not grown.
+    #[arg(skip)]
+    #[serde(skip)]
+    pub first_max_tokens: Option<NonZeroU32>,
+    /// The field that carries that limit; auto is what is known of the endpoint, else max_tokens, and the other one if the server asks for
+    /// it
+    #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
+    #[serde(skip)]
+    pub token_field: TokenField,
+    /// How long a reasoning model thinks, in the server's words (none, minimal, low, medium, high …); default: not sent
+    #[arg(long, value_name = "EFFORT", add = Decides::Reply)]
+    pub reasoning_effort: Option<String>,
+    /// Whether the model thinks before it answers, sent in the server's own field (src/ask/thinking.toml); default: not sent
+    #[arg(long, value_name = "THINKING", value_enum, add = Decides::Reply)]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thinking: Option<Thinking>,
+    /// How closely the server looks at images; default: not sent
+    #[arg(long, value_name = "DETAIL", value_enum, add = Decides::Reply)]
+    pub detail: Option<ImageDetail>,
+    /// The API: chat in one piece or as a stream, or the Responses API; auto is chat, and what the server asks for instead
+    #[arg(long, value_name = "WIRE", value_enum, default_value_t, add = Decides::Reply)]
+    #[serde(skip)]
+    pub wire: WireSetting,
+    /// The seed of the server's sampling, if the server supports it: replies at a temperature above 0 are then more alike.
+    #[arg(skip)]
+    pub seed: Option<u64>,
+    /// The constraint that the server puts on the model's reply.
+    #[arg(skip)]
+    pub constrain: Constrain,
+    /// Whether the probabilities of the likeliest tokens are asked for.
+    #[arg(skip)]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub probabilities: bool,
+    /// Fields that the user adds to requests or leaves out.
+    #[arg(skip)]
+    #[serde(flatten)]
+    pub extra: ExtraFields,
+}
+
+impl Parameters {
+    /// The default of the token limit; chosen.
+    pub const MAX_TOKENS: NonZeroU32 = NonZeroU32::new(1024).unwrap();
+
+    /// The settings that every server accepts: temperature 0, and enough tokens for a reply with reasoning.
+    #[must_use]
+    pub fn new(model: String) -> Self {
+        Self {
+            model,
+            temperature: Temperature::Auto,
+            top_p: None,
+            seed: None,
+            max_tokens: Self::MAX_TOKENS,
+            first_max_tokens: None,
+            token_field: TokenField::Auto,
+            reasoning_effort: None,
+            thinking: None,
+            detail: None,
+            wire: WireSetting::Auto,
+            constrain: Constrain::None,
+            probabilities: false,
+            extra: ExtraFields::default(),
+        }
+    }
+
+    /// The token limit that is sent; `None` if none is sent.
+    pub(in crate::ask) fn limit(&self) -> Option<u32> {
+        (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
+    }
+
+    /// The token limit that is sent, if it is larger than the one that the run began with.
+    pub(in crate::ask) fn grown_limit(&self) -> Option<u32> {
+        self.limit().filter(|_| self.first_max_tokens.is_some())
+    }
+
+    /// The same settings in a run that began with a smaller token limit, which stays in the keys of its trials; `None` if this one is not
+    /// larger or not sent.
+    pub(crate) fn grown_from(&self, first: NonZeroU32) -> Option<Self> {
+        let is_larger = self.limit()? > first.get();
+        is_larger.then(|| Self {
+            first_max_tokens: Some(first),
+            ..self.clone()
+        })
+    }
+
+    /// The same settings in a run that has this column of the model, with a smaller token limit; `None` if another setting differs, too.
+    pub(crate) fn grown_from_column(&self, column: &Value) -> Option<Self> {
+        let first = u32::try_from(column["--max-tokens"].as_u64()?).ok()?;
+        self.grown_from(NonZeroU32::new(first)?)
+            .filter(|grown| grown.are_of_column(column))
+    }
+
+    /// Whether the settings that decide a reply are those of a run's column, whose address is left aside.
+    pub(crate) fn are_of_column(&self, column: &Value) -> bool {
+        let Value::Object(own) = self.content() else {
+            return false;
+        };
+        let mut column = column.as_object().cloned().unwrap_or_default();
+        column.remove("--base-url");
+        by_flag(own) == column
+    }
+
+    /// Checks that the temperature does not change the probabilities of tokens.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it is another one than 0 or the server's own.
+    pub(crate) fn require_greedy(&self) -> Result<()> {
+        match self.temperature {
+            Temperature::Of(value) if value > 0.0 => Err(Error::usage(
+                "--request probabilities",
+                "the probabilities of tokens depend on the temperature: --temperature 0, auto or default expected",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// The settings that can change a reply, the API among them. Whether a token limit is sent is one of them; the name of its field is not.
+    pub(in crate::ask) fn content(&self) -> Value {
+        let mut content = json!(self);
+        let first = self.first_max_tokens.map(NonZeroU32::get);
+        content["max_tokens"] = first.or(self.limit()).into();
+        content["wire"] = self.wire.content().into();
+        content
+    }
+}
+
+/// The settings of a model, by the flag that sets each.
+pub(crate) fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
+    content
+        .into_iter()
+        .map(|(name, value)| (flag(&name), value))
+        .collect()
+}
+
+/// The flag that sets a parameter.
+fn flag(parameter: &str) -> String {
+    match parameter {
+        "seed" => "--sampling-seed".to_owned(),
+        // Keys of a file of models that are no flags.
+        "deployment" => "deployment".to_owned(),
+        "reply_headers" => "reply-headers".to_owned(),
+        name => format!("--{}", name.replace('_', "-")),
+    }
+}
+
+/// Reads a probability above 0.
+fn probability(text: &str) -> std::result::Result<f64, String> {
+    let value = text.parse().ok();
+    let value = value.filter(|value| 0.0 < *value && *value <= 1.0);
+    value.ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
+}
+
+/// The sampling temperature of a request.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Temperature {
+    /// 0, which gives the likeliest answer. If the model refuses it, as reasoning models do, the server's default.
+    Auto,
+    /// The server's default: no temperature is sent.
+    Server,
+    /// A given temperature, 0 or more.
+    Of(f64),
+}
+
+impl fmt::Display for Temperature {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.pad("auto"),
+            Self::Server => f.pad("default"),
+            Self::Of(value) => write!(f, "{value}"),
+        }
+    }
+}
+
+impl FromStr for Temperature {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match (text, text.parse::<f64>()) {
+            ("auto", _) => Ok(Self::Auto),
+            ("default", _) => Ok(Self::Server),
+            (_, Ok(value)) if value.is_finite() && value >= 0.0 => Ok(Self::Of(value)),
+            _ => Err("a number from 0 on, auto or default expected".to_owned()),
+        }
+    }
+}
+
+/// The resolution at which the server reads an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum ImageDetail {
+    /// As the server decides
+    Auto,
+    /// Small: what little can be seen in the dark is lost
+    Low,
+    /// Large
+    High,
+    /// As large as it is, within the server's limits (the newest models of OpenAI)
+    Original,
+}
+
+/// The constraint on a model's reply. Any value but `None` measures something else: the model's answer if it must name a
+/// letter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Constrain {
+    /// Anything
+    #[default]
+    None,
+    /// A JSON object with the letter of a choice, by response_format (OpenAI, vLLM, SGLang, llama.cpp, Ollama, Gemini)
+    Json,
+    /// The letter of a choice alone, by structured_outputs (vLLM from 0.12)
+    Choice,
+}
+
+written_as_text!(Temperature);
+flag_words!(ImageDetail, Constrain);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_read_back() {
+        for name in ["auto", "max_tokens", "max_completion_tokens", "none"] {
+            let field = TokenField::from_str(name, false).unwrap();
+            assert_eq!(field.to_string(), name);
+        }
+        for text in ["auto", "default", "0.5"] {
+            assert_eq!(text.parse::<Temperature>().unwrap().to_string(), text);
+        }
+        for wrong in ["-1", "NaN", "inf", "", "hot"] {
+            assert!(wrong.parse::<Temperature>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn settings_that_decide_a_reply_change_the_content() {
+        let base = Parameters::new("m".into());
+        let mut others = vec![base.clone(); 15];
+        others[0].model = "n".into();
+        others[1].temperature = Temperature::Server;
+        others[2].token_field = TokenField::Omit;
+        others[3].reasoning_effort = Some(String::new());
+        others[4].detail = Some(ImageDetail::High);
+        others[5].constrain = Constrain::Json;
+        others[6].temperature = Temperature::Of(0.0);
+        others[7].seed = Some(0);
+        others[8].extra.deployment = Some("a".into());
+        others[9].extra.system = Some("a".into());
+        others[10].extra.body.insert("a".into(), Value::Null);
+        others[11].extra.omit = vec!["a".into()];
+        others[12].wire = WireSetting::Responses;
+        others[13].probabilities = true;
+        others[14].thinking = Some(Thinking::Off);
+        for other in &others {
+            assert_ne!(other.content(), base.content(), "{other:?}");
+        }
+        let renamed = Parameters {
+            token_field: TokenField::MaxTokens,
+            wire: WireSetting::ChatStream,
+            ..base.clone()
+        };
+        assert_eq!(renamed.content(), base.content());
+        let mut grown = base.clone();
+        grown.max_tokens = NonZeroU32::new(4096).unwrap();
+        assert_ne!(grown.content(), base.content());
+        let grown = grown.grown_from(base.max_tokens).unwrap();
+        assert_eq!(grown.content(), base.content());
+        assert_eq!(
+            (grown.limit(), grown.grown_limit()),
+            (Some(4096), Some(4096))
+        );
+        assert_eq!(base.grown_from(grown.max_tokens), None);
+    }
+}

@@ -1,0 +1,182 @@
+//! Whether a model thinks before it answers ([`Thinking`]), and how a server is told ([`ThinkingSwitch`]).
+//!
+//! Every vendor has fields of its own for it; they are in `thinking.toml`, by host.
+
+use std::sync::LazyLock;
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::ask::endpoints::BaseUrl;
+use crate::error::{Error, Result};
+use crate::types::flags::flag_words;
+
+/// The table that comes with the program.
+static TABLE: LazyLock<Table> = LazyLock::new(|| {
+    let text = include_str!("../thinking.toml");
+    toml::from_str(text).unwrap_or_else(|e| unreachable!("a test reads thinking.toml: {e}"))
+});
+
+/// Whether a model thinks before it answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Thinking {
+    /// It answers at once
+    Off,
+    /// It thinks first
+    On,
+}
+
+flag_words!(Thinking);
+
+/// The servers that are known, with the date of the table.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct Table {
+    #[expect(dead_code, reason = "for readers of the table")]
+    as_of: String,
+    server: Vec<ServerRow>,
+}
+
+/// Servers that are told in the same way.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ServerRow {
+    /// Ends of their hosts' names.
+    #[serde(default)]
+    hosts: Vec<String>,
+    /// Ports of servers on this machine.
+    #[serde(default)]
+    ports: Vec<u16>,
+    off: Option<ThinkingSwitch>,
+    on: Option<ThinkingSwitch>,
+}
+
+/// The part of a request that controls thinking.
+#[derive(Debug, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(in crate::ask) struct ThinkingSwitch {
+    /// The reasoning effort; `None` if it is not the switch.
+    pub(super) effort: Option<String>,
+    /// Fields at the top of the request.
+    #[serde(default)]
+    pub(super) body: Map<String, Value>,
+}
+
+impl Thinking {
+    /// The switch that this server understands.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if nothing is known of the server's switch.
+    pub(super) fn at(self, base: &BaseUrl) -> Result<&'static ThinkingSwitch> {
+        let servers = &TABLE.server;
+        let row = servers.iter().find(|row| row.is_of(base));
+        let row = row.or_else(|| servers.iter().find(|row| row.is_of_others()));
+        let switch = row.and_then(|row| match self {
+            Self::Off => row.off.as_ref(),
+            Self::On => row.on.as_ref(),
+        });
+        switch.ok_or_else(|| {
+            let problem = format_args!(
+                "how to turn thinking {self} at {base} is not known; set it with --reasoning-effort, in the server's words"
+            );
+            Error::usage("--thinking", problem)
+        })
+    }
+}
+
+impl ServerRow {
+    fn is_of(&self, base: &BaseUrl) -> bool {
+        let named = self.hosts.iter().any(|host| {
+            let whole = base.host() == host.trim_start_matches('.');
+            whole || (host.starts_with('.') && base.host().ends_with(&**host))
+        });
+        named || (base.is_loopback() && base.port().is_some_and(|port| self.ports.contains(&port)))
+    }
+
+    fn is_of_others(&self) -> bool {
+        self.hosts.is_empty() && self.ports.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn at(base: &str, thinking: Thinking) -> Result<&'static ThinkingSwitch> {
+        thinking.at(&base.parse().unwrap())
+    }
+
+    #[test]
+    fn every_server_is_told_in_its_own_words() {
+        let template = json!({"chat_template_kwargs": {"enable_thinking": false}});
+        for (base, effort, body) in [
+            ("https://api.openai.com/v1", Some("none"), json!({})),
+            (
+                "https://r.openai.azure.com/openai/v1",
+                Some("none"),
+                json!({}),
+            ),
+            (
+                "https://dashscope-intl.aliyuncs.com/compatible-mode/v1",
+                None,
+                json!({"enable_thinking": false}),
+            ),
+            (
+                "https://openrouter.ai/api/v1",
+                None,
+                json!({"reasoning": {"enabled": false}}),
+            ),
+            ("http://127.0.0.1:11434/v1", Some("none"), json!({})),
+            ("http://127.0.0.1:8000/v1", None, template.clone()),
+            // The port reveals nothing about another machine, nor a name of another domain.
+            ("http://gpu7:11434/v1", None, template.clone()),
+            ("https://api.openai.com.example/v1", None, template),
+        ] {
+            let switch = at(base, Thinking::Off).unwrap();
+            assert_eq!(switch.effort.as_deref(), effort, "{base}");
+            assert_eq!(json!(switch.body), body, "{base}");
+        }
+    }
+
+    #[test]
+    fn a_switch_that_is_not_known_is_refused() {
+        for (base, thinking) in [
+            ("https://api.mistral.ai/v1", Thinking::Off),
+            ("https://api.openai.com/v1", Thinking::On),
+        ] {
+            let error = at(base, thinking).unwrap_err().to_string();
+            assert!(error.contains("--thinking"), "{error}");
+            assert!(error.contains("--reasoning-effort"), "{error}");
+        }
+    }
+
+    /// No switch sets what the program sets, and none says nothing.
+    #[test]
+    fn the_table_holds_switches_alone() {
+        let own = [
+            "model",
+            "messages",
+            "input",
+            "stream",
+            "temperature",
+            "max_tokens",
+            "reasoning_effort",
+            "logprobs",
+        ];
+        let others = TABLE.server.iter().filter(|row| row.is_of_others());
+        assert_eq!(others.count(), 1);
+        for row in &TABLE.server {
+            for switch in row.off.iter().chain(&row.on) {
+                assert!(
+                    switch.effort.is_some() || !switch.body.is_empty(),
+                    "{row:?}"
+                );
+                assert!(own.iter().all(|field| !switch.body.contains_key(*field)));
+            }
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! API keys that are never printed ([`Secret`]), and removal of keys from text that a server sent ([`Scrub`]).
+
+use std::fmt;
+use std::path::Path;
+
+use super::secret_parts::{MASK, SecretParts};
+use crate::error::{Error, Result};
+use crate::files::reading;
+
+/// The most bytes of a file that holds a key. Chosen: the longest tokens have half of it.
+const MOST_BYTES: u64 = 4096;
+
+/// An API key that is never printed.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Secret(String);
+
+impl Secret {
+    /// A key without the spaces around it; `origin` is its variable or file, for the error.
+    ///
+    /// # Errors
+    /// If it is empty or has characters other than visible ASCII, which an HTTP header cannot carry. The error does not show
+    /// the key.
+    pub fn new(text: &str, origin: &str) -> Result<Self> {
+        let key = text.trim();
+        if key.is_empty() {
+            return Err(Error::usage(
+                origin,
+                "the key is empty; for an endpoint without keys use --api-key-env none",
+            ));
+        }
+        if !key.bytes().all(|byte| byte.is_ascii_graphic()) {
+            return Err(Error::usage(
+                origin,
+                "the key has spaces or characters that an HTTP header cannot carry; it must be one line of visible ASCII",
+            ));
+        }
+        Ok(Self(key.to_owned()))
+    }
+
+    /// The key in a file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or holds anything but one line of visible ASCII, as a file does that was named by mistake. The error
+    /// shows nothing of it.
+    pub(in crate::ask) fn read(path: &Path) -> Result<Self> {
+        let bytes = reading::at_most(path, MOST_BYTES)?;
+        let origin = format!("--api-key-file {}", path.display());
+        let text = String::from_utf8_lossy(&bytes);
+        if text.contains("-----BEGIN") {
+            let problem =
+                "this is a private key or a certificate, not an API key; nothing of it was sent";
+            return Err(Error::usage(origin, problem));
+        }
+        Self::new(&text, &origin)
+    }
+
+    /// The key as plain text, for HTTP headers.
+    pub(in crate::ask) fn expose(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Debug for Secret {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Secret(…)")
+    }
+}
+
+/// The maximum number of characters of a server's text; chosen.
+const MAX_LINE: usize = 300;
+
+/// The number of bytes of a server's text that are read for its line; chosen.
+const MAX_READ: usize = 64 << 10;
+
+/// The minimum length of a secret that is removed. Shorter ones are placeholders like `x` for servers that accept any key;
+/// their removal would destroy ordinary words.
+const MIN_SECRET: usize = 4;
+
+/// The minimum length of a secret that is removed from a model's reply. Real keys are longer, and an answer may need a shorter
+/// word.
+const MIN_SECRET_IN_REPLY: usize = 16;
+
+/// A filter that makes the text of a server safe for a terminal, a log and a table: one short line without control characters
+/// and secrets.
+#[derive(Clone, Default)]
+pub(in crate::ask) struct Scrub {
+    /// The longest first: if one secret contains another, no part of the longer one must remain.
+    secrets: Vec<String>,
+    /// The parts of those that are removed from replies.
+    parts: SecretParts,
+}
+
+impl Scrub {
+    /// The filter for these secrets.
+    pub(in crate::ask) fn new(secrets: impl IntoIterator<Item = String>) -> Self {
+        let mut secrets: Vec<String> = secrets
+            .into_iter()
+            .filter(|secret| secret.len() >= MIN_SECRET)
+            .collect();
+        secrets.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
+        secrets.dedup();
+        let parts = SecretParts::new(keys(&secrets));
+        Self { secrets, parts }
+    }
+
+    /// Whether there are no secrets to remove.
+    pub(in crate::ask) fn is_empty(&self) -> bool {
+        self.secrets.is_empty()
+    }
+
+    /// A model's reply without keys that it repeats, whole, in parts or in base64; otherwise unchanged.
+    pub(super) fn reply(&self, text: String) -> String {
+        self.parts.masked(self.without_whole_keys(text))
+    }
+
+    /// A line of JSON without keys; its strings stay apart, and the id of a request in a batch loses whole keys alone.
+    pub(in crate::ask) fn json_line(&self, line: String) -> String {
+        let line = self.without_whole_keys(line);
+        let pieces: Vec<&str> = line.split('"').collect();
+        pieces
+            .iter()
+            .enumerate()
+            .map(|(at, piece)| {
+                let is_id = at >= 2 && pieces[at - 2] == "custom_id";
+                if is_id {
+                    (*piece).to_owned()
+                } else {
+                    self.parts.masked((*piece).to_owned())
+                }
+            })
+            .collect::<Vec<_>>()
+            .join("\"")
+    }
+
+    fn without_whole_keys(&self, text: String) -> String {
+        keys(&self.secrets).fold(text, |text, key| {
+            if text.contains(key) {
+                text.replace(key, MASK)
+            } else {
+                text
+            }
+        })
+    }
+
+    /// The text on one line of at most 300 characters, without secrets.
+    pub(in crate::ask) fn line(&self, text: &str) -> String {
+        let text = &text[..text.floor_char_boundary(MAX_READ)];
+        let shown: String = text.chars().filter(|c| !is_hidden(*c)).collect();
+        let words: Vec<&str> = shown.split_whitespace().collect();
+        let mut line = words.join(" ");
+        // Shorten last: otherwise the first half of a secret could remain.
+        for secret in &self.secrets {
+            line = line.replace(secret, MASK);
+        }
+        let line = self.parts.masked(line);
+        match line.char_indices().nth(MAX_LINE) {
+            None => line,
+            Some((end, _)) => format!("{}…", &line[..end]),
+        }
+    }
+}
+
+/// The secrets that are removed from replies.
+fn keys(secrets: &[String]) -> impl Iterator<Item = &str> {
+    secrets
+        .iter()
+        .map(String::as_str)
+        .filter(|secret| secret.len() >= MIN_SECRET_IN_REPLY)
+}
+
+/// Whether a character is a control other than white space, or a mark that reverses or hides text.
+fn is_hidden(c: char) -> bool {
+    (c.is_control() && !c.is_whitespace())
+        || matches!(c, '\u{200B}'..='\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2060}'..='\u{2069}' | '\u{FEFF}')
+}
+
+impl fmt::Debug for Scrub {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Scrub({} secrets)", self.secrets.len())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_checked_and_never_shown() {
+        let key = Secret::new(" sk-abc\n", "KEY").unwrap();
+        assert_eq!(key.expose(), "sk-abc");
+        assert!(!format!("{key:?}").contains("abc"));
+        for wrong in ["", " \n", "sk-a b", "sk-\u{7f}", "sk-é", "sk\nab"] {
+            let error = Secret::new(wrong, "KEY").unwrap_err().to_string();
+            assert!(error.starts_with("KEY: "), "{error}");
+            assert!(!error.contains("sk-"), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_holds_no_key_is_refused_unseen() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let read = |text: &[u8]| {
+            std::fs::write(file.path(), text).unwrap();
+            Secret::read(file.path()).map_err(|e| e.to_string())
+        };
+        assert_eq!(read(b"sk-abc\n").unwrap().expose(), "sk-abc");
+        for wrong in [
+            &b"sk-abc\nsk-def\n"[..],
+            b"-----BEGIN OPENSSH PRIVATE KEY-----\nabc\n",
+            b"-----BEGIN-abc",
+            &[b'a'; 4097],
+            b"sk-\xff",
+        ] {
+            let error = read(wrong).unwrap_err();
+            assert!(error.contains(&*file.path().to_string_lossy()), "{error}");
+            assert!(
+                !["sk-", "abc", "aaa"]
+                    .iter()
+                    .any(|part| error.contains(part)),
+                "{error}"
+            );
+        }
+    }
+
+    #[test]
+    fn only_keys_are_removed_from_replies() {
+        let scrub = Scrub::new(["kitchen".to_owned(), "sk-0123456789abcdef".to_owned()]);
+        let reply = "A  kitchen\nsk-0123456789abcdef".to_owned();
+        assert_eq!(scrub.reply(reply), "A  kitchen\n[secret]");
+    }
+
+    #[test]
+    fn secrets_are_removed_before_the_text_is_shortened() {
+        let scrub = Scrub::new(["sk-abcdef".to_owned(), "sk-abcdef-long".to_owned()]);
+        assert_eq!(
+            scrub.line("key \u{1b}[31msk-abc\u{200b}def-long,\r\n\tsk-abcdef"),
+            "key [31m[secret], [secret]"
+        );
+        let long = format!("{}sk-abcdef", "x".repeat(MAX_LINE - 4));
+        assert!(!scrub.line(&long).contains("sk-"));
+        assert_eq!(scrub.line(&"é".repeat(400)).chars().count(), MAX_LINE + 1);
+        assert_eq!(
+            Scrub::new(["x".to_owned()]).line("an axe\u{202e}"),
+            "an axe"
+        );
+    }
+}

@@ -1,0 +1,145 @@
+//! Vendors that the user adds: [`VendorTable`], a file in the form of `vendors.toml`.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::vendor::Vendor;
+use crate::ask::secrets::looks_like_key;
+use crate::error::{Error, Result};
+use crate::files::reading;
+use crate::types::text::TomlFault;
+
+/// The vendors of a file, above those of the built-in table. The default has none.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::ask) struct VendorTable(&'static [Vendor]);
+
+/// The content of a file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+struct Rows {
+    /// The date of the table, for its readers.
+    #[expect(dead_code, reason = "for readers of the table")]
+    as_of: Option<String>,
+    vendor: Vec<Vendor>,
+}
+
+impl VendorTable {
+    /// Reads a file. The vendors live as long as the program, as those of the built-in table do.
+    ///
+    /// # Errors
+    /// If it cannot be read, has no vendor or unknown fields, or names a key in place of a variable, which is not shown.
+    pub(in crate::ask) fn read(path: &Path) -> Result<Self> {
+        let text = reading::settings(path)?;
+        let wrong = |problem: String| {
+            let expected =
+                "expected tables [[vendor]] with name, hosts and key, as in src/ask/vendors.toml";
+            let problem = format!("{}: {problem}; {expected}", path.display());
+            Error::usage("--vendor", problem)
+        };
+        let Rows { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
+            let TomlFault { line, problem } = TomlFault::new(&text, &e);
+            wrong(format!("line {line}: {problem}"))
+        })?;
+        if rows.is_empty() {
+            return Err(wrong("there is no [[vendor]] in it".to_owned()));
+        }
+        for vendor in &rows {
+            vendor
+                .check()
+                .map_err(|problem| wrong(format!("{}: {problem}", vendor.name)))?;
+            if vendor.batch.is_some() {
+                let problem = "batch: what a Batch API takes is not read from a file; set it with --file-size, --file-requests, --url and \
+                               --purpose";
+                return Err(wrong(format!("{}: {problem}", vendor.name)));
+            }
+            if vendor.key.iter().any(|name| looks_like_key(name)) {
+                let problem = "the value of key looks like a key, which is not shown here: name the variable that holds it";
+                return Err(wrong(format!("{}: {problem}", vendor.name)));
+            }
+        }
+        Ok(Self(Box::leak(rows.into_boxed_slice())))
+    }
+
+    /// The vendor of a host: of the file, else of the built-in table; `None` if neither has it.
+    pub(in crate::ask) fn at_host(self, host: &str) -> Option<&'static Vendor> {
+        self.0
+            .iter()
+            .find(|vendor| vendor.is_of(host))
+            .or_else(|| Vendor::at_host(host))
+    }
+
+    /// The vendor whose keys look like this one, in the same order as [`Self::at_host`].
+    pub(in crate::ask) fn by_key(self, key: &str) -> Option<&'static Vendor> {
+        self.0
+            .iter()
+            .find(|vendor| vendor.has_key(key))
+            .or_else(|| Vendor::by_key(key))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<VendorTable> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        VendorTable::read(file.path())
+    }
+
+    #[test]
+    fn rows_of_the_user_are_above_the_built_in_ones() {
+        let table = read(
+            "[[vendor]]\nname = \"Mine\"\nhosts = [\"llm.example\", \"api.openai.com\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\n",
+        );
+        let table = table.unwrap();
+        let name = |host| table.at_host(host).map(|vendor| &*vendor.name);
+        assert_eq!(name("eu.llm.example"), Some("Mine"));
+        assert_eq!(name("api.openai.com"), Some("Mine"));
+        assert_eq!(name("api.mistral.ai"), Some("Mistral"));
+        assert_eq!(name("notllm.example"), None);
+        assert_eq!(
+            VendorTable::default()
+                .at_host("api.openai.com")
+                .unwrap()
+                .name,
+            "OpenAI"
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_named() {
+        let row = "[[vendor]]\nname = \"Mine\"\n";
+        for (text, part) in [
+            ("", "line 1: missing field `vendor`"),
+            ("vendor = []", "there is no [[vendor]]"),
+            ("[[vendor]]\nname = 3", "line 2: "),
+            (
+                &format!("{row}hosts = [\"a.b\"]\nkey = []\ncolour = 1"),
+                "line 5: unknown field `colour`",
+            ),
+            (&format!("{row}hosts = []\nkey = []"), "Mine: hosts: "),
+            (
+                &format!("{row}hosts = [\"https://a.b/v1\"]\nkey = []"),
+                "Mine: hosts: ",
+            ),
+            (
+                &format!("{row}hosts = [\"a.b\"]\nkey = []\nbatch = {{ requests = 9 }}"),
+                "Mine: batch: ",
+            ),
+            (
+                &format!("{row}hosts = [\"a.b\"]\nkey = [\"sk-0123456789\"]"),
+                "looks like a key",
+            ),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(
+                error.contains("--vendor: ") && error.contains(part),
+                "{text}: {error}"
+            );
+            assert!(!error.contains("0123"), "{error}");
+        }
+        assert!(VendorTable::read(Path::new("/nowhere/at/all")).is_err());
+    }
+}

@@ -1,0 +1,109 @@
+//! A letter with the text of another choice, wherever it stands: [`contradiction`].
+
+use crate::names::{Delimiting, Name};
+use crate::text::Boundary;
+use crate::text::words::Role;
+use crate::view::ReplyView;
+use darkqa_ground::types::questions::{Answer, UnreadReason};
+
+/// A letter with the text of another choice: "B. bathroom", "kitchen (C)", "I choose D, the kitchen".
+pub(super) fn contradiction(view: &ReplyView<'_>) -> Option<Answer> {
+    let wrong = view.names.letters.iter().find(|letter| {
+        letter.state.counts()
+            && paired_text(view, letter).is_some_and(|text| text.choice != letter.choice)
+    });
+    let reason = match wrong?.choice {
+        Some(_) => UnreadReason::Contradiction,
+        None => UnreadReason::OutOfRange,
+    };
+    Some(Answer::Unparsed(reason))
+}
+
+/// The text that stands with a letter as its label or in apposition.
+fn paired_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
+    if let Some(text) = view
+        .names
+        .text_before(letter)
+        .filter(|name| name.state.counts())
+        && view.text[letter.end..].starts_with([')', ']'])
+    {
+        let next = view.names.labelled_text(letter);
+        // "(A) bedroom (B) kitchen" has its labels before the texts.
+        return match next {
+            Some(next) if text.choice != letter.choice => Some(next),
+            _ => Some(text),
+        };
+    }
+    if letter.delimiting == Delimiting::Firm {
+        return view
+            .names
+            .labelled_text(letter)
+            .or_else(|| explained(view, letter))
+            .or_else(|| text_apposed(view, letter));
+    }
+    apposed_text(view, letter).or_else(|| text_apposed(view, letter))
+}
+
+/// The text behind a letter that no bracket marks, with nothing but a comma, a dash or a colon between them, at the end of a
+/// part of a clause: "I choose D, the kitchen."
+fn apposed_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
+    if let Some(text) = explained(view, letter) {
+        return Some(text);
+    }
+    let text = view.names.labelled_text(letter)?;
+    let gap = &view.text[letter.end..text.start];
+    let signs = [',', '-', '–', '—', ':', '.', ')', '=', '→'];
+    let signed = gap.trim_start().starts_with(signs);
+    (signed && ends_part(view, text.end)).then_some(text)
+}
+
+/// The text behind a letter with words such as "i.e." between them: "B, which is the kitchen".
+fn explained(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
+    let elements = &view.clauses.elements;
+    let mut at = view.clauses.index(letter.end);
+    at += usize::from(view.clauses.is_sign(at, &[')', ']']));
+    at += usize::from(view.clauses.is_sign(at, &[',']));
+    if !elements.get(at)?.has(Role::Apposition) {
+        return None;
+    }
+    at += 1 + usize::from(view.clauses.is_sign(at + 1, &[',']));
+    let text = view.names.text_at(elements.get(at)?.start)?;
+    text.state.counts().then_some(text)
+}
+
+/// The text before a letter, with a comma or a dash and perhaps "option" between them: "the kitchen, option C."
+fn text_apposed(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
+    let elements = &view.clauses.elements;
+    let mut at = view.clauses.index(letter.start);
+    let mut called = false;
+    while at > 0
+        && elements[at - 1]
+            .roles
+            .has_any(&[Role::Candidate, Role::Apposition])
+    {
+        at -= 1;
+        called = true;
+    }
+    let sign = at.checked_sub(1)?;
+    let joined = view
+        .clauses
+        .is_sign(sign, &[',', '-', '–', '—', '=', '→', ':', '(', '[']);
+    let text = view.names.text_to(elements[sign.checked_sub(1)?].end)?;
+    let ends = ends_part(view, letter.end) && view.names.labelled_text(letter).is_none();
+    let alone = called || !view.clauses.is_sign(sign, &[',']) || at_clause_end(view, letter.end);
+    (joined && ends && alone && text.state.counts()).then_some(text)
+}
+
+/// Whether a part of a clause ends at a byte.
+fn ends_part(view: &ReplyView<'_>, end: usize) -> bool {
+    let next = view.clauses.elements.get(view.clauses.index(end));
+    next.is_none_or(|next| {
+        next.boundary > Boundary::None || next.roles.has_any(&[Role::Within, Role::Preposition])
+    })
+}
+
+/// Whether a clause ends at a byte.
+fn at_clause_end(view: &ReplyView<'_>, end: usize) -> bool {
+    let next = view.clauses.elements.get(view.clauses.index(end));
+    next.is_none_or(crate::text::Element::cuts)
+}

@@ -1,0 +1,136 @@
+//! Ticks, crosses and task lists: [`ticked`], [`without_unknown`].
+
+use std::borrow::Cow;
+use std::sync::LazyLock;
+
+use regex::Regex;
+
+use crate::text::clean::compiled;
+use darkqa_ground::types::questions::{Answer, UnreadReason};
+
+/// One mark: yes, or no.
+static MARK: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"(?P<yes>[✓✔✅☑👍]|\[[xX]\])|(?P<no>[✗✘❌❎✖👎☐]|\[ \])"));
+
+/// A mark that may mean yes or no.
+const UNKNOWN: char = '☒';
+
+/// Meaning of a mark for the item next to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mark {
+    Yes,
+    No,
+}
+
+/// The choices that a text ticks and crosses.
+#[derive(Debug, Default)]
+pub(super) struct Ticks {
+    ticked: Vec<usize>,
+    crossed: Vec<usize>,
+    /// Whether there are more than [`MAX_MARKS`].
+    is_endless: bool,
+}
+
+/// Maximum number of marks that are parsed. A reply with more repeats itself and is not evaluated.
+const MAX_MARKS: usize = 100;
+
+impl Ticks {
+    /// The answer of the marks: the only choice that is ticked. If there are only crosses, `stated` is, if it is not crossed;
+    /// a tick and another stated answer contradict each other. `None` if no item names a choice.
+    pub(super) fn answer(&self, stated: Option<Answer>) -> Option<Answer> {
+        let stated = stated.filter(|answer| matches!(answer, Answer::Chosen(_)));
+        let unparsed = |reason| Some(Answer::Unparsed(reason));
+        match (self.ticked.first(), stated) {
+            _ if self.is_endless => unparsed(UnreadReason::Ambiguous),
+            (None, _) if self.crossed.is_empty() => None,
+            (None, Some(Answer::Chosen(index))) if !self.crossed.contains(&index) => stated,
+            (None, _) => unparsed(UnreadReason::Negated),
+            (Some(first), _) if self.ticked.iter().any(|other| other != first) => {
+                unparsed(UnreadReason::Ambiguous)
+            }
+            (Some(first), _) if self.crossed.contains(first) => unparsed(UnreadReason::Ambiguous),
+            (Some(first), Some(answer)) if answer != Answer::Chosen(*first) => {
+                unparsed(UnreadReason::Ambiguous)
+            }
+            (Some(first), _) => Some(Answer::Chosen(*first)),
+        }
+    }
+}
+
+/// The text without the lines that have a mark of unknown meaning.
+pub(super) fn without_unknown(tidy: &str) -> Cow<'_, str> {
+    if !tidy.contains(UNKNOWN) {
+        return Cow::Borrowed(tidy);
+    }
+    let lines = tidy.lines().filter(|line| !line.contains(UNKNOWN));
+    Cow::Owned(lines.collect::<Vec<_>>().join("\n"))
+}
+
+/// The marks of a text, with the choice that `read` finds in the item of each. A line with one mark is an item; a line with
+/// more has an item at each mark, behind it if the line begins with a mark, otherwise before it.
+pub(super) fn ticked(tidy: &str, read: impl Fn(&str) -> Answer) -> Option<Ticks> {
+    if !MARK.is_match(tidy) {
+        return None;
+    }
+    let mut ticks = Ticks::default();
+    if MARK.find_iter(tidy).nth(MAX_MARKS).is_some() {
+        ticks.is_endless = true;
+        return Some(ticks);
+    }
+    for line in tidy.lines() {
+        for (mark, item) in items(line) {
+            let Answer::Chosen(index) = read(item.trim_matches([' ', '|', ':', ',', '-', '\t']))
+            else {
+                continue;
+            };
+            match mark {
+                Mark::Yes => ticks.ticked.push(index),
+                Mark::No => ticks.crossed.push(index),
+            }
+        }
+    }
+    Some(ticks)
+}
+
+/// The items of a line, each with its mark.
+fn items(line: &str) -> Vec<(Mark, &str)> {
+    let marks: Vec<(Mark, usize, usize)> = MARK
+        .captures_iter(line)
+        .filter_map(|found| {
+            let whole = found.get(0)?;
+            let mark = if found.name("yes").is_some() {
+                Mark::Yes
+            } else {
+                Mark::No
+            };
+            Some((mark, whole.start(), whole.end()))
+        })
+        .collect();
+    let blank = |text: &str| {
+        text.trim_matches([' ', '\t', '|', '-', '*', '+', '•'])
+            .is_empty()
+    };
+    let leads = marks
+        .first()
+        .is_some_and(|(_, start, _)| blank(&line[..*start]));
+    if let [(mark, start, end)] = *marks {
+        let item = if leads {
+            &line[end..]
+        } else if blank(&line[end..]) {
+            &line[..start]
+        } else {
+            line
+        };
+        return vec![(mark, item)];
+    }
+    let mut items = Vec::with_capacity(marks.len());
+    for (at, (mark, start, end)) in marks.iter().enumerate() {
+        let item = if leads {
+            &line[*end..marks.get(at + 1).map_or(line.len(), |(_, next, _)| *next)]
+        } else {
+            &line[at.checked_sub(1).map_or(0, |before| marks[before].2)..*start]
+        };
+        items.push((*mark, item));
+    }
+    items
+}

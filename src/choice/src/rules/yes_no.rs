@@ -1,0 +1,34 @@
+//! A leading "yes" or "no": [`yes_or_no`].
+
+use crate::names::Delimiting;
+use crate::view::ReplyView;
+use darkqa_ground::types::questions::{Answer, UnreadReason};
+
+/// The leading word, if yes and no are among the choices: "Yes, there is no lamp". A leading "no" counts only if it is an
+/// answer and not a determiner; the other word must not be said as well.
+pub(super) fn yes_or_no(view: &ReplyView<'_>) -> Option<Answer> {
+    let (yes, no) = view.offered.yes_no?;
+    let first = view
+        .clauses
+        .elements
+        .iter()
+        .find(|element| element.end > element.start)?;
+    let word = view.names.text_from(first.start)?;
+    let (chosen, other) = match word.choice {
+        Some(choice) if choice == yes => (yes, no),
+        Some(choice) if choice == no => (no, yes),
+        _ => return None,
+    };
+    if !word.is_affirmed() {
+        return None;
+    }
+    Some(
+        if view.names.all().any(|name| {
+            name.choice == Some(other) && name.delimiting > Delimiting::Loose && name.state.counts()
+        }) {
+            Answer::Unparsed(UnreadReason::Ambiguous)
+        } else {
+            Answer::Chosen(chosen)
+        },
+    )
+}

@@ -1,0 +1,15 @@
+//! The text of a reply: cleaned, without markup, and cut into words and clauses.
+
+mod clauses;
+pub(super) mod clean;
+mod plain;
+mod ranges;
+mod refusal;
+mod tokens;
+pub(super) mod words;
+
+pub(super) use clauses::{Boundary, Clauses, Element};
+pub(super) use plain::{RANGE, fold, plain};
+pub(super) use ranges::Ranges;
+pub(super) use refusal::declines;
+pub(super) use tokens::{Token, TokenKind, tokens};

@@ -1,0 +1,157 @@
+//! Removal of markup from a reply: Markdown, HTML, LaTeX, quotes, pictographs.
+
+use std::sync::LazyLock;
+
+use regex::Regex;
+
+use super::clean::compiled;
+
+static FENCE: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(
+        r"(?i)```(?:json|jsonc|text|txt|markdown|md|python|plaintext|plain|latex|tex|xml|html|yaml)?[ \t]*(?:\n|\b)",
+    )
+});
+static LATEX_GROUP: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(concat!(
+        r"\\(?:text|textbf|textit|textrm|texttt|textsf|mathrm|mathbf|mathit|mathsf|mathtt|mathbb|rm|bf|emph",
+        r"|boldsymbol|bm|boxed|fbox|framebox|operatorname|underline|mbox|displaystyle)\s*\{([^{}]*)\}"
+    ))
+});
+static LATEX_SIGN: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"\\(?:[()\[\],;:! ]|quad\b|qquad\b|bf\b|rm\b)"));
+static LETTER_TAG: LazyLock<Regex> = LazyLock::new(|| compiled(r"\A<([A-Za-z])>\z"));
+static BREAK_TAG: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"(?i)</?(?:br|p|div|li|tr|td|th|h[1-6])\s*/?>"));
+static TAG: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r#"</?[A-Za-z][A-Za-z0-9_-]{0,30}(?:\s+[a-z-]+="[^"<>]*")*\s*/?>"#));
+static LINE_START: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:#{1,6}|>|[-+•·▪◦‣●○■–—])[ \t]+)+"));
+/// The box of a task list, before its text.
+static TASK: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:[-+*•]|\d+[.)])[ \t]+)?\[[ xX]\][ \t]+"));
+/// A box anywhere, in a text that has an empty one.
+static BOX: LazyLock<Regex> = LazyLock::new(|| compiled(r"\[[ xX]\]"));
+/// Maximum depth of LaTeX groups that are unwrapped.
+const LATEX_DEPTH: usize = 4;
+
+/// The text without markup, one space between words, no empty lines, trimmed.
+pub(crate) fn plain(text: &str) -> String {
+    let text = LETTER_TAG.replace(text.trim(), "($1)");
+    let mut text = if text.contains("```") {
+        FENCE.replace_all(&text, "\n").into_owned()
+    } else {
+        text.into_owned()
+    };
+    if text.contains('\\') {
+        text = without_latex(text);
+    }
+    if text.contains('<') {
+        text = BREAK_TAG.replace_all(&text, "\n").into_owned();
+        text = TAG.replace_all(&text, "").into_owned();
+    }
+    if text.contains("[ ]") {
+        text = BOX.replace_all(&text, " ").into_owned();
+    } else if text.contains('[') {
+        text = TASK.replace_all(&text, "").into_owned();
+    }
+    let text = without_signs(&text);
+    let text = LINE_START.replace_all(&text, "");
+    with_single_spaces(&text)
+}
+
+/// The text with the content of LaTeX groups in their place, and without signs of LaTeX.
+fn without_latex(mut text: String) -> String {
+    for _ in 0..LATEX_DEPTH {
+        match LATEX_GROUP.replace_all(&text, "$1") {
+            std::borrow::Cow::Borrowed(_) => break,
+            std::borrow::Cow::Owned(unwrapped) => text = unwrapped,
+        }
+    }
+    LATEX_SIGN.replace_all(&text, " ").into_owned()
+}
+
+/// The trimmed text with a line break for each stretch of white space that has one, and a space for any other.
+fn with_single_spaces(text: &str) -> String {
+    let mut single = String::with_capacity(text.len());
+    let mut gap = None;
+    for c in text.trim().chars() {
+        if c.is_whitespace() {
+            gap = Some(if c == '\n' || gap == Some('\n') {
+                '\n'
+            } else {
+                ' '
+            });
+            continue;
+        }
+        single.extend(gap.take());
+        single.push(c);
+    }
+    single
+}
+
+/// An en dash between two letters, in one byte, as long as a hyphen: "living–room" is a name, "kitchen–bathroom" is two.
+pub(crate) const RANGE: char = '\u{1e}';
+
+/// The text without emphasis, quotes and pictographs. A cross mark becomes "not", any hyphen between letters "-".
+fn without_signs(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    let mut previous = None;
+    let mut rest = text.chars().peekable();
+    while let Some(c) = rest.next() {
+        let next = rest.peek().copied();
+        let inside =
+            previous.is_some_and(char::is_alphanumeric) && next.is_some_and(char::is_alphanumeric);
+        let compound =
+            previous.is_some_and(char::is_alphabetic) && next.is_some_and(char::is_alphabetic);
+        match c {
+            '‐' | '‑' | '‒' | '−' if compound => plain.push('-'),
+            '–' if compound => plain.push(RANGE),
+            RANGE => plain.push(' '),
+            '\'' | '’' | '‘' | 'ʼ' if inside => plain.push('\''),
+            '_' if inside => plain.push('_'),
+            '*' | '`' | '$' | '_' | '\'' | '’' | '‘' | '‚' | '"' | '“' | '”' | '„' | '‟' | '«'
+            | '»' | '‹' | '›' | '「' | '」' | '『' | '』' | '《' | '》' | '〈' | '〉' | '″' =>
+                {}
+            '【' | '〔' | '〖' => plain.push('['),
+            '】' | '〕' | '〗' => plain.push(']'),
+            '|' => plain.push('\n'),
+            '❌' | '✗' | '✘' | '❎' | '✖' | '👎' | '☐' => plain.push_str(" not "),
+            '~'
+            | '\u{20e3}'
+            | '\u{2600}'..='\u{27bf}'
+            | '\u{2b00}'..='\u{2bff}'
+            | '\u{1f000}'..='\u{1faff}' => plain.push(' '),
+            c => plain.push(c),
+        }
+        previous = Some(c);
+    }
+    plain
+}
+
+/// The text in lower case with the same byte positions: a character whose lower case has another length stays as it is. A
+/// hyphen between two letters becomes a blank, and "grey" becomes "gray".
+pub(crate) fn fold(text: &str) -> String {
+    let lower = |c: char| {
+        if c.is_ascii() {
+            return c.to_ascii_lowercase();
+        }
+        let mut lower = c.to_lowercase();
+        match (lower.next(), lower.next()) {
+            (Some(l), None) if l.len_utf8() == c.len_utf8() => l,
+            _ => c,
+        }
+    };
+    let mut folded = String::with_capacity(text.len());
+    let mut rest = text.chars().peekable();
+    let mut letter = false;
+    while let Some(c) = rest.next() {
+        let compound =
+            matches!(c, '-' | RANGE) && letter && rest.peek().is_some_and(|c| c.is_alphabetic());
+        folded.push(if compound { ' ' } else { lower(c) });
+        letter = c.is_alphabetic();
+    }
+    if folded.contains("grey") {
+        folded = folded.replace("grey", "gray");
+    }
+    folded
+}

@@ -1,0 +1,217 @@
+//! Vocabulary of lenient parsing: [`Role`], [`phrase_at`].
+//!
+//! The lists are data, in `words.toml`. A phrase is looked up word by word; no list is searched as a regular expression.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::LazyLock;
+
+use serde::Deserialize;
+
+use super::plain::fold;
+use super::tokens::{Token, TokenKind, tokens};
+
+/// The lists of words and phrases.
+const WORDS: &str = include_str!("../words.toml");
+
+/// Function of a phrase in a reply. Each has a list in `words.toml`, which explains it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Role {
+    /// Takes the names behind it out of the running.
+    Exclude,
+    /// As a predicate, takes the names before it out of the running.
+    Excluded,
+    /// As `Excluded`, at the end of a clause alone.
+    ExcludedLast,
+    /// Excludes together with a [`Role::Candidate`].
+    Untrue,
+    /// A word for a choice, as "option".
+    Candidate,
+    /// Denies the names behind it, which stay in the way.
+    Not,
+    /// Denies the name directly before it, which stays in the way.
+    NotBehind,
+    /// As a predicate, denies the name directly before it, which stays in the way.
+    Absent,
+    /// Looks like a denial or a boundary, and is none.
+    Neutral,
+    /// Ends the reach of denials.
+    Cut,
+    /// Ends the reach of "not".
+    Subordinate,
+    /// Joins a letter and a text that mean the same.
+    Apposition,
+    /// Begins a clause of its own after a comma.
+    Assertion,
+    /// A verb before a predicate.
+    Copula,
+    /// A verb before "not".
+    Modal,
+    /// A word between a verb and its predicate.
+    Adverb,
+    /// Announces the choices that are left over.
+    Leaves,
+    /// Follows a name and marks it as the remainder.
+    Remains,
+    /// Joins alternatives.
+    Or,
+    /// Joins names.
+    And,
+    /// Begins a question.
+    Question,
+    /// Begins a condition.
+    If,
+    /// A verb of a counterfactual.
+    ModalPast,
+    /// Marks a clause as counterfactual.
+    Condition,
+    /// A preposition of [`Role::Better`] light.
+    Given,
+    /// More than there is, before a [`Role::LightNoun`].
+    Better,
+    /// Light, or an image.
+    LightNoun,
+    /// Begins a condition at the start of a clause.
+    Inverted,
+    /// Says that what stands before it is described.
+    Expected,
+    /// A condition that only makes the model choose.
+    Forced,
+    /// Retracts an earlier statement.
+    Retraction,
+    /// A word between "or" and a name.
+    Hedge,
+    /// "No" in a phrase that answers nothing.
+    NoIdiom,
+    /// Begins a clause.
+    ClauseStart,
+    /// A preposition behind a "no" that answers.
+    Preposition,
+    /// A noun that makes another thing of the name before it.
+    Head,
+    /// A color.
+    Color,
+    /// A word for brightness.
+    Shade,
+    /// A word for a place.
+    Place,
+    /// A number.
+    Number,
+    /// A subject that means the image.
+    Image,
+    /// A subject that may mean the image.
+    Pronoun,
+    /// Makes a pronoun mean the image.
+    Entirely,
+    /// Says that nothing but a color is seen.
+    See,
+    /// A noun that makes a color before it a property of the image.
+    Noise,
+    /// A preposition before an image noun that is no subject.
+    Within,
+    /// A part of the image.
+    Portion,
+}
+
+/// A set of roles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Roles(u64);
+
+impl Roles {
+    /// The set of one role.
+    pub(crate) const fn from_role(role: Role) -> Self {
+        Self(1 << role as u64)
+    }
+
+    /// Whether the set has this role.
+    pub(crate) const fn has(self, role: Role) -> bool {
+        self.0 & (1 << role as u64) != 0
+    }
+
+    /// Whether the set has any of these roles.
+    pub(crate) fn has_any(self, roles: &[Role]) -> bool {
+        roles.iter().any(|role| self.has(*role))
+    }
+
+    /// The roles that are in either set.
+    pub(super) const fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// The roles that are in both sets.
+    pub(super) const fn both(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+/// One phrase: the words after its first one, and its role.
+#[derive(Debug)]
+struct Phrase {
+    rest: Vec<String>,
+    roles: Roles,
+}
+
+/// All phrases by their first word, longest first.
+static PHRASES: LazyLock<HashMap<String, Vec<Phrase>>> = LazyLock::new(|| {
+    let mut phrases = HashMap::<String, Vec<Phrase>>::new();
+    for (role, list) in lists() {
+        for phrase in list {
+            let mut words = words_of(&phrase).into_iter();
+            let first = words.next().unwrap_or_default();
+            let rest: Vec<String> = words.collect();
+            let same_start = phrases.entry(first).or_default();
+            match same_start.iter_mut().find(|phrase| phrase.rest == rest) {
+                Some(known) => known.roles = known.roles.with(Roles::from_role(role)),
+                None => same_start.push(Phrase {
+                    rest,
+                    roles: Roles::from_role(role),
+                }),
+            }
+        }
+    }
+    for same_start in phrases.values_mut() {
+        same_start.sort_by_key(|phrase| std::cmp::Reverse(phrase.rest.len()));
+    }
+    phrases
+});
+
+/// The lists of `words.toml`.
+#[expect(
+    clippy::expect_used,
+    reason = "a file of this program, which the tests read"
+)]
+pub(crate) fn lists() -> BTreeMap<Role, Vec<String>> {
+    toml::from_str(WORDS).expect("words.toml has the lists of `Role`")
+}
+
+/// The words of a phrase, as they are cut in a reply.
+fn words_of(phrase: &str) -> Vec<String> {
+    let folded = fold(phrase);
+    let words = tokens(&folded);
+    words
+        .iter()
+        .map(|word| word.slice(&folded).to_owned())
+        .collect()
+}
+
+/// The longest phrase that begins with the first of these tokens: its number of tokens, and its roles. A contraction with
+/// "not" is [`Role::Not`] if it is not in the lists.
+pub(crate) fn phrase_at(folded: &str, tokens: &[Token]) -> Option<(usize, Roles)> {
+    let first = tokens
+        .first()
+        .filter(|token| token.kind == TokenKind::Word)?;
+    let word = first.slice(folded);
+    let listed = PHRASES.get(word).into_iter().flatten().find(|phrase| {
+        phrase.rest.len() < tokens.len()
+            && phrase
+                .rest
+                .iter()
+                .zip(&tokens[1..])
+                .all(|(word, token)| token.slice(folded) == word)
+    });
+    let contraction =
+        || (word.ends_with("n't") && word.len() > 3).then_some((1, Roles::from_role(Role::Not)));
+    listed
+        .map(|phrase| (phrase.rest.len() + 1, phrase.roles))
+        .or_else(contraction)
+}

@@ -1,0 +1,16 @@
+//! Pictures of a row, and the frames, ids and scenes made of them.
+
+mod frames;
+mod ids;
+mod image_marks;
+mod images;
+mod scenes;
+
+pub(super) use frames::Frames;
+pub(in crate::dataset) use frames::Series;
+pub(super) use ids::Ids;
+pub(super) use image_marks::ImageMarks;
+pub(in crate::dataset) use images::EmbeddedImage;
+pub(super) use images::{ImagesAre, images};
+pub(in crate::dataset) use scenes::SceneNames;
+pub(super) use scenes::Scenes;

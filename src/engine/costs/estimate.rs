@@ -1,0 +1,345 @@
+//! An estimate of what a run takes, without sending anything: [`estimate`].
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::ask::{ImageLimit, Price, Server};
+use crate::engine::costs::budget::{Budget, shown_tokens, text_tokens};
+use crate::engine::costs::measured_tokens::MeasuredTokens;
+use crate::engine::costs::planned_images::{PlannedImages, SampledImages};
+use crate::engine::experiment::{ExpectedRequest, Experiment};
+use crate::engine::models::ModelUnderTest;
+use crate::engine::open_run::limit;
+use crate::error::Result;
+use crate::images::frames::Source;
+use crate::images::image_pipeline::ImagePipeline;
+use crate::images::trials::{Item as _, Plan};
+use crate::report::forecast::{CostLine, FewSources, Forecast, ReadingCost, StoreForecast};
+use crate::store::StoredTrial;
+use crate::types::{Degradation, ImageFacts, ReadingName, View};
+use darkqa_score::cluster::MIN_SCENES;
+
+/// Assumed time of a reply in seconds, if no reply is stored.
+const REPLY_SECONDS: f64 = 2.0;
+
+/// The remaining requests with their tokens, cost, bytes and time. A few images are made to measure their size.
+pub(crate) fn estimate<E: Experiment>(
+    experiment: &E,
+    plans: &[Plan<E::Item>],
+    measured: &[MeasuredTokens],
+    stored: &[StoredTrial],
+    pipeline: &mut ImagePipeline<'_>,
+) -> Result<Forecast> {
+    let settings = experiment.settings();
+    let (money, sources) = (&settings.money, experiment.sources());
+    let expected = plans
+        .first()
+        .map_or_else(Vec::new, |plan| experiment.expected_requests(&plan.sources));
+    let (mut lines, mut all_models) = (Vec::new(), Vec::new());
+    let mut built_in = Vec::new();
+    let mut loads = Vec::new();
+    for (phase, plan) in plans.iter().enumerate() {
+        let expected = if phase == 0 { &[] } else { &expected[..] };
+        let measured = &measured[phase];
+        for (model, line) in self::lines(experiment, phase, plan, measured, expected) {
+            add_load(&mut loads, &experiment.models(phase)[model], &line);
+            lines.push(line);
+        }
+        built_in.extend(built_in_models(experiment, phase, plan));
+        all_models.extend(experiment.models(phase).iter().cloned());
+    }
+    let budget = Budget::new(money, &all_models, stored)?;
+    let sample = match plans.first() {
+        Some(plan) => SampledImages::make(experiment, plan, pipeline)?,
+        None => SampledImages::default(),
+    };
+    let images = PlannedImages::new(experiment, plans, &sample);
+    let latencies: Vec<u64> = stored.iter().filter_map(StoredTrial::latency_ms).collect();
+    // Endpoints are asked side by side: the slowest decides.
+    let times = loads.iter().map(|load| asking_time(load, &latencies));
+    let slowest = times.max_by(|(a, _), (b, _)| a.total_cmp(b));
+    let (asking_seconds, pace) =
+        slowest.unwrap_or_else(|| (0.0, "built-in models alone".to_owned()));
+    let largest = sample.images.iter().max_by_key(|image| image.bytes);
+    let limit = limit(settings);
+    let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
+    let remaining: usize = plans.iter().map(Plan::remaining).sum();
+    let is_few = experiment.part().is_none() && sources.len() < MIN_SCENES;
+    let few_sources = FewSources {
+        number: sources.len(),
+        needed: MIN_SCENES,
+        of: E::SOURCE,
+    };
+    Ok(Forecast {
+        lines,
+        built_in,
+        trials: planned + expected.len(),
+        answered: planned - remaining,
+        spent: budget.spent(),
+        images: images.made,
+        images_sent: images.sent,
+        bytes: images.bytes,
+        largest_image: largest.map_or(0, |image| image.bytes),
+        sampled: sample.images.len(),
+        too_large: limit
+            .zip(largest)
+            .and_then(|(limit, image)| too_large(limit, image, sources)),
+        making_seconds: images.seconds,
+        asking_seconds,
+        pace,
+        prices: format!("prices of {}", money.prices.as_of),
+        batch: money.prices.batch,
+        image_store: images
+            .set
+            .map(|set| StoreForecast::new(set.words(), set.bytes(), set.room())),
+        reply: E::REPLY,
+        few_sources: is_few.then_some(few_sources),
+        power: experiment.power().filter(|_| experiment.part().is_none()),
+        largest_request: sources
+            .iter()
+            .any(|source| source.order.len() > 1)
+            .then_some(images.largest_request),
+    })
+}
+
+/// The models of this program that a plan asks, with the number of trials of each.
+fn built_in_models<E: Experiment>(
+    experiment: &E,
+    phase: usize,
+    plan: &Plan<E::Item>,
+) -> Vec<(String, usize)> {
+    let models = experiment.models(phase);
+    let mut trials = vec![0; models.len()];
+    for trial in plan.groups().flat_map(|(_, group)| &group.trials) {
+        trials[trial.model] += 1;
+    }
+    models
+        .iter()
+        .zip(trials)
+        .filter(|(model, trials)| !model.model.is_remote() && *trials > 0)
+        .map(|(model, trials)| (label(model, E::PHASES[phase]), trials))
+        .collect()
+}
+
+/// The name of a model with what it is asked for, or as what.
+fn label(model: &ModelUnderTest, phase: &str) -> String {
+    let role = match (phase, model.view) {
+        ("marks", _) => " (judge)",
+        (_, View::Blind) => " (blind)",
+        (_, View::Image) => "",
+    };
+    format!("{}{role}", model.name)
+}
+
+/// The reason why a request is too large for an endpoint: the largest image, or the request with the most images.
+fn too_large(limit: ImageLimit, image: &ImageFacts, sources: &[Source]) -> Option<String> {
+    let most = sources
+        .iter()
+        .map(|source| source.order.len())
+        .max()
+        .unwrap_or(0);
+    let checked = limit.check(image);
+    let checked = checked.and_then(|()| limit.check_request(most, Some(image)));
+    let problem = checked.err().map(|problem| problem.to_string());
+    problem.or_else(|| limit.may_exceed(most, image))
+}
+
+/// The cost line of each model of a phase that is asked at an endpoint.
+fn lines<E: Experiment>(
+    experiment: &E,
+    phase: usize,
+    plan: &Plan<E::Item>,
+    measured: &MeasuredTokens,
+    expected: &[ExpectedRequest],
+) -> Vec<(usize, CostLine)> {
+    let sources = experiment.sources();
+    experiment
+        .models(phase)
+        .iter()
+        .enumerate()
+        .filter(|(_, model)| model.model.is_remote())
+        .map(|(index, model)| {
+            let price = model.price(&experiment.settings().money.prices);
+            let mut by_reading = BTreeMap::<Option<ReadingName>, Tokens>::new();
+            for (place, group) in plan.groups() {
+                let degradation = group.condition.as_ref().and_then(|c| c.degradation());
+                let reading = degradation.and_then(Degradation::reading).cloned();
+                let tokens = by_reading.entry(reading).or_default();
+                let own = group.trials.iter().filter(|trial| trial.model == index);
+                let before = tokens.requests;
+                for trial in own {
+                    tokens.add(text_tokens(&trial.prompt), trial.item.reply_tokens());
+                }
+                let source = &sources[place];
+                if group.condition.is_some() && tokens.requests > before {
+                    let scaling = experiment.recipe().scaling;
+                    let charged = measured.image(index);
+                    let of_request = shown_tokens(model, price, charged, source, scaling);
+                    let requests = (tokens.requests - before) as f64;
+                    let known = tokens.image.zip(of_request);
+                    tokens.image = known.map(|(sum, each)| sum + each * requests);
+                }
+            }
+            for request in expected.iter().filter(|request| request.model == index) {
+                let tokens = by_reading.entry(None).or_default();
+                tokens.add(request.text_tokens, request.reply_tokens);
+            }
+            let line = CostLine {
+                charged_image_tokens: measured.image(index),
+                ..line(model, price, &by_reading, E::PHASES[phase])
+            };
+            (index, line)
+        })
+        .filter(|(_, line)| line.requests > 0)
+        .collect()
+}
+
+/// The requests to one endpoint and their tokens.
+struct Load {
+    server: Arc<Server>,
+    requests: f64,
+    tokens: f64,
+}
+
+/// Adds the requests to a model to those of its endpoint.
+fn add_load(loads: &mut Vec<Load>, model: &ModelUnderTest, line: &CostLine) {
+    let Some(server) = &model.server else {
+        return;
+    };
+    let requests = line.requests as f64;
+    let tokens = line.text_tokens + line.image_tokens.unwrap_or(0.0) + line.reply_tokens;
+    match loads
+        .iter_mut()
+        .find(|load| Arc::ptr_eq(&load.server, server))
+    {
+        Some(load) => {
+            load.requests += requests;
+            load.tokens += tokens;
+        }
+        None => loads.push(Load {
+            server: Arc::clone(server),
+            requests,
+            tokens,
+        }),
+    }
+}
+
+/// Numbers of requests to one model and of their tokens.
+#[derive(Debug)]
+struct Tokens {
+    requests: usize,
+    text: f64,
+    reply: f64,
+    /// Tokens of all images; `None` if unknown.
+    image: Option<f64>,
+}
+
+impl Default for Tokens {
+    fn default() -> Self {
+        Self {
+            requests: 0,
+            text: 0.0,
+            reply: 0.0,
+            image: Some(0.0),
+        }
+    }
+}
+
+impl Tokens {
+    fn sum<'t>(parts: impl Iterator<Item = &'t Self>) -> Self {
+        parts.fold(Self::default(), |sum, part| Self {
+            requests: sum.requests + part.requests,
+            text: sum.text + part.text,
+            reply: sum.reply + part.reply,
+            image: sum.image.zip(part.image).map(|(sum, part)| sum + part),
+        })
+    }
+
+    /// The cost if each reply has this many tokens in all; `None` if no price or number of tokens is known.
+    fn dollars(&self, price: Option<Price>, reply: f64) -> Option<f64> {
+        Some(price?.cost(self.text + self.image?, reply))
+    }
+
+    fn add(&mut self, text: f64, reply: f64) {
+        self.requests += 1;
+        self.text += text;
+        self.reply += reply;
+    }
+}
+
+/// The cost line of one model, by the light reading of what it is shown.
+fn line(
+    model: &ModelUnderTest,
+    price: Option<Price>,
+    by_reading: &BTreeMap<Option<ReadingName>, Tokens>,
+    phase: &str,
+) -> CostLine {
+    let tokens = Tokens::sum(by_reading.values());
+    let requests = tokens.requests as f64;
+    let longest = model
+        .model
+        .max_tokens()
+        .map(|limit| requests * f64::from(limit));
+    let readings = by_reading.iter().filter(|(_, part)| part.requests > 0);
+    CostLine {
+        model: label(model, phase),
+        endpoints: model
+            .server
+            .as_deref()
+            .map_or_else(Vec::new, Server::addresses),
+        requests: tokens.requests,
+        text_tokens: tokens.text,
+        image_tokens: tokens.image,
+        reply_tokens: tokens.reply,
+        longest_reply_tokens: longest,
+        dollars: tokens.dollars(price, tokens.reply),
+        most_dollars: longest.and_then(|longest| tokens.dollars(price, longest)),
+        charged_image_tokens: None,
+        readings: readings
+            .map(|(reading, part)| ReadingCost {
+                reading: reading.clone(),
+                requests: part.requests,
+                dollars: part.dollars(price, part.reply),
+            })
+            .collect(),
+    }
+}
+
+/// Seconds until all replies of an endpoint have arrived, and the limit that decides it: `--rpm`, `--tpm`, or the mean time of a stored reply.
+fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
+    let Load {
+        server,
+        requests,
+        tokens,
+    } = load;
+    let (requests, tokens) = (*requests, *tokens);
+    let times: Vec<f64> = latencies_ms
+        .iter()
+        .filter(|ms| **ms > 0)
+        .map(|ms| *ms as f64 / 1e3)
+        .collect();
+    let (each, origin) = if times.is_empty() {
+        (REPLY_SECONDS, "assumed")
+    } else {
+        (times.iter().sum::<f64>() / times.len() as f64, "as so far")
+    };
+    let sending = &server.sending;
+    let concurrency = server.most_in_flight();
+    let mut slowest = (
+        requests * each / concurrency as f64,
+        format!("{each:.1} s a reply {origin}, {concurrency} at once"),
+    );
+    let minutes = |number: f64, quota: Option<std::num::NonZeroU32>| {
+        quota.map(|quota| 60.0 * number / f64::from(quota.get()))
+    };
+    let quotas = [
+        ("--rpm", minutes(requests, sending.quota.requests)),
+        ("--tpm", minutes(tokens, sending.quota.tokens)),
+    ];
+    for (flag, seconds) in quotas {
+        if let Some(seconds) = seconds.filter(|seconds| *seconds > slowest.0) {
+            slowest = (seconds, format!("by {flag}"));
+        }
+    }
+    slowest
+}

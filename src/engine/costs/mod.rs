@@ -1,0 +1,18 @@
+//! Costs of a run: its limit, bounds, estimates and measured tokens.
+
+mod budget;
+mod budget_notes;
+pub(super) mod estimate;
+mod in_flight_cost;
+mod measured_tokens;
+mod money;
+pub(crate) mod plan_costs;
+mod planned_images;
+mod prompt_bounds;
+
+pub(crate) use budget::text_tokens;
+pub(super) use budget::{Answering, Budget, Permit};
+pub(super) use budget_notes::BudgetNotes;
+pub(super) use in_flight_cost::InFlightCost;
+pub(super) use measured_tokens::MeasuredTokens;
+pub(super) use money::{MoneyArgs, MoneySettings};

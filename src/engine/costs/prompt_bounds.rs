@@ -1,0 +1,215 @@
+//! Upper bounds of the tokens of prompts: [`PromptBounds`].
+//!
+//! Before the first reply, a bound follows from the length of the text and the rule of the model's family for images. Afterwards it
+//! follows from the charged tokens of an earlier prompt with images of the same sizes: no tokenizer makes more tokens than bytes of the
+//! part of the text that differs.
+
+use std::collections::VecDeque;
+
+use crate::images::trials::Prompt;
+use crate::types::ImageFacts;
+
+/// Tokens that a chat template adds to a message; chosen: more than those of known models.
+const TEMPLATE_TOKENS: u64 = 64;
+
+/// Pixels per token of an image, if the model's rule is not known: patches of 14 × 14, the smallest in use.
+const PIXELS_PER_TOKEN: u64 = 14 * 14;
+
+/// Minimum for an image, if the model's rule is not known: five tiles of 576 tokens, as of LLaVA-NeXT.
+const MIN_IMAGE_TOKENS: u64 = 5 * 576;
+
+/// Tokens by which a text may have more than its parts, at the places where they are joined; chosen.
+const JOINS: u64 = 4;
+
+/// Number of earlier prompts that are kept for comparison; chosen.
+const REFERENCES: usize = 16;
+
+/// Factor between a bound and the charged tokens from which a prompt is kept for comparison; chosen.
+const CLOSE: f64 = 1.05;
+
+/// Facts that determine the tokens of a prompt.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PromptFacts<'a> {
+    pub(crate) prompt: &'a Prompt,
+    /// Width and height of each image, in pixels.
+    pub(crate) sizes: &'a [(usize, usize)],
+    /// Bytes of the system message.
+    pub(crate) system_bytes: usize,
+    /// Tokens of all images by the rule of the model's family; `None` if it is not known.
+    pub(crate) image_tokens: Option<f64>,
+}
+
+/// The width and the height of images.
+pub(crate) fn sizes<'a>(images: impl Iterator<Item = &'a ImageFacts>) -> Vec<(usize, usize)> {
+    images.map(|image| (image.width, image.height)).collect()
+}
+
+/// An earlier prompt with the tokens that it was charged.
+#[derive(Debug)]
+struct Reference {
+    prompt: Prompt,
+    sizes: Vec<(usize, usize)>,
+    charged: u64,
+}
+
+/// Upper bounds of the tokens of a model's prompts.
+#[derive(Debug)]
+pub(crate) struct PromptBounds {
+    references: VecDeque<Reference>,
+    /// Factor by which a prompt exceeded the bound by its length; at least 1.
+    excess_by_length: f64,
+    /// Factor by which a prompt exceeded the bound by comparison; at least 1.
+    excess_by_comparison: f64,
+}
+
+impl PromptBounds {
+    pub(crate) fn new() -> Self {
+        Self {
+            references: VecDeque::new(),
+            excess_by_length: 1.0,
+            excess_by_comparison: 1.0,
+        }
+    }
+
+    /// The most tokens of a prompt.
+    pub(crate) fn bound(&self, facts: PromptFacts<'_>) -> u64 {
+        let by_length = by_length(facts) * self.excess_by_length;
+        let by_comparison = self.by_comparison(facts);
+        let by_comparison = by_comparison.map(|tokens| tokens * self.excess_by_comparison);
+        by_comparison
+            .map_or(by_length, |tokens| tokens.min(by_length))
+            .ceil() as u64
+    }
+
+    /// Takes the charged tokens of a prompt into account.
+    pub(crate) fn observe(&mut self, facts: PromptFacts<'_>, charged: u64) {
+        if charged == 0 {
+            return;
+        }
+        let tokens = charged as f64;
+        self.excess_by_length = self.excess_by_length.max(tokens / by_length(facts));
+        let by_comparison = self.by_comparison(facts);
+        if let Some(expected) = by_comparison {
+            self.excess_by_comparison = self.excess_by_comparison.max(tokens / expected);
+        }
+        if by_comparison.is_none_or(|expected| expected > CLOSE * tokens) {
+            if self.references.len() == REFERENCES {
+                self.references.pop_front();
+            }
+            self.references.push_back(Reference {
+                prompt: facts.prompt.clone(),
+                sizes: facts.sizes.to_vec(),
+                charged,
+            });
+        }
+    }
+
+    /// The most tokens of a prompt, by the earlier prompt that is most like it; `None` if none had images of these sizes.
+    fn by_comparison(&self, facts: PromptFacts<'_>) -> Option<f64> {
+        self.references
+            .iter()
+            .filter(|one| one.sizes == facts.sizes)
+            .map(|one| one.charged + differing_bytes(&one.prompt, facts.prompt) as u64 + JOINS)
+            .min()
+            .map(|tokens| tokens as f64)
+    }
+}
+
+/// The most tokens of a prompt, by its bytes and the sizes of its images.
+fn by_length(facts: PromptFacts<'_>) -> f64 {
+    let text: usize = facts.prompt.parts().iter().map(|part| part.len()).sum();
+    let text = (text + facts.system_bytes) as u64 + TEMPLATE_TOKENS;
+    let tiled = facts
+        .sizes
+        .iter()
+        .map(|(width, height)| (width * height) as u64)
+        .map(|area| area.div_ceil(PIXELS_PER_TOKEN).max(MIN_IMAGE_TOKENS));
+    let images = facts
+        .image_tokens
+        .unwrap_or_else(|| tiled.sum::<u64>() as f64);
+    text as f64 + images
+}
+
+/// Bytes of a prompt's text that another one does not share at its beginning or end.
+fn differing_bytes(other: &Prompt, prompt: &Prompt) -> usize {
+    other
+        .parts()
+        .into_iter()
+        .zip(prompt.parts())
+        .map(|(other, text)| differing(other.as_bytes(), text.as_bytes()))
+        .sum()
+}
+
+fn differing(other: &[u8], text: &[u8]) -> usize {
+    let start = other.iter().zip(text).take_while(|(a, b)| a == b).count();
+    let (other, text) = (&other[start..], &text[start..]);
+    let ends = other.iter().rev().zip(text.iter().rev());
+    text.len() - ends.take_while(|(a, b)| a == b).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZES: &[(usize, usize)] = &[(640, 480)];
+
+    fn facts(prompt: &Prompt, image_tokens: Option<f64>) -> PromptFacts<'_> {
+        PromptFacts {
+            prompt,
+            sizes: SIZES,
+            system_bytes: 0,
+            image_tokens,
+        }
+    }
+
+    fn prompt(number: usize) -> Prompt {
+        Prompt::from_text(format!("Which room is shown in image {number} of the set?").into())
+    }
+
+    #[test]
+    fn a_first_prompt_is_bounded_by_its_length() {
+        let bounds = PromptBounds::new();
+        let text = prompt(7);
+        let bytes = text.parts()[0].len() as u64;
+        assert_eq!(bounds.bound(facts(&text, Some(80.0))), bytes + 64 + 80);
+        assert_eq!(bounds.bound(facts(&text, None)), bytes + 64 + 2880);
+    }
+
+    #[test]
+    fn later_prompts_are_bounded_by_earlier_ones() {
+        let (mut bounds, seven) = (PromptBounds::new(), prompt(7));
+        bounds.observe(facts(&seven, None), 300);
+        assert_eq!(bounds.bound(facts(&prompt(123), None)), 300 + 3 + 4);
+        let other_size = PromptFacts {
+            sizes: &[(320, 240)],
+            ..facts(&seven, None)
+        };
+        assert!(
+            bounds.bound(other_size) > 2000,
+            "another image may have more tokens"
+        );
+    }
+
+    #[test]
+    fn a_prompt_beyond_its_bound_raises_all_later_ones() {
+        let (mut bounds, seven) = (PromptBounds::new(), prompt(7));
+        bounds.observe(facts(&seven, Some(80.0)), 2000);
+        assert!(bounds.bound(facts(&prompt(8), Some(80.0))) >= 2000);
+        bounds.observe(facts(&prompt(8), Some(80.0)), 4000);
+        assert!(bounds.bound(facts(&prompt(9), Some(80.0))) >= 3990);
+        let other_size = PromptFacts {
+            sizes: &[(320, 240)],
+            ..facts(&seven, Some(80.0))
+        };
+        assert!(bounds.bound(other_size) >= 4000);
+    }
+
+    #[test]
+    fn shared_beginnings_and_ends_are_not_counted() {
+        let of = |a: &str, b: &str| differing(a.as_bytes(), b.as_bytes());
+        assert_eq!(of("is #17 here", "is #2 here"), 1);
+        assert_eq!(of("aaa", "aaaa"), 1);
+        assert_eq!(of("aaaa", "aa"), 0);
+        assert_eq!(of("", "abc"), 3);
+    }
+}

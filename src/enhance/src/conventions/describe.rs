@@ -1,0 +1,246 @@
+//! Description of a model's convention for users, with the source of each value: [`Description`].
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::convention::Tile;
+use super::preset::Preset;
+use super::sidecar::ModelSidecar;
+use crate::graphs::Graph;
+use crate::sizing::{MULTIPLES, SizeRule};
+use darkqa_ground::types::manifests::{ConventionLine, TRAINED_ON};
+
+/// Source of ranges that nothing states.
+const ASSUMED: &str = "assumed";
+
+/// Source of values that the graph itself states.
+const GRAPH: &str = "graph";
+
+/// Sources of a model's convention, and its number of flushed weights.
+#[derive(Debug)]
+pub(crate) struct Description {
+    /// The user's sidecar; empty if there is none.
+    pub(crate) sidecar: ModelSidecar,
+    /// The preset, if one was named.
+    pub(crate) preset: Option<Preset>,
+    /// Whether nothing states the ranges and the usual ones, which are plausible, are assumed.
+    pub(crate) assumed: bool,
+    /// Caveats for readers of the results, as sentences that follow the model's name.
+    pub(crate) remarks: Vec<String>,
+    /// Number of subnormal weights that were set to zero.
+    pub(crate) flushed: usize,
+}
+
+/// Rows of a table: name, value, source.
+struct Lines(Vec<ConventionLine>);
+
+impl Lines {
+    fn add(&mut self, name: &str, value: impl std::fmt::Display, source: impl Into<String>) {
+        self.0.push(ConventionLine {
+            key: name.to_owned(),
+            value: value.to_string(),
+            source: source.into(),
+        });
+    }
+}
+
+impl Description {
+    /// How the model is fed and read.
+    pub(crate) fn lines(&self, graph: &Graph, convention: &ModelSidecar) -> Vec<ConventionLine> {
+        let mut lines = Lines(Vec::new());
+        if let Some(preset) = &self.preset {
+            lines.add("preset", &preset.name, preset.content.to_string());
+        }
+        for remark in &self.remarks {
+            lines.add("remark", remark, GRAPH);
+        }
+        if let Some(differing) = &graph.differing {
+            lines.add("warning", differing, "graph");
+        }
+        self.input(&mut lines, graph, convention);
+        self.output(&mut lines, graph);
+        let source = match convention.tile {
+            Some(_) => self.source(|s| s.tile.is_some(), ""),
+            None => "not stated; --llie-options tile=N tries it and checks every seam".to_owned(),
+        };
+        lines.add("tile", convention.tile.unwrap_or(Tile::None), source);
+        if let Some(data) = &convention.trained_on {
+            let source = self.source(|s| s.trained_on.is_some(), "");
+            lines.add(TRAINED_ON, data, source);
+        }
+        lines.0
+    }
+
+    /// The table as text.
+    pub(crate) fn text(&self, path: &Path, graph: &Graph, convention: &ModelSidecar) -> String {
+        let mut lines = Lines(self.lines(graph, convention));
+        lines.add(
+            "subnormal weights",
+            self.flushed,
+            "set to zero, which changes no byte",
+        );
+        let runtime = graph.runtime();
+        let source = format!("{}: {}", runtime.place(), runtime.path().display());
+        lines.add("ONNX Runtime", runtime.version(), source);
+        aligned(path, &lines.0)
+    }
+
+    /// Adds the lines about the input.
+    fn input(&self, lines: &mut Lines, graph: &Graph, convention: &ModelSidecar) {
+        let (signature, feeding) = (&graph.signature, &graph.feeding);
+        let side = |size: Option<usize>| size.map_or("any".to_owned(), |size| size.to_string());
+        lines.add("input", &signature.input.port, GRAPH);
+        let source = self.source(|s| s.layout_in.is_some(), "graph: the dimension of size 3");
+        lines.add("layout_in", feeding.layout, source);
+        let height_width = format!("{} × {}", side(signature.height), side(signature.width));
+        lines.add("height × width", height_width, GRAPH);
+        if let Some([width, height]) = convention.fixed {
+            let source = self.source(|s| s.fixed.is_some(), "");
+            lines.add("fixed", format!("{height} × {width}"), source);
+        }
+        if graph.batch() > 1 {
+            let cost = format!(
+                "graph: each image is given {0} times, which takes {0} times as long",
+                graph.batch()
+            );
+            lines.add("batch", graph.batch(), cost);
+        }
+        let usual = "usual; a graph cannot state it";
+        if let Some(input) = &convention.input {
+            let source = self.source(|s| s.input.is_some(), "");
+            lines.add("input = ", input, source);
+        }
+        if let Some(channels) = convention.channels {
+            let source = self.source(|s| s.channels.is_some(), "");
+            lines.add("channels", channels, source);
+        }
+        let source = self.source(|s| s.color.is_some(), "usual, cannot be checked");
+        lines.add("color", feeding.color, source);
+        let source = self.source(
+            |s| s.range_in.is_some(),
+            self.range_source("usual for its type"),
+        );
+        lines.add("range_in", feeding.range, source);
+        if convention.mean.is_some() || convention.std.is_some() {
+            let value = format!("{:?}, {:?}", feeding.mean, feeding.std);
+            let source = self.source(|s| s.mean.is_some() || s.std.is_some(), usual);
+            lines.add("mean, std", value, source);
+        }
+        let fixed = [signature.height, signature.width];
+        match convention.multiple {
+            Some(multiple) => {
+                lines.add(
+                    "multiple",
+                    multiple,
+                    self.source(|s| s.multiple.is_some(), ""),
+                );
+            }
+            None if SizeRule::new(fixed, convention, feeding.pad).takes_any_size() => {
+                let others = MULTIPLES[1..]
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect::<Vec<_>>()
+                    .join(", ");
+                let source = format!("tried first, then {others} if it fails");
+                lines.add("multiple", MULTIPLES[0], source);
+            }
+            None => lines.add(
+                "multiple",
+                1,
+                "its size is fixed: other images are filled or cut, if it is local",
+            ),
+        }
+        lines.add(
+            "pad",
+            feeding.pad,
+            self.source(|s| s.pad.is_some(), "usual"),
+        );
+        if convention.pad_always == Some(true) {
+            let source = self.source(|s| s.pad_always.is_some(), "");
+            lines.add("pad_always", "one row and column at least", source);
+        }
+        for extra in &signature.extras {
+            let source = self.source(|s| s.extra.contains_key(&extra.port.name), "");
+            lines.add(&format!("extra.{}", extra.port.name), &extra.value, source);
+        }
+    }
+
+    /// Adds the lines about the output.
+    fn output(&self, lines: &mut Lines, graph: &Graph) {
+        let (outputs, composition) = (&graph.signature.outputs, &graph.reading);
+        if let Some(image) = &graph.convention.image {
+            let preset = self.preset.as_ref();
+            let preset =
+                preset.map_or(GRAPH.to_owned(), |preset| format!("preset {}", preset.name));
+            let source = self.source(|s| s.image.is_some(), &preset);
+            lines.add("image = ", image, source);
+        }
+        for (output, reading) in outputs.iter().zip(&composition.outputs) {
+            let source = match (output.reason, &self.preset) {
+                ("stated", Some(preset)) => {
+                    self.source(|s| s.output.is_some(), &format!("preset {}", preset.name))
+                }
+                ("stated", None) => "sidecar".to_owned(),
+                (reason, _) => reason.to_owned(),
+            };
+            lines.add("output", &output.port, source);
+            let fallback = match reading.layout {
+                Some(_) => "graph: the dimension of size 3",
+                None => "as the input; the actual output decides",
+            };
+            let source = self.source(|s| s.layout_out.is_some(), fallback);
+            let layout = reading.layout.unwrap_or(reading.preferred);
+            lines.add("layout_out", layout, source);
+        }
+        for port in &graph.signature.unread {
+            lines.add("not read", port, GRAPH);
+        }
+        let reading = &composition.outputs[0];
+        let source = self.source(|s| s.color_out.is_some(), "as the input");
+        lines.add("color_out", reading.color, source);
+        let checked = "as the input; the actual output is checked";
+        let source = self.source(|s| s.range_out.is_some(), self.range_source(checked));
+        lines.add("range_out", reading.range, source);
+        if let Some([mean, std]) = reading.mean_and_std {
+            let source = self.source(|s| s.mean_out.is_some() || s.std_out.is_some(), "usual");
+            lines.add("mean_out, std_out", format!("{mean:?}, {std:?}"), source);
+        }
+        let source = self.source(|s| s.rounding.is_some(), "usual");
+        lines.add("rounding", composition.rounding, source);
+    }
+
+    /// Source of a range that nothing states.
+    fn range_source(&self, otherwise: &'static str) -> &'static str {
+        if self.assumed { ASSUMED } else { otherwise }
+    }
+
+    /// Source of a value: sidecar or preset if they state it, else `otherwise`.
+    fn source(&self, states: impl Fn(&ModelSidecar) -> bool, otherwise: &str) -> String {
+        match &self.preset {
+            _ if states(&self.sidecar) => "sidecar".to_owned(),
+            Some(preset) if states(&preset.content.sidecar) => format!("preset {}", preset.name),
+            _ => otherwise.to_owned(),
+        }
+    }
+}
+
+fn aligned(path: &Path, lines: &[ConventionLine]) -> String {
+    let width = |cell: fn(&ConventionLine) -> &str| {
+        lines
+            .iter()
+            .map(|line| cell(line).chars().count())
+            .max()
+            .unwrap_or(0)
+    };
+    let widths = [width(|line| &line.key), width(|line| &line.value)];
+    let mut text = format!("{}\n", path.display());
+    for ConventionLine { key, value, source } in lines {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "  {key:0$}  {value:1$}  {source}",
+            widths[0], widths[1]
+        );
+    }
+    text
+}

@@ -1,0 +1,338 @@
+//! Values of further inputs, as `[extra]` of a sidecar states them: [`ExtraValue`].
+
+use std::fmt;
+
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Error, MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::expressions::Expression;
+
+/// Most numbers of a list; chosen.
+const MOST_NUMBERS: usize = 4096;
+
+/// Value of a further input.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum ExtraValue {
+    /// One number: `ratio = 3`.
+    Number(Number),
+    /// A vector: `alpha = [1, 2, 3]`.
+    List(Vec<Number>),
+    /// A tensor of the image's size in which each sample is this number: `ratio = { map = 5.0 }`.
+    Map(Number),
+    /// Normal noise: `z = { noise = "normal", std = 0.9, seed = 0, divide = 8 }`.
+    Noise(NoiseStatement),
+    /// An expression of the dark image: `gray = { from = "1 - max(image)" }`.
+    From(Expression),
+}
+
+/// A number or a truth value, as the sidecar writes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Number {
+    Bool(bool),
+    Integer(i64),
+    Float(f64),
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Bool(value) => value.fmt(f),
+            Self::Integer(value) => value.fmt(f),
+            Self::Float(value) => write!(f, "{value:?}"),
+        }
+    }
+}
+
+/// Noise that a further input is given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct NoiseStatement {
+    /// Standard deviation.
+    pub(crate) std: f64,
+    /// Seed; another one gives other noise.
+    pub(crate) seed: u64,
+    /// Height and width are those of the image, divided by this number and rounded up.
+    pub(crate) divide: usize,
+}
+
+/// The table of a value that is no plain number.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    map: Option<Number>,
+    noise: Option<Distribution>,
+    std: Option<f64>,
+    seed: Option<u64>,
+    divide: Option<usize>,
+    from: Option<Expression>,
+}
+
+/// Distribution of noise.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Distribution {
+    Normal,
+}
+
+impl TryFrom<Table> for ExtraValue {
+    type Error = String;
+
+    fn try_from(table: Table) -> Result<Self, String> {
+        let noise_alone = table.std.is_none() && table.seed.is_none() && table.divide.is_none();
+        match (table.map, table.noise, table.from) {
+            (Some(map), None, None) if noise_alone => Ok(Self::Map(map)),
+            (None, None, Some(from)) if noise_alone => Ok(Self::From(from)),
+            (None, Some(Distribution::Normal), None) => {
+                let std = table.std.unwrap_or(1.0);
+                let divide = table.divide.unwrap_or(1);
+                if !(0.0..=f64::from(f32::MAX)).contains(&std) || divide == 0 {
+                    return Err(format!(
+                        "noise of std = {std}, divide = {divide}; std must be a number from 0, divide a whole number from 1"
+                    ));
+                }
+                Ok(Self::Noise(NoiseStatement {
+                    std,
+                    seed: table.seed.unwrap_or(0),
+                    divide,
+                }))
+            }
+            _ => Err(format!("a table in [extra] is {FORMS}")),
+        }
+    }
+}
+
+/// The forms of a table, for messages.
+const FORMS: &str = "`{ map = NUMBER }`, `{ noise = \"normal\", std = NUMBER, seed = NUMBER, divide = NUMBER }` or `{ from = \"EXPRESSION\" }`";
+
+impl Serialize for Number {
+    /// A whole number is written as a float where that is the same number: `1` and `1.0` are one statement.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Bool(value) => serializer.serialize_bool(*value),
+            Self::Integer(value) if *value as f64 as i128 == i128::from(*value) => {
+                serializer.serialize_f64(*value as f64)
+            }
+            Self::Integer(value) => serializer.serialize_i64(*value),
+            Self::Float(value) => serializer.serialize_f64(*value),
+        }
+    }
+}
+
+impl Serialize for ExtraValue {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Number(number) => number.serialize(serializer),
+            Self::List(numbers) => numbers.serialize(serializer),
+            Self::Map(number) => Table {
+                map: Some(*number),
+                ..Table::default()
+            }
+            .serialize(serializer),
+            Self::Noise(noise) => Table {
+                noise: Some(Distribution::Normal),
+                std: Some(noise.std),
+                seed: Some(noise.seed),
+                divide: Some(noise.divide),
+                ..Table::default()
+            }
+            .serialize(serializer),
+            Self::From(expression) => Table {
+                from: Some(expression.clone()),
+                ..Table::default()
+            }
+            .serialize(serializer),
+        }
+    }
+}
+
+/// Visitor of a number or of a table.
+struct AnyValue;
+
+impl<'de> Visitor<'de> for AnyValue {
+    type Value = ExtraValue;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a number, true, false, a list of them, {FORMS}")
+    }
+
+    fn visit_bool<E: Error>(self, value: bool) -> Result<ExtraValue, E> {
+        Ok(ExtraValue::Number(Number::Bool(value)))
+    }
+
+    fn visit_i64<E: Error>(self, value: i64) -> Result<ExtraValue, E> {
+        Ok(ExtraValue::Number(Number::Integer(value)))
+    }
+
+    fn visit_f64<E: Error>(self, value: f64) -> Result<ExtraValue, E> {
+        Ok(ExtraValue::Number(Number::Float(value)))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<ExtraValue, A::Error> {
+        let mut numbers = Vec::new();
+        while let Some(number) = list.next_element()? {
+            numbers.push(number);
+            if numbers.len() > MOST_NUMBERS {
+                return Err(A::Error::custom(format!(
+                    "a list of more than {MOST_NUMBERS} numbers"
+                )));
+            }
+        }
+        Ok(ExtraValue::List(numbers))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ExtraValue, A::Error> {
+        let table = Table::deserialize(MapAccessDeserializer::new(map))?;
+        ExtraValue::try_from(table).map_err(A::Error::custom)
+    }
+}
+
+impl<'de> Deserialize<'de> for ExtraValue {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(AnyValue)
+    }
+}
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match ExtraValue::deserialize(deserializer)? {
+            ExtraValue::Number(number) => Ok(number),
+            _ => Err(D::Error::custom("a number or a truth value is expected")),
+        }
+    }
+}
+
+impl ExtraValue {
+    /// Checks everything that needs no graph: numbers are finite, and the names of an expression are known.
+    ///
+    /// # Errors
+    /// A description of the faulty value of `name`.
+    pub(super) fn check(&self, name: &str) -> Result<(), String> {
+        match self {
+            Self::Number(Number::Float(value)) | Self::Map(Number::Float(value))
+                if !value.is_finite() =>
+            {
+                Err(format!("extra.{name} is {value}; expected a finite number"))
+            }
+            Self::List(numbers) => {
+                let wrong = numbers
+                    .iter()
+                    .find(|n| matches!(n, Number::Float(value) if !value.is_finite()));
+                wrong.map_or(Ok(()), |value| {
+                    Err(format!("extra.{name} has {value}; expected finite numbers"))
+                })
+            }
+            Self::From(expression) => {
+                expression.check_names(&format!("extra.{name}.from"), &["image"])
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for ExtraValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => number.fmt(f),
+            Self::List(numbers) => {
+                let numbers: Vec<String> = numbers.iter().map(Number::to_string).collect();
+                write!(f, "[{}]", numbers.join(", "))
+            }
+            Self::Map(number) => write!(f, "map of {number}"),
+            Self::Noise(NoiseStatement { std, seed, divide }) => {
+                write!(f, "normal noise, std {std}, seed {seed}, divide {divide}")
+            }
+            Self::From(expression) => write!(f, "from {expression}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    fn read(text: &str) -> Result<ExtraValue, String> {
+        let mut all: BTreeMap<String, ExtraValue> =
+            toml::from_str(&format!("a = {text}")).map_err(|e| e.message().to_owned())?;
+        let value = all.remove("a").unwrap();
+        value.check("a").map(|()| value)
+    }
+
+    #[test]
+    fn every_form_is_read() {
+        let rows = [
+            ("3", ExtraValue::Number(Number::Integer(3))),
+            ("0.8", ExtraValue::Number(Number::Float(0.8))),
+            ("true", ExtraValue::Number(Number::Bool(true))),
+            (
+                "[1, 2.5]",
+                ExtraValue::List(vec![Number::Integer(1), Number::Float(2.5)]),
+            ),
+            ("{ map = 5.0 }", ExtraValue::Map(Number::Float(5.0))),
+            (
+                "{ noise = \"normal\", std = 0.9, seed = 7, divide = 8 }",
+                ExtraValue::Noise(NoiseStatement {
+                    std: 0.9,
+                    seed: 7,
+                    divide: 8,
+                }),
+            ),
+            (
+                "{ noise = \"normal\" }",
+                ExtraValue::Noise(NoiseStatement {
+                    std: 1.0,
+                    seed: 0,
+                    divide: 1,
+                }),
+            ),
+            (
+                "{ from = \"1 - max(image)\" }",
+                ExtraValue::From("1 - max(image)".parse().unwrap()),
+            ),
+        ];
+        for (text, value) in rows {
+            assert_eq!(read(text), Ok(value), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_form_is_an_error_that_says_what_is_expected() {
+        for (text, part) in [
+            ("\"3\"", "a number, true, false"),
+            ("{ }", "{ map = NUMBER }"),
+            ("{ map = 1, from = \"image\" }", "{ map = NUMBER }"),
+            ("{ map = 1, seed = 3 }", "{ map = NUMBER }"),
+            ("{ chart = 1 }", "chart"),
+            ("{ map = { map = 1 } }", "a number or a truth value"),
+            ("{ noise = \"uniform\" }", "normal"),
+            ("{ noise = \"normal\", std = -1 }", "std must be"),
+            ("{ noise = \"normal\", std = inf }", "std must be"),
+            (
+                "{ noise = \"normal\", divide = 0 }",
+                "divide a whole number",
+            ),
+            ("{ from = \"image +\" }", "the end"),
+            ("{ from = \"input\" }", "the names are `image`"),
+            ("nan", "extra.a is NaN"),
+            ("{ map = inf }", "extra.a is inf"),
+        ] {
+            let message = read(text).unwrap_err();
+            assert!(message.contains(part), "{text}: {message}");
+        }
+    }
+
+    #[test]
+    fn a_number_is_written_as_before() {
+        let text = |value: &str| serde_json::to_string(&read(value).unwrap()).unwrap();
+        for (value, written) in [
+            ("1", "1.0"),
+            ("0.8", "0.8"),
+            ("1e-7", "1e-7"),
+            ("true", "true"),
+        ] {
+            assert_eq!(text(value), written);
+        }
+        assert_eq!(text("9007199254740993"), "9007199254740993");
+    }
+}

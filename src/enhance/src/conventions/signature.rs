@@ -1,0 +1,231 @@
+//! Roles of a graph's tensors: the degraded image, the enhanced image and further inputs ([`Signature::infer`]).
+//!
+//! A graph states element types, ranks and fixed sizes. Value range and colour order come from a sidecar or a preset; by
+//! default they are those of the published models: RGB, 0..1.
+
+use super::convention::{Channels, TensorLayout};
+use super::sidecar::ModelSidecar;
+use crate::graphs::{Port, list};
+use crate::inputs::{ATTENTION, FurtherInput};
+use crate::outputs::Output;
+
+/// Inputs and outputs of a graph, by their roles.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Signature {
+    /// The input that is the degraded image.
+    pub(crate) input: ImageInput,
+    /// Height that the input must have, in pixels; `None` for any.
+    pub(crate) height: Option<usize>,
+    /// Width that the input must have, in pixels; `None` for any.
+    pub(crate) width: Option<usize>,
+    /// Further inputs.
+    pub(crate) extras: Vec<FurtherInput>,
+    /// The output that is the enhanced image, or those that its expression names, in its order.
+    pub(crate) outputs: Vec<Output>,
+    /// The outputs that are not read.
+    pub(crate) unread: Vec<Port>,
+}
+
+/// An input that is an image.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ImageInput {
+    /// Name, type and dimensions in the graph.
+    pub(crate) port: Port,
+    /// Order of its dimensions.
+    pub(crate) layout: TensorLayout,
+}
+
+impl Signature {
+    /// Finds the role of each tensor.
+    ///
+    /// # Errors
+    /// The finding and the remedy, to follow the file's name.
+    pub(crate) fn infer(
+        inputs: &[Port],
+        outputs: &[Port],
+        convention: &ModelSidecar,
+    ) -> Result<Self, String> {
+        let (image, layout) = image_input(inputs, convention)?;
+        let [_, height, width] = layout.places().map(|place| &image.dims[place]);
+        let channels = convention.channels.unwrap_or_default();
+        let not_one = |key: &str, numbers: Option<[f32; 3]>| {
+            let numbers = numbers
+                .filter(|[a, b, c]| a.to_bits() != b.to_bits() || b.to_bits() != c.to_bits());
+            numbers.map(|numbers| format!("has one channel (channels = \"y\"), but {key} = {numbers:?} in its sidecar or preset has three different numbers; state the same one three times"))
+        };
+        let mismatch = not_one("mean", convention.mean).or(not_one("std", convention.std));
+        if let (Channels::Y, Some(problem)) = (channels, mismatch) {
+            return Err(problem);
+        }
+        let extras = inputs
+            .iter()
+            .filter(|port| port.name != image.name)
+            .map(|port| FurtherInput::new(port, convention.extra.get(&port.name), layout))
+            .collect::<Result<Vec<_>, String>>()?;
+        let mut stated = convention.extra.keys();
+        if let Some(name) =
+            stated.find(|name| !extras.iter().any(|extra| extra.port.name == **name))
+        {
+            return Err(format!(
+                "its sidecar gives a value for {name:?}, which is not one of its further inputs; it has {}",
+                list(inputs)
+            ));
+        }
+        let fits = |port: &Port, count: usize| {
+            let layout = convention
+                .layout_out
+                .or(port.layout(count))
+                .unwrap_or(layout);
+            port.can_be_image(layout, count, [height, width])
+        };
+        let read = match &convention.image {
+            Some(expression) => Output::named(outputs, expression, channels, fits)?,
+            None => vec![Output::choose(
+                outputs,
+                convention.output.as_ref(),
+                channels,
+                fits,
+            )?],
+        };
+        let is_unread = |port: &&Port| !read.iter().any(|output| output.port.name == port.name);
+        Ok(Self {
+            height: height.known(),
+            width: width.known(),
+            extras,
+            unread: outputs.iter().filter(is_unread).cloned().collect(),
+            outputs: read,
+            input: ImageInput {
+                port: image.clone(),
+                layout,
+            },
+        })
+    }
+}
+
+impl Signature {
+    /// Whether an output can be an image of one or three channels of the input's size.
+    pub(crate) fn has_image_size(&self, port: &Port) -> bool {
+        let layout = self.input.layout;
+        let [_, height, width] = layout.places().map(|place| &self.input.port.dims[place]);
+        [1, 3].into_iter().any(|count| {
+            let layout = port.layout(count).unwrap_or(layout);
+            port.channels().is_some() && port.can_be_image(layout, count, [height, width])
+        })
+    }
+}
+
+/// The input that is the image, and its layout.
+fn image_input<'a>(
+    inputs: &'a [Port],
+    convention: &ModelSidecar,
+) -> Result<(&'a Port, TensorLayout), String> {
+    let channels = convention.channels.unwrap_or_default();
+    let images: Vec<&Port> = inputs
+        .iter()
+        .filter(|port| !port.is_scalar() && !convention.extra.contains_key(&port.name))
+        .collect();
+    // If all but one lack a value, the message names the first of those.
+    let Some(image) = images
+        .iter()
+        .find(|port| {
+            let name = port.name.to_lowercase();
+            port.layout(channels.count()).is_some()
+                && !ATTENTION.iter().any(|word| name.contains(word))
+        })
+        .or(images.first())
+        .copied()
+    else {
+        if let Some(port) = inputs
+            .iter()
+            .find(|port| port.dims.is_empty() && port.element.is_fed())
+        {
+            return Err(format!(
+                "takes {port}, without dimensions; export it with the input's shape, such as [1, 3, height, width]"
+            ));
+        }
+        return Err(format!(
+            "has no image among its inputs; it has {}",
+            list(inputs)
+        ));
+    };
+    if !image.element.is_fed() {
+        return Err(format!(
+            "takes {image}; export it with float32, float16 or uint8"
+        ));
+    }
+    if let [first, _, _, _] = image.dims.as_slice()
+        && !first.can_be(1)
+    {
+        return Err(format!(
+            "takes {image}, several images at a time; export it for a batch of 1 or of any size"
+        ));
+    }
+    if let Some(problem) = unusable_shape(image) {
+        return Err(format!("takes {image}, {problem}"));
+    }
+    let layout = match (convention.layout_in, image.layout(channels.count())) {
+        (Some(stated), Some(found)) if stated != found => None,
+        (Some(stated), _) => Some(stated).filter(|stated| stated.rank() == image.dims.len()),
+        (None, Some(found)) => Some(found),
+        (None, None) if channels == Channels::Rgb && image.layout(1).is_some() => {
+            return Err(format!(
+                "takes {image}, an image of one channel; if that is the luma, state it in MODEL.onnx.toml beside it: `channels = \"y\"`"
+            ));
+        }
+        (None, None) if channels == Channels::Y && image.layout(3).is_some() => {
+            return Err(format!(
+                "takes {image}, an image of three channels, but its sidecar or preset states one (channels = \"y\"); leave that line out"
+            ));
+        }
+        (None, None) if image.may_be_image() => {
+            return Err(format!(
+                "takes {image}, whose dimensions do not show which are the {}; state it in MODEL.onnx.toml beside it: `layout_in = \"nchw\"` (or nhwc, chw, hwc)",
+                channels.words()
+            ));
+        }
+        (None, None) => {
+            return Err(format!(
+                "takes {image}, which is not an image of {}",
+                channels.words()
+            ));
+        }
+    };
+    match layout {
+        Some(layout) if image.dims[layout.places()[0]].can_be(channels.count()) => {
+            Ok((image, layout))
+        }
+        _ => Err(format!(
+            "takes {image}, which contradicts layout_in in its sidecar or preset"
+        )),
+    }
+}
+
+/// Why an input of these dimensions cannot be the image, and what to export instead; `None` if it can be one.
+fn unusable_shape(port: &Port) -> Option<String> {
+    let several = |count: usize| {
+        format!(
+            "{count} channels, and an image has 3; export it so that it takes the image alone and makes the other channels inside the graph"
+        )
+    };
+    let [three, one] = [3, 1].map(|count| port.layout(count).is_some());
+    match port.dims.len() {
+        ..3 => Some(
+            "flat values; export it so that it takes an image of [1, 3, height, width]".to_owned(),
+        ),
+        3 | 4 if three || one => None,
+        3 | 4 => {
+            let counts = port.channel_counts();
+            counts
+                .into_iter()
+                .filter(|count| (2..=16).contains(count))
+                .find(|count| *count != 3)
+                .map(several)
+        }
+        rank => Some(format!(
+            "{rank} dimensions: several frames at a time; export it for single images of [1, 3, height, width]"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests;

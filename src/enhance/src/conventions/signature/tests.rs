@@ -1,0 +1,381 @@
+use super::*;
+use crate::conventions::convention::ElementType;
+use crate::conventions::extra::{ExtraValue, Number};
+use crate::conventions::sidecar::OutputChoice;
+use crate::graphs::Dim;
+
+/// A float32 port; a dimension of 0 is a free one.
+fn port(name: &str, dims: &[usize]) -> Port {
+    let dim = |size: &usize| match size {
+        0 => Dim::Free("n".into()),
+        known => Dim::Known(*known),
+    };
+    Port {
+        name: name.into(),
+        element: ElementType::Float32,
+        dims: dims.iter().map(dim).collect(),
+    }
+}
+
+fn image(name: &str) -> Port {
+    port(name, &[1, 3, 0, 0])
+}
+
+fn curves(name: &str) -> Port {
+    port(name, &[1, 24, 0, 0])
+}
+
+fn signature(inputs: &[Port], outputs: &[Port]) -> Result<Signature, String> {
+    Signature::infer(inputs, outputs, &ModelSidecar::default())
+}
+
+fn choose(outputs: &[Port]) -> Result<String, String> {
+    signature(&[image("input")], outputs).map(|signature| signature.outputs[0].port.name.clone())
+}
+
+#[test]
+fn the_only_image_is_taken_whatever_its_name() {
+    let cases = [
+        vec![image("758")],
+        vec![curves("a"), image("758")],
+        vec![port("scalar", &[1]), image("758")],
+        vec![port("758", &[0, 0, 0, 0])],
+        vec![port("758", &[])],
+    ];
+    for outputs in cases {
+        assert_eq!(choose(&outputs), Ok("758".into()), "{}", list(&outputs));
+    }
+}
+
+#[test]
+fn among_several_the_name_decides() {
+    for (names, expected) in [
+        (&["illumination", "output"][..], "output"),
+        (&["enhanced", "params"], "enhanced"),
+        (&["mul", "add", "result"], "result"),
+        (&["illumination", "r", "enhance_image"], "enhance_image"),
+    ] {
+        let outputs: Vec<Port> = names.iter().map(|name| image(name)).collect();
+        assert_eq!(choose(&outputs), Ok(expected.into()), "{names:?}");
+    }
+}
+
+#[test]
+fn zero_dce_gives_its_second_output_under_any_name() {
+    for names in [
+        ["enhance_image_1", "enhance_image", "r"],
+        ["301", "322", "300"],
+        ["output", "322", "300"],
+        ["output_0", "output_1", "output_2"],
+    ] {
+        let outputs = [image(names[0]), image(names[1]), curves(names[2])];
+        assert_eq!(choose(&outputs), Ok(names[1].into()), "{names:?}");
+    }
+}
+
+#[test]
+fn an_ambiguous_output_must_be_stated() {
+    for names in [
+        &["1", "2"][..],
+        &["output", "322"],
+        &["output", "add_5"],
+        &["enhanced", "/net/Mul_output_0"],
+        &["u0", "u1", "u2", "u_denoised"],
+        &["enhanced", "output"],
+    ] {
+        let outputs: Vec<Port> = names.iter().map(|name| image(name)).collect();
+        let message = choose(&outputs).unwrap_err();
+        assert!(message.contains("output = INDEX"), "{message}");
+        assert!(names.iter().all(|name| message.contains(name)), "{message}");
+    }
+    // Names and structure that contradict each other.
+    let outputs = [image("enhanced"), image("half"), curves("r")];
+    assert!(choose(&outputs).is_err());
+}
+
+#[test]
+fn a_stated_output_is_taken_where_it_can_be_an_image() {
+    let outputs = [image("1"), image("2"), curves("3")];
+    let stated = |outputs: &[Port], choice: OutputChoice| {
+        let sidecar = ModelSidecar {
+            output: Some(choice),
+            ..ModelSidecar::default()
+        };
+        let found = Signature::infer(&[image("input")], outputs, &sidecar);
+        found.map(|signature| signature.outputs[0].port.name.clone())
+    };
+    let index = OutputChoice::Index;
+    assert_eq!(stated(&outputs, index(0)), Ok("1".into()));
+    assert_eq!(
+        stated(&outputs, OutputChoice::Name("2".into())),
+        Ok("2".into())
+    );
+    // With a single output, any index is that one.
+    assert_eq!(stated(&outputs[1..2], index(3)), Ok("2".into()));
+    for (choice, part) in [
+        (index(3), "does not have"),
+        (OutputChoice::Name("x".into()), "does not have"),
+        (index(2), "not one of its image outputs"),
+    ] {
+        let message = stated(&outputs, choice).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn fixed_sizes_are_read_and_must_agree() {
+    let fixed = port("in", &[1, 3, 96, 128]);
+    let found = signature(
+        std::slice::from_ref(&fixed),
+        &[port("out", &[1, 3, 0, 128])],
+    )
+    .unwrap();
+    assert_eq!((found.height, found.width), (Some(96), Some(128)));
+    let half = signature(&[port("in", &[1, 3, 0, 128])], &[image("out")]).unwrap();
+    assert_eq!((half.height, half.width), (None, Some(128)));
+    for dims in [[1, 3, 96, 127], [1, 3, 128, 96], [2, 3, 96, 128]] {
+        assert!(signature(std::slice::from_ref(&fixed), &[port("out", &dims)]).is_err());
+    }
+}
+
+#[test]
+fn layouts_and_elements_are_read() {
+    for (dims, layout) in [
+        (&[1, 3, 0, 0][..], TensorLayout::Nchw),
+        (&[0, 0, 0, 3], TensorLayout::Nhwc),
+        (&[3, 0, 0], TensorLayout::Chw),
+        (&[48, 64, 3], TensorLayout::Hwc),
+    ] {
+        for element in [
+            ElementType::Float32,
+            ElementType::Float16,
+            ElementType::Uint8,
+        ] {
+            let input = Port {
+                element,
+                ..port("x", dims)
+            };
+            let found = signature(&[input], &[port("y", &[])]).unwrap();
+            assert_eq!(
+                (found.input.layout, found.outputs[0].layout),
+                (layout, None)
+            );
+        }
+    }
+    let out = signature(&[image("x")], &[port("y", &[0, 0, 3])]).unwrap();
+    assert_eq!(out.outputs[0].layout, Some(TensorLayout::Hwc));
+}
+
+#[test]
+fn a_layout_that_the_graph_leaves_open_must_be_stated() {
+    let open = [port("x", &[0, 0, 0, 0])];
+    let message = signature(&open, &[image("y")]).unwrap_err();
+    assert!(message.contains("layout_in = \"nchw\""), "{message}");
+    let stated = |layout| ModelSidecar {
+        layout_in: Some(layout),
+        ..ModelSidecar::default()
+    };
+    let found = Signature::infer(&open, &[image("y")], &stated(TensorLayout::Nhwc)).unwrap();
+    assert_eq!(found.input.layout, TensorLayout::Nhwc);
+    for layout in [TensorLayout::Chw, TensorLayout::Nhwc] {
+        assert!(Signature::infer(&[image("x")], &[image("y")], &stated(layout)).is_err());
+    }
+}
+
+/// A convention of these lines.
+fn sidecar(text: &str) -> ModelSidecar {
+    ModelSidecar::parse(std::path::Path::new("m.onnx"), text).unwrap()
+}
+
+fn typed(element: ElementType, port: Port) -> Port {
+    Port { element, ..port }
+}
+
+#[test]
+fn further_numbers_need_values() {
+    let inputs = [image("x"), port("strength", &[1])];
+    let message = signature(&inputs, &[image("y")]).unwrap_err();
+    assert!(message.contains("`strength = NUMBER`"), "{message}");
+    // A value is proposed only where a preset knows the name.
+    let known = [image("x"), port("exposure", &[])];
+    let message = signature(&known, &[image("y")]).unwrap_err();
+    assert!(
+        message.contains("`exposure = 0.2`, as preset pairlie has it"),
+        "{message}"
+    );
+    let switch = [image("x"), typed(ElementType::Bool, port("on", &[1]))];
+    let message = signature(&switch, &[image("y")]).unwrap_err();
+    assert!(message.contains("`on = true` or `on = false`"), "{message}");
+    let given = |text: &str| Signature::infer(&inputs, &[image("y")], &sidecar(text));
+    let found = given("[extra]\nstrength = 0.25").unwrap();
+    assert_eq!(
+        found.extras[0].value,
+        ExtraValue::Number(Number::Float(0.25))
+    );
+    let message = given("[extra]\ngamma = 1").unwrap_err();
+    assert!(message.contains("its value is unknown"), "{message}");
+    let message = given("[extra]\nstrength = 1\ngamma = 1").unwrap_err();
+    assert!(
+        message.contains("\"gamma\", which is not one of its further inputs"),
+        "{message}"
+    );
+}
+
+#[test]
+fn further_inputs_take_what_fits_them() {
+    let small = |port| typed(ElementType::Int32, port);
+    let plane = || port("a", &[1, 1, 0, 0]);
+    let noise = "{ noise = \"normal\" }";
+    let rows = [
+        (small(port("a", &[1])), "3", None),
+        (small(port("a", &[])), "3", None),
+        (small(port("a", &[0])), "3", None),
+        (
+            small(port("a", &[1])),
+            "3.5",
+            Some("3.5 does not fit its type int32"),
+        ),
+        (
+            typed(ElementType::Bool, port("a", &[])),
+            "1",
+            Some("type bool"),
+        ),
+        (
+            port("a", &[1]),
+            "{ map = 1 }",
+            Some("single number: `a = NUMBER`"),
+        ),
+        (plane(), "0.5", Some("`a = { map = 0.5 }`")),
+        (plane(), "{ map = 0.5 }", None),
+        (port("a", &[1, 7, 0, 0]), "{ map = 0.5 }", None),
+        (port("a", &[0, 0]), "{ map = 0.5 }", None),
+        (small(plane()), "{ map = 0.5 }", Some("type int32")),
+        (port("a", &[1, 4, 0, 0]), noise, None),
+        (small(plane()), noise, Some("export it with floats")),
+        (plane(), "{ from = \"max(image)\" }", None),
+        (
+            plane(),
+            "{ from = \"1 - image\" }",
+            Some("max(…) or mean(…)"),
+        ),
+        (port("a", &[1, 3, 0, 0]), "{ from = \"1 - image\" }", None),
+        (
+            port("a", &[1, 4, 0, 0]),
+            "{ from = \"image\" }",
+            Some("4 channels"),
+        ),
+        (
+            port("a", &[5, 1, 0, 0]),
+            "{ map = 1 }",
+            Some("a dimension of 5"),
+        ),
+    ];
+    for (further, value, problem) in rows {
+        let inputs = [image("x"), further];
+        let convention = sidecar(&format!("[extra]\na = {value}"));
+        let found = Signature::infer(&inputs, &[image("y")], &convention).err();
+        let words = format!("{} {value}: {found:?}", inputs[1]);
+        match problem {
+            None => assert_eq!(found, None, "{words}"),
+            Some(part) => assert!(found.is_some_and(|found| found.contains(part)), "{words}"),
+        }
+    }
+}
+
+#[test]
+fn what_a_further_input_may_be_is_told_by_its_shape_and_name() {
+    for (further, part) in [
+        (port("ratio", &[1, 1, 0, 0]), "`ratio = { map = 5.0 }`"),
+        (
+            port("z", &[1, 1, 0, 0]),
+            "`z = { noise = \"normal\", std = NUMBER, seed = 0 }`",
+        ),
+        (port("second", &[1, 3, 0, 0]), "of three channels"),
+        (
+            image("attention"),
+            "`attention = { from = \"1 - max(image)\" }`",
+        ),
+        (port("gray.1", &[1, 1, 0, 0]), "`\"gray.1\" = { from ="),
+        (
+            typed(ElementType::Other("string".into()), port("s", &[])),
+            "whose type is not supported",
+        ),
+    ] {
+        let name = further.to_string();
+        let message = signature(&[image("x"), further], &[image("y")]).unwrap_err();
+        assert!(message.contains(&name), "{message}");
+        assert!(message.contains(part), "{message}");
+    }
+    // An input of such a name is not the image, even if it is the first.
+    let message = signature(&[image("mask"), image("x")], &[image("y")]).unwrap_err();
+    assert!(message.starts_with("takes \"mask\""), "{message}");
+}
+
+#[test]
+fn an_expression_of_the_image_names_outputs() {
+    let outputs = [port("L", &[1, 1, 0, 0]), image("R"), curves("c")];
+    let read = |text: &str| {
+        let convention = sidecar(&format!("image = \"{text}\""));
+        let found = Signature::infer(&[image("x")], &outputs, &convention)?;
+        let names = found.outputs.into_iter().map(|output| output.port.name);
+        Ok::<_, String>(names.collect::<Vec<_>>())
+    };
+    assert_eq!(read("L ^ 0.2 * R"), Ok(vec!["L".into(), "R".into()]));
+    assert_eq!(read("R + 0 * input"), Ok(vec!["R".into()]));
+    for (text, part) in [
+        ("L * Q", "names `Q`, which is not there"),
+        ("c * R", "not an image of one or three channels"),
+        ("input * 2", "names none of its outputs"),
+    ] {
+        let message = read(text).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn one_channel_must_be_stated_to_be_the_luma() {
+    let inputs = [port("a", &[1, 1, 0, 0])];
+    let outputs = [port("b", &[1, 1, 0, 0])];
+    let message = signature(&inputs, &outputs).unwrap_err();
+    assert!(message.contains("`channels = \"y\"`"), "{message}");
+    let stated = |text: &str| Signature::infer(&inputs, &outputs, &sidecar(text));
+    let found = stated("channels = \"y\"").unwrap();
+    assert_eq!(found.input.layout, TensorLayout::Nchw);
+    let message = stated("channels = \"y\"\nmean = [0, 0, 1]").unwrap_err();
+    assert!(message.contains("three different numbers"), "{message}");
+    let colour = Signature::infer(&[image("a")], &outputs, &sidecar("channels = \"y\""));
+    assert!(colour.unwrap_err().contains("leave that line out"));
+}
+
+#[test]
+fn other_conventions_are_refused_by_name() {
+    let double = typed(ElementType::Float64, image("double"));
+    let cases = [
+        (vec![], "no image among its inputs; it has none"),
+        (vec![image("a"), image("b")], "\"b\" (float32 [1, 3, n, n])"),
+        (vec![double], "float64"),
+        (vec![port("a", &[2, 3, 0, 0])], "several images"),
+        (vec![port("a", &[])], "without dimensions"),
+        (
+            vec![port("a", &[1, 4, 0, 0])],
+            "4 channels, and an image has 3",
+        ),
+        (vec![port("a", &[1, 2, 3, 64, 64])], "several frames"),
+        (vec![port("a", &[1, 85])], "flat values"),
+    ];
+    for (inputs, part) in cases {
+        let message = signature(&inputs, &[image("out")]).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn a_model_without_an_image_is_refused() {
+    let outputs = [port("758", &[1, 85, 22, 22]), port("flat", &[1, 3])];
+    let message = choose(&outputs).unwrap_err();
+    assert!(
+        message.contains("\"758\" (float32 [1, 85, 22, 22])"),
+        "{message}"
+    );
+    assert!(choose(&[]).unwrap_err().ends_with("it has none"));
+}

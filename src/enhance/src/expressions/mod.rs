@@ -1,0 +1,10 @@
+//! Expressions of sidecars, computed at each pixel.
+
+mod channel_slice;
+mod expression;
+mod parser;
+mod term;
+
+pub(super) use channel_slice::ChannelSlice;
+pub(super) use expression::Expression;
+pub(super) use term::Sample;

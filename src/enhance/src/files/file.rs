@@ -1,0 +1,476 @@
+//! An enhancement model on disk: [`ModelFile`].
+
+use std::collections::BTreeMap;
+use std::io::ErrorKind;
+use std::ops::Range;
+use std::path::{Component, Path, PathBuf};
+
+use serde::Serialize;
+
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::files::reading;
+use darkqa_ground::types::{Digest, EnhancerName};
+
+use super::built_in::built_in;
+use super::protobuf::{FieldValue, fields};
+use super::weights::Weights;
+use crate::conventions::preset::{Preset, PresetOutputs};
+use crate::conventions::sidecar::{self, ModelSidecar, OutputChoice};
+
+/// An ONNX file with its sidecar, read and checked as far as possible without ONNX Runtime.
+#[derive(Debug)]
+pub struct ModelFile {
+    /// The words that name it, as the user gave them.
+    pub(crate) named: PathBuf,
+    /// Path of the file; for an enhancer of the program, what messages call it.
+    pub(crate) path: PathBuf,
+    pub(crate) name: EnhancerName,
+    pub(crate) digest: Digest,
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) weights: Weights,
+    /// The user's sidecar; empty if there is none.
+    pub(crate) sidecar: ModelSidecar,
+    /// The preset, if one was named.
+    pub(crate) preset: Option<Preset>,
+}
+
+impl ModelFile {
+    /// Reads a model: an enhancer of the program (`lift`, `gray-gain`), or `FILE.onnx` or `PRESET:FILE.onnx` with its sidecar
+    /// `FILE.onnx.toml` if there is one, and the files of its external data.
+    ///
+    /// # Errors
+    /// If a file cannot be read or is not an ONNX model, its name is not an [`EnhancerName`], the sidecar has an unknown key,
+    /// or the enhancer of the program or the preset does not exist.
+    pub fn read(model: &Path) -> Result<Self> {
+        if let Some(built_in) = built_in(model)? {
+            let path = PathBuf::from(format!("{} (built in)", built_in.name));
+            let name = EnhancerName::new(built_in.name)?;
+            let bytes = built_in.model.to_vec();
+            let file = Self::from_bytes(path, name, None, bytes, built_in.sidecar)?;
+            return Ok(Self {
+                named: model.to_owned(),
+                ..file
+            });
+        }
+        let (preset, path) = Preset::split(model)?;
+        let bytes = read_model(&path)?;
+        if let Some(preset) = &preset
+            && let Some(other) = preset.named_after(&path)
+        {
+            tracing::warn!(
+                "{} is read as a model of {}, but is named like one of {other}",
+                path.display(),
+                preset.name
+            );
+        }
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = name_of(&stem)?;
+        if name.as_str() != stem {
+            tracing::warn!("{} is called {name} in tables and records", path.display());
+        }
+        let text = sidecar::text_for(&path)?;
+        let file = Self::from_bytes(path, name, preset, bytes, &text)?;
+        Ok(Self {
+            named: model.to_owned(),
+            ..file
+        })
+    }
+
+    /// The model of these bytes, with the text of its sidecar.
+    fn from_bytes(
+        path: PathBuf,
+        name: EnhancerName,
+        preset: Option<Preset>,
+        bytes: Vec<u8>,
+        sidecar: &str,
+    ) -> Result<Self> {
+        let weights = Weights::find(&bytes).map_err(|_| not_onnx(&path, &bytes))?;
+        let sidecar = ModelSidecar::parse(&path, sidecar)?;
+        Ok(Self {
+            digest: digest(&path, &bytes, &sidecar, &weights, preset.as_ref())?,
+            named: path.clone(),
+            path,
+            name,
+            sidecar,
+            preset,
+            bytes,
+            weights,
+        })
+    }
+
+    /// The enhancer of the program with a digest; `None` if no enhancer of this version has it.
+    #[must_use]
+    pub fn built_in_with(digest: &str) -> Option<Self> {
+        darkqa_models::BUILT_IN
+            .iter()
+            .filter_map(|built_in| Self::read(Path::new(built_in.name)).ok())
+            .find(|file| file.digest.to_string() == digest)
+    }
+
+    /// Data that the model was trained on; `None` if neither sidecar nor preset states them.
+    #[must_use]
+    pub fn trained_on(&self) -> Option<&str> {
+        let preset = self.preset.as_ref();
+        let preset = preset.and_then(|preset| preset.content.sidecar.trained_on.as_deref());
+        self.sidecar.trained_on.as_deref().or(preset)
+    }
+
+    /// The same file, with this output as the default to read.
+    #[must_use]
+    pub fn with_output(mut self, place: usize) -> Self {
+        let stated = &mut self.sidecar.output;
+        *stated = stated.take().or(Some(OutputChoice::Index(place)));
+        self
+    }
+
+    /// Name in tables and records: the file's name without its extension, or that of an enhancer of the program.
+    #[must_use]
+    pub fn name(&self) -> &EnhancerName {
+        &self.name
+    }
+
+    /// Path of the file; for an enhancer of the program, what messages call it.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Digest of everything that affects opening and probing the model. It includes which statements are from the sidecar and which from
+    /// the preset, although that affects no image.
+    ///
+    /// # Errors
+    /// If a number of the sidecar is infinite or NaN.
+    pub fn stated(&self) -> Result<Digest> {
+        let preset = self.preset.as_ref().map(|preset| &preset.name);
+        let facts = (self.digest, &self.sidecar, preset);
+        Digest::canonical("darkqa.enhancer-stated/1", &facts)
+    }
+
+    /// Digest of the model, its external data, and the convention of sidecar and preset.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        self.digest
+    }
+}
+
+/// Name of an enhancer whose file has this stem: other characters than letters, digits, `_`, `-` and `.` become `-`. If letters were
+/// lost, the begin of the stem's digest tells such files apart.
+fn name_of(stem: &str) -> Result<EnhancerName> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    if stem.chars().all(fits) {
+        return EnhancerName::new(stem);
+    }
+    let mut name = stem
+        .split(|c: char| !fits(c))
+        .filter(|word| !word.is_empty())
+        .collect::<Vec<_>>()
+        .join("-");
+    if !stem.is_ascii() {
+        let digest: String = Digest::from_bytes(stem.as_bytes()).to_string();
+        let digest = digest.rsplit(':').next().unwrap_or_default();
+        let digest: String = digest.chars().take(6).collect();
+        name = [name, digest].join("-");
+    }
+    EnhancerName::new(name.trim_matches('-'))
+}
+
+/// Content of an enhancer's digest: all that decides an enhanced image, except the degraded one.
+#[derive(Serialize)]
+struct EnhancementFacts<'a> {
+    file: Digest,
+    /// Digests of external data, by the location that the model states.
+    external: BTreeMap<&'a str, Digest>,
+    convention: ModelSidecar,
+    /// The preset's rules that choose an output, if no sidecar states one.
+    outputs: Option<PresetOutputs<'a>>,
+}
+
+/// Digest of a model's content, its external data and the convention of sidecar and preset. Each file is hashed alone, so
+/// that only one is in memory at a time.
+fn digest(
+    path: &Path,
+    bytes: &[u8],
+    sidecar: &ModelSidecar,
+    weights: &Weights,
+    preset: Option<&Preset>,
+) -> Result<Digest> {
+    let mut external = BTreeMap::new();
+    for (location, size) in &weights.external {
+        let file = external_path(path, location)?;
+        let content = read_weights(path, &file, *size)?;
+        external.insert(location.as_ref(), Digest::from_bytes(&content));
+    }
+    let sidecar = sidecar.clone();
+    let convention = match preset {
+        None => sidecar,
+        Some(preset) => sidecar.with_defaults(&preset.content.sidecar),
+    };
+    // The preset chooses the output unless a sidecar does, or there is only one.
+    let read_by_preset =
+        convention.output.is_none() && convention.image.is_none() && output_count(bytes) != 1;
+    let facts = EnhancementFacts {
+        file: Digest::from_bytes(bytes),
+        external,
+        convention: convention.without_defaults(),
+        outputs: preset.filter(|_| read_by_preset).map(Preset::outputs),
+    };
+    Digest::canonical("darkqa.enhancer/2", &facts)
+}
+
+/// Number of outputs of a model: field 12 of its `GraphProto`, which is field 7 of the `ModelProto` (`onnx/onnx.proto`).
+fn output_count(model: &[u8]) -> usize {
+    let within = |range: Range<usize>, wanted: u64| {
+        fields(model, range)
+            .filter_map(Result::ok)
+            .filter_map(move |field| match field {
+                (number, FieldValue::Bytes(bytes)) if number == wanted => Some(bytes),
+                _ => None,
+            })
+    };
+    let graphs = within(0..model.len(), 7);
+    graphs.map(|graph| within(graph, 12).count()).sum()
+}
+
+/// Path of a file with external data, which must be in the model's folder or below (ONNX Runtime refuses others too).
+fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
+    let relative = Path::new(location);
+    let inside = relative
+        .components()
+        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if !inside || location.is_empty() {
+        return Err(Error::Enhancer {
+            path: model.to_owned(),
+            problem: format!(
+                "names {location:?} as a file of its weights, which is outside its folder; export it again with the weights beside it"
+            ),
+        });
+    }
+    Ok(model.with_file_name("").join(relative))
+}
+
+/// The bytes of a file of weights that has at least this size.
+fn read_weights(model: &Path, file: &Path, least: u64) -> Result<Vec<u8>> {
+    let fault = |problem: String| Error::Enhancer {
+        path: model.to_owned(),
+        problem,
+    };
+    let size = match std::fs::metadata(file) {
+        Ok(data) => data.len(),
+        Err(e) if e.kind() == ErrorKind::NotFound => {
+            return Err(fault(format!(
+                "the weights of the model are missing: {}; copy this file to the same folder, or export the model as one file",
+                file.display()
+            )));
+        }
+        Err(e) => return Err(Error::file(file, "read", e)),
+    };
+    if size < least {
+        return Err(fault(format!(
+            "the weights of the model are cut short: {} has {size} of {least} bytes; copy or download it again",
+            file.display()
+        )));
+    }
+    reading::at_most(file, MOST_WEIGHTS)
+}
+
+/// Most bytes of a file of weights. Chosen: the largest published enhancers have a hundredth.
+const MOST_WEIGHTS: u64 = 1 << 36;
+
+/// Largest ONNX file in bytes: what a protobuf message can hold (2³¹ − 1, <https://protobuf.dev/programming-guides/encoding/>).
+const MOST_BYTES: u64 = i32::MAX as u64;
+
+/// The bytes of an ONNX file. A file that is too large to be one is refused before it is read.
+fn read_model(path: &Path) -> Result<Vec<u8>> {
+    let size = std::fs::metadata(path)
+        .map_err(|e| match e.kind() {
+            ErrorKind::NotFound => {
+                Error::usage("--llie", format_args!("{}: no such file", path.display()))
+            }
+            _ => Error::file(path, "read", e),
+        })?
+        .len();
+    if size > MOST_BYTES {
+        return Err(Error::Enhancer {
+            path: path.to_owned(),
+            problem: format!(
+                "has {:.1} GB, and an ONNX file holds at most 2.1 GB; export it with its weights in a file beside it (external data)",
+                size as f64 / 1e9
+            ),
+        });
+    }
+    reading::at_most(path, MOST_BYTES)
+}
+
+fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
+    let problem = if bytes.starts_with(b"version https://git-lfs") {
+        "is a Git LFS pointer, not a model; fetch the model itself with `git lfs pull`"
+    } else {
+        "is not a complete ONNX model; download it again, or export it to ONNX if it is a PyTorch or TensorFlow model"
+    };
+    Error::Enhancer {
+        path: path.to_owned(),
+        problem: problem.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `ir_version = 8` and a graph with only one initialiser, whose external data is in `location`.
+    fn model(location: &str) -> Vec<u8> {
+        let field = |number: u8, content: &[u8]| {
+            [&[number << 3 | 2, content.len() as u8], content].concat()
+        };
+        let entry = [field(1, b"location"), field(2, location.as_bytes())].concat();
+        let tensor = [&[16, 1, 14 << 3, 1], field(13, &entry).as_slice()].concat();
+        [&[8, 8], field(7, &field(5, &tensor)).as_slice()].concat()
+    }
+
+    #[test]
+    fn the_digest_changes_with_every_part() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, content: &[u8]| {
+            std::fs::write(folder.path().join(name), content).unwrap();
+        };
+        let digest = || {
+            ModelFile::read(&folder.path().join("a.onnx"))
+                .unwrap()
+                .digest()
+        };
+        write("a.onnx", &model("a.bin"));
+        write("a.bin", &[1]);
+        let first = digest();
+        assert_eq!(first, digest());
+        write("a.bin", &[2]);
+        let second = digest();
+        write("a.onnx.toml", b"output = 0");
+        let third = digest();
+        write("a.onnx", &model("./a.bin"));
+        let all = [first, second, third, digest()];
+        for (i, digest) in all.iter().enumerate() {
+            assert!(!all[..i].contains(digest), "{i}");
+        }
+    }
+
+    #[test]
+    fn stating_a_default_does_not_change_the_digest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.onnx");
+        std::fs::write(&path, model("a.bin")).unwrap();
+        std::fs::write(folder.path().join("a.bin"), [1]).unwrap();
+        let digest = |sidecar: &str| {
+            std::fs::write(folder.path().join("a.onnx.toml"), sidecar).unwrap();
+            ModelFile::read(&path).unwrap().digest()
+        };
+        let bare = digest("");
+        for same in [
+            "# a remark",
+            "color = \"rgb\"\npad = \"reflect\"\nrounding = \"round\"",
+            "multiple = 1\nmean = [0, 0, 0]\nstd = [1, 1, 1]",
+            "trained_on = \"LOL-v1\"",
+            "[extra]",
+        ] {
+            assert_eq!(digest(same), bare, "{same}");
+        }
+        for other in ["color = \"bgr\"", "mean = [0.1, 0, 0]", "[extra]\na = 0"] {
+            assert_ne!(digest(other), bare, "{other}");
+        }
+    }
+
+    /// The digest is of the canonical JSON of the stated keys alone, so that keys added later change no digest.
+    #[test]
+    fn what_is_not_stated_is_not_in_the_digest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.onnx");
+        let file = model("a.bin");
+        std::fs::write(&path, &file).unwrap();
+        std::fs::write(folder.path().join("a.bin"), [1]).unwrap();
+        let hash = |bytes: &[u8]| serde_json::to_string(&Digest::from_bytes(bytes)).unwrap();
+        for (sidecar, convention) in [
+            ("", ""),
+            (
+                "color_out = \"rgb\"\nchannels = \"rgb\"\ninput = \"image\"",
+                "",
+            ),
+            (
+                "range_in = \"-1..1\"\noutput = 0\n[extra]\na = 0.5\nb = 1",
+                r#""extra":{"a":0.5,"b":1.0},"output":0,"range_in":"-1..1""#,
+            ),
+            (
+                "image = \"L ^ 0.2 * R\"\n[extra]\nr = { map = 5 }",
+                r#""extra":{"r":{"map":5.0}},"image":"L ^ 0.2 * R""#,
+            ),
+        ] {
+            std::fs::write(folder.path().join("a.onnx.toml"), sidecar).unwrap();
+            let facts = format!(
+                r#"darkqa.enhancer/2{}{{"convention":{{{convention}}},"external":{{"a.bin":{}}},"file":{}}}"#,
+                '\0',
+                hash(&[1]),
+                hash(&file)
+            );
+            let found = ModelFile::read(&path).unwrap().digest();
+            assert_eq!(found, Digest::from_bytes(facts.as_bytes()), "{sidecar}");
+        }
+    }
+
+    #[test]
+    fn any_file_name_gives_a_name() {
+        let name = |stem: &str| name_of(stem).unwrap().to_string();
+        assert_eq!(name("zero-dce_v1.2"), "zero-dce_v1.2");
+        assert_eq!(name("zero dce (1)"), "zero-dce-1");
+        let [one, other] = ["低光", "增强"].map(name);
+        assert!(
+            one.len() == 6 && other.len() == 6 && one != other,
+            "{one} {other}"
+        );
+        assert!(name("模型 v2").starts_with("v2-"));
+    }
+
+    #[test]
+    fn outputs_are_counted() {
+        let field = |number: u8, content: &[u8]| {
+            [&[number << 3 | 2, content.len() as u8], content].concat()
+        };
+        let graph = [field(12, b""), field(11, b""), field(12, b"")].concat();
+        assert_eq!(output_count(&field(7, &graph)), 2);
+        assert_eq!(output_count(&model("a.bin")), 0);
+        assert_eq!(output_count(&[0xFF]), 0);
+    }
+
+    #[test]
+    fn a_file_that_cannot_be_used_is_refused_with_the_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let cases: [(&str, &[u8], &str); 4] = [
+            ("text.onnx", b"not a model", "is not a complete ONNX model"),
+            (
+                "lfs.onnx",
+                b"version https://git-lfs.github.com/spec/v1\n",
+                "git lfs pull",
+            ),
+            ("out.onnx", &model("../secret"), "outside its folder"),
+            (
+                "gone.onnx",
+                &model("gone.bin"),
+                "weights of the model are missing: ",
+            ),
+        ];
+        for (name, content, part) in cases {
+            let path = folder.path().join(name);
+            std::fs::write(&path, content).unwrap();
+            let message = ModelFile::read(&path).unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        }
+        // Empty, but for its size.
+        let large = folder.path().join("large.onnx");
+        let file = std::fs::File::create(&large).unwrap();
+        file.set_len(MOST_BYTES + 1).unwrap();
+        let message = ModelFile::read(&large).unwrap_err().to_string();
+        assert!(message.contains("2.1 GB"), "{message}");
+        let missing = ModelFile::read(Path::new("missing.onnx")).unwrap_err();
+        assert!(
+            missing
+                .to_string()
+                .starts_with("--llie: missing.onnx: no such file")
+        );
+    }
+}

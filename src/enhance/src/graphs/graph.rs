@@ -1,0 +1,411 @@
+//! A graph loaded into ONNX Runtime, with the conversion of images to and from it: [`Graph`].
+
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use ort::session::Session;
+
+use super::port::Port;
+use super::session::{
+    GraphSource, SessionOptions, Stopper, builder, one_line, ports, run, take_batch,
+};
+use crate::conventions::Signature;
+use crate::conventions::preset::Preset;
+use crate::conventions::sidecar::ModelSidecar;
+use crate::failure::{RunFailure, load_problem};
+use crate::inputs::{DarkImage, FedImage, Feeding, Tensor};
+use crate::libraries::{Ended, JobLimits, Runtime};
+use crate::limits::{ImageClock, MemoryLimit, TimeLimit};
+use crate::outputs::{Composition, ImageTensor, OutOfRange};
+use crate::planes::Planes;
+use crate::probes::Codes;
+use crate::sizing::TileWindow;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::Rgb;
+
+/// A loaded graph with its session.
+pub(crate) struct Graph {
+    pub(crate) signature: Arc<Signature>,
+    pub(crate) feeding: Feeding,
+    pub(crate) reading: Arc<Composition>,
+    /// Statements of sidecar and preset.
+    pub(crate) convention: ModelSidecar,
+    /// Differences between the graph and the model that the preset's authors published.
+    pub(crate) differing: Option<String>,
+    runtime: Runtime,
+    session: Arc<Mutex<Session>>,
+    options: Arc<SessionOptions>,
+    ports: Arc<Ports>,
+    /// Options that give back memory after a run.
+    releasing: Arc<SessionOptions>,
+    clock: Mutex<ImageClock>,
+    /// Memory that the process may take during a run.
+    memory: MemoryLimit,
+}
+
+/// Limits for loading a model, and then for each image. Loading is limited too, because ONNX Runtime folds constants then.
+#[derive(Debug, Clone, Copy)]
+pub struct LoadLimits {
+    /// The longest time.
+    pub time: TimeLimit,
+    /// The memory of the process.
+    pub memory: MemoryLimit,
+}
+
+impl LoadLimits {
+    /// No limits.
+    pub const NONE: Self = Self {
+        time: TimeLimit::NONE,
+        memory: MemoryLimit::NONE,
+    };
+}
+
+/// All inputs and outputs of a graph, by name, type and dimensions; those of its first image if it takes several.
+struct Ports {
+    inputs: Vec<Port>,
+    outputs: Vec<Port>,
+    /// Number of images of each run: 1, or the graph's fixed batch size.
+    batch: usize,
+}
+
+/// Treatment at the end of a run of the arena, the memory that ONNX Runtime keeps for later runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Arena {
+    Kept,
+    Released,
+}
+
+/// Result of a run of a model.
+pub(crate) enum RunResult<T> {
+    /// Content read from the output.
+    Output(T),
+    /// It gave no image of this size.
+    Failed(RunFailure),
+    /// The values of the output are not those of an image.
+    Unusable(OutOfRange),
+}
+
+impl Graph {
+    /// Loads a model, with the statements of its sidecar and its preset.
+    ///
+    /// # Errors
+    /// The inner error describes the fault of the model, to follow the file's name.
+    pub(crate) fn load(
+        source: GraphSource,
+        sidecar: &ModelSidecar,
+        preset: Option<&Preset>,
+        runtime: &Runtime,
+        threads: Option<NonZeroUsize>,
+        limits: LoadLimits,
+    ) -> Result<std::result::Result<Self, String>> {
+        let environment = runtime.environment().clone();
+        let job = move || builder(&environment, threads).and_then(|found| source.commit(found));
+        let within = JobLimits {
+            time: limits.time.get(),
+            memory: limits.memory,
+        };
+        let session = match runtime.thread().run_or_leave(within, job)? {
+            Ended::InTime(session) => session,
+            Ended::Late => {
+                let problem = format!(
+                    "takes longer than {} s to load; --llie-options timeout allows more, and 0 any time",
+                    limits.time
+                );
+                return Ok(Err(problem));
+            }
+            Ended::TooLarge => return Ok(Err(RunFailure::TooLarge(limits.memory).words())),
+        };
+        Ok(session
+            .map_err(|e| load_problem(&one_line(&e), runtime.version()))
+            .and_then(|session| Self::new(session, sidecar, preset, runtime))
+            .map(|mut graph| {
+                graph.limit_time(limits.time);
+                graph.limit_memory(limits.memory);
+                graph
+            }))
+    }
+
+    fn new(
+        session: Session,
+        sidecar: &ModelSidecar,
+        preset: Option<&Preset>,
+        runtime: &Runtime,
+    ) -> std::result::Result<Self, String> {
+        let (mut inputs, mut outputs) = (ports(session.inputs()), ports(session.outputs()));
+        let batch = take_batch(&mut inputs, &mut outputs);
+        let convention = match preset {
+            None => sidecar.clone(),
+            Some(preset) => {
+                let preset = preset.for_graph(sidecar, &inputs, &outputs)?;
+                sidecar.clone().with_defaults(&preset)
+            }
+        };
+        let differing = preset.and_then(|preset| preset.differing(&inputs, &outputs));
+        let ports = Ports {
+            inputs,
+            outputs,
+            batch,
+        };
+        let session = Arc::new(Mutex::new(session));
+        let graph = Self::from_session(session, Arc::new(ports), convention, runtime)?;
+        Ok(Self { differing, ..graph })
+    }
+
+    fn from_session(
+        session: Arc<Mutex<Session>>,
+        ports: Arc<Ports>,
+        convention: ModelSidecar,
+        runtime: &Runtime,
+    ) -> std::result::Result<Self, String> {
+        let signature = Signature::infer(&ports.inputs, &ports.outputs, &convention)?;
+        let options = SessionOptions::for_outputs(&signature.outputs).map_err(|e| one_line(&e))?;
+        let releasing = SessionOptions::releasing_memory(&signature.outputs);
+        let releasing = releasing.map_err(|e| one_line(&e))?;
+        Ok(Self {
+            feeding: Feeding::new(&signature, &convention),
+            reading: Arc::new(Composition::new(&signature, &convention)?),
+            convention,
+            differing: None,
+            signature: Arc::new(signature),
+            runtime: runtime.clone(),
+            session,
+            options: Arc::new(options),
+            releasing: Arc::new(releasing),
+            ports,
+            clock: Mutex::default(),
+            memory: MemoryLimit::NONE,
+        })
+    }
+
+    /// The same session, fed and read by another convention.
+    ///
+    /// # Errors
+    /// If the graph contradicts it; the message follows the file's name.
+    pub(crate) fn with_convention(
+        &self,
+        convention: ModelSidecar,
+    ) -> std::result::Result<Self, String> {
+        let (session, ports) = (Arc::clone(&self.session), Arc::clone(&self.ports));
+        let mut graph = Self::from_session(session, ports, convention, &self.runtime)?;
+        graph.clock = Mutex::new(*self.clock());
+        graph.memory = self.memory;
+        graph.differing.clone_from(&self.differing);
+        Ok(graph)
+    }
+
+    /// Remark on unread outputs that have the image's size; `None` if there are none, or if a statement or a preset defines the image.
+    pub(crate) fn unread_images(&self) -> Option<String> {
+        let is_stated = self.convention.image.is_some() || self.convention.output.is_some();
+        let unread: Vec<String> = self
+            .signature
+            .unread
+            .iter()
+            .filter(|port| self.signature.has_image_size(port))
+            .map(|port| format!("{:?}", port.name))
+            .collect();
+        (!unread.is_empty() && !is_stated).then(|| {
+            format!(
+                "of its outputs {:?} is read as the image, and {}, which {} the image's size, {} not read: if its authors make the image of several, state their formula in MODEL.onnx.toml beside it, `image = \"EXPRESSION\"`, else `output = {:?}`",
+                self.signature.outputs[0].port.name,
+                unread.join(", "),
+                if unread.len() == 1 { "has" } else { "have" },
+                if unread.len() == 1 { "is" } else { "are" },
+                self.signature.outputs[0].port.name
+            )
+        })
+    }
+
+    /// The ONNX Runtime that runs it.
+    pub(crate) fn runtime(&self) -> &Runtime {
+        &self.runtime
+    }
+
+    /// Number of images of each run: 1, or the graph's fixed batch size.
+    pub(crate) fn batch(&self) -> usize {
+        self.ports.batch
+    }
+
+    /// Sets the time that the runs of one image may take together.
+    pub(crate) fn limit_time(&mut self, limit: TimeLimit) {
+        *self.clock() = ImageClock::new(limit);
+    }
+
+    /// The time that the runs of one image may take together.
+    pub(crate) fn time_limit(&self) -> TimeLimit {
+        self.clock().time_limit()
+    }
+
+    /// Sets the memory that the process may take while the model runs.
+    pub(crate) fn limit_memory(&mut self, limit: MemoryLimit) {
+        self.memory = limit;
+    }
+
+    /// The memory that the process may take while the model runs.
+    pub(crate) fn memory_limit(&self) -> MemoryLimit {
+        self.memory
+    }
+
+    /// Begins the time of another image, or of a trial.
+    pub(crate) fn restart_clock(&self) {
+        self.clock().restart();
+    }
+
+    fn clock(&self) -> MutexGuard<'_, ImageClock> {
+        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A handle that ends a run from another thread.
+    pub(crate) fn stopper(&self) -> Stopper {
+        Stopper(Arc::clone(&self.options))
+    }
+
+    /// Runs the model on a window of an image; returns the bytes of a part of the window.
+    pub(crate) fn window(
+        &self,
+        dark: &DarkImage<'_>,
+        window: TileWindow,
+        part: TileWindow,
+    ) -> Result<RunResult<Vec<u8>>> {
+        let fed = self.fed(dark, window);
+        let mut further = self.signature.extras.iter();
+        if let Some(problem) = further.find_map(|input| input.check_cut(&fed).err()) {
+            return Ok(RunResult::Failed(RunFailure::NotCut(problem)));
+        }
+        let used = TileWindow {
+            left: window.left + part.left,
+            top: window.top + part.top,
+            right: window.left + part.right,
+            bottom: window.top + part.bottom,
+        };
+        let needed = self.reading.needs_dark();
+        let dark = needed.then(|| self.fed(dark, used).planes().into_owned());
+        let (reading, size) = (Arc::clone(&self.reading), window.size());
+        self.run(&self.options, &fed, move |outputs| {
+            reading.bytes(outputs, size, part, dark.as_ref())
+        })
+    }
+
+    /// Runs the model on a window of an image and ignores its output.
+    pub(crate) fn probe(&self, image: &Rgb, window: TileWindow) -> Result<RunResult<()>> {
+        self.probe_memory(image, window, Arena::Kept)
+    }
+
+    /// The same, for a measurement of memory: with the arena as it is, or released afterwards.
+    pub(crate) fn probe_memory(
+        &self,
+        image: &Rgb,
+        window: TileWindow,
+        arena: Arena,
+    ) -> Result<RunResult<()>> {
+        let options = match arena {
+            Arena::Kept => &self.options,
+            Arena::Released => &self.releasing,
+        };
+        let dark = DarkImage::new(image);
+        self.run(options, &self.fed(&dark, window), |_| Ok(()))
+    }
+
+    /// Runs the model on a whole image of floats.
+    pub(crate) fn planes(&self, planes: &Planes) -> Result<RunResult<Planes>> {
+        let (reading, size) = (Arc::clone(&self.reading), planes.size());
+        let dark = reading.needs_dark().then(|| planes.clone());
+        self.run(&self.options, &FedImage::Whole(planes), move |outputs| {
+            reading.planes(outputs, size, TileWindow::whole(size), dark.as_ref())
+        })
+    }
+
+    /// Runs the model once on a whole image, and reads it by the conventions of several graphs, which feed it as this one does.
+    pub(crate) fn readings(&self, image: &Rgb, graphs: &[Self]) -> Result<RunResult<Vec<Codes>>> {
+        let readings: Vec<Arc<Composition>> = graphs
+            .iter()
+            .map(|graph| Arc::clone(&graph.reading))
+            .collect();
+        let dark = Planes::from_rgb(image);
+        let fed = dark.clone();
+        self.run(&self.options, &FedImage::Whole(&fed), move |outputs| {
+            let size = dark.size();
+            let codes = readings.iter().map(|reading| {
+                let dark = reading.needs_dark().then_some(&dark);
+                let planes = reading.planes(outputs, size, TileWindow::whole(size), dark);
+                // The rules about plausible images name values that are none.
+                planes.map_or_else(
+                    |_| Codes::unusable(size),
+                    |planes| Codes::from_planes(&planes),
+                )
+            });
+            Ok(codes.collect())
+        })
+    }
+
+    fn fed<'a>(&self, dark: &'a DarkImage<'a>, window: TileWindow) -> FedImage<'a> {
+        FedImage::Window {
+            dark,
+            window,
+            pad: self.feeding.pad,
+        }
+    }
+
+    /// The tensors of all inputs, by name; `None` if expressions in the sidecar give values that are not finite.
+    fn inputs(&self, fed: &FedImage<'_>) -> Option<Vec<(String, Tensor)>> {
+        let name = |port: &Port| port.name.clone();
+        let image = self.feeding.tensor(fed)?;
+        let mut inputs = vec![(name(&self.signature.input.port), image)];
+        for extra in &self.signature.extras {
+            inputs.push((name(&extra.port), extra.tensor(fed)?));
+        }
+        Some(inputs)
+    }
+
+    /// Runs the model, and reads its outputs before another run overwrites them.
+    fn run<T: Send + 'static>(
+        &self,
+        options: &Arc<SessionOptions>,
+        fed: &FedImage<'_>,
+        read: impl FnOnce(&[ImageTensor<'_>]) -> std::result::Result<T, OutOfRange> + Send + 'static,
+    ) -> Result<RunResult<T>> {
+        let Some(inputs) = self.inputs(fed) else {
+            return Ok(RunResult::Unusable(OutOfRange::NotFed));
+        };
+        let size = fed.size();
+        let (session, signature) = (Arc::clone(&self.session), Arc::clone(&self.signature));
+        let (reading, used) = (Arc::clone(&self.reading), Arc::clone(options));
+        let (clock, batch, start) = (*self.clock(), self.ports.batch, Instant::now());
+        let job = move || {
+            let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
+            let result = run(
+                &mut session,
+                &used,
+                batch,
+                inputs,
+                &signature.outputs,
+                |outputs| match reading.laid_out(outputs, size) {
+                    Ok(images) => read(&images).map_or_else(RunResult::Unusable, RunResult::Output),
+                    Err(other) => RunResult::Failed(other.failure(size)),
+                },
+            );
+            result
+                .unwrap_or_else(|e| RunResult::Failed(RunFailure::from_message(size, one_line(&e))))
+        };
+        let limits = JobLimits {
+            time: clock.left(),
+            memory: self.memory,
+        };
+        let ended = self
+            .runtime
+            .thread()
+            .run_within(limits, || options.end_run(), job)?;
+        self.clock().add(start.elapsed());
+        Ok(match (ended, clock.limit()) {
+            (Ended::InTime(result), _) => result,
+            (Ended::Late, limit) => {
+                options.allow_runs();
+                RunResult::Failed(RunFailure::TooLong(limit.unwrap_or_default()))
+            }
+            (Ended::TooLarge, _) => {
+                options.allow_runs();
+                RunResult::Failed(RunFailure::TooLarge(self.memory))
+            }
+        })
+    }
+}

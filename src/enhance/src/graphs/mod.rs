@@ -1,0 +1,13 @@
+//! Graphs loaded into ONNX Runtime: their ports, sessions and runs.
+
+mod graph;
+mod network;
+mod port;
+mod session;
+
+pub use graph::LoadLimits;
+pub(super) use graph::{Arena, Graph, RunResult};
+pub use network::Network;
+pub(super) use port::{Dim, Port, list};
+pub(super) use session::GraphSource;
+pub use session::Stopper;

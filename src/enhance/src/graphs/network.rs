@@ -1,0 +1,65 @@
+//! A network that the program carries and that is no enhancer: [`Network`].
+
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ort::session::{Session, SessionInputValue};
+use ort::value::Tensor;
+
+use darkqa_ground::error::{Error, Result};
+
+use super::session::{builder, one_line};
+use crate::failure::load_problem;
+use crate::libraries::Runtime;
+
+/// A loaded network with one input and several outputs, all of 32-bit floats. It runs on one thread, so that its outputs do not
+/// depend on the number of cores.
+pub struct Network {
+    name: &'static str,
+    runtime: Runtime,
+    session: Arc<Mutex<Session>>,
+}
+
+impl Network {
+    /// Loads a network from its file's content; errors call it by this name.
+    ///
+    /// # Errors
+    /// If ONNX Runtime refuses it.
+    pub fn open(name: &'static str, model: &'static [u8], runtime: &Runtime) -> Result<Self> {
+        // Enhancers work at the same time.
+        let runtime = runtime.beside()?;
+        let environment = runtime.environment().clone();
+        let job = move || {
+            let mut builder = builder(&environment, Some(NonZeroUsize::MIN))?;
+            builder.commit_from_memory(model)
+        };
+        let session = runtime.thread().run(job)?.map_err(|e| {
+            let problem = load_problem(&one_line(&e), runtime.version());
+            Error::Runtime(format!("{name}: {problem}"))
+        })?;
+        Ok(Self {
+            name,
+            session: Arc::new(Mutex::new(session)),
+            runtime,
+        })
+    }
+
+    /// Runs the network on an input of these dimensions. Returns the outputs in the order of the graph, row by row.
+    ///
+    /// # Errors
+    /// If the run fails, as for want of memory.
+    pub fn run(&self, dims: Vec<usize>, input: Vec<f32>) -> Result<Vec<Vec<f32>>> {
+        let session = Arc::clone(&self.session);
+        let job = move || {
+            let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
+            let input = SessionInputValue::from(Tensor::from_array((dims, input))?);
+            let outputs = session.run([input])?;
+            outputs
+                .values()
+                .map(|output| Ok(output.try_extract_tensor::<f32>()?.1.to_vec()))
+                .collect::<ort::Result<_>>()
+        };
+        let outputs = self.runtime.thread().run(job)?;
+        outputs.map_err(|e| Error::Runtime(format!("{}: {}", self.name, one_line(&e))))
+    }
+}

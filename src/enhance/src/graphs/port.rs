@@ -1,0 +1,161 @@
+//! Inputs and outputs of a graph: [`Port`].
+
+use std::fmt;
+
+use crate::conventions::{ElementType, TensorLayout};
+
+/// Most channels of an output; chosen, Zero-DCE's curves have 24.
+const MOST_CHANNELS: usize = 64;
+
+/// An input or output of a graph.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Port {
+    pub(crate) name: String,
+    pub(crate) element: ElementType,
+    /// Dimensions; empty for a single number, and if the graph does not state their number.
+    pub(crate) dims: Vec<Dim>,
+}
+
+/// One dimension of a tensor.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Dim {
+    /// Size that the graph fixes.
+    Known(usize),
+    /// Any size, with the graph's name for it, which may be empty.
+    Free(String),
+}
+
+impl Dim {
+    pub(crate) fn known(&self) -> Option<usize> {
+        match self {
+            Self::Known(size) => Some(*size),
+            Self::Free(_) => None,
+        }
+    }
+
+    /// Whether the dimension can have this size.
+    pub(crate) fn can_be(&self, size: usize) -> bool {
+        self.known().is_none_or(|known| known == size)
+    }
+
+    /// Whether two dimensions can have the same size.
+    fn can_equal(&self, other: &Self) -> bool {
+        other.known().is_none_or(|size| self.can_be(size))
+    }
+}
+
+impl fmt::Display for Dim {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Known(size) => write!(f, "{size}"),
+            Self::Free(name) if name.is_empty() => write!(f, "?"),
+            Self::Free(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+impl fmt::Display for Port {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:?} ({} [", self.name, self.element)?;
+        for (i, dim) in self.dims.iter().enumerate() {
+            let comma = if i == 0 { "" } else { ", " };
+            write!(f, "{comma}{dim}")?;
+        }
+        write!(f, "])")
+    }
+}
+
+impl Port {
+    /// Layout of an image with `channels` channels; `None` if the dimensions do not determine it.
+    pub(crate) fn layout(&self, channels: usize) -> Option<TensorLayout> {
+        let mut fitting = TensorLayout::ALL.into_iter().filter(|layout| {
+            self.dims.len() == layout.rank()
+                && self.dims[layout.places()[0]].known() == Some(channels)
+                && (layout.rank() == 3 || self.dims[0].can_be(1))
+        });
+        // With such a size in two places, the layout is ambiguous.
+        fitting.next().filter(|_| fitting.next().is_none())
+    }
+
+    /// Whether one of the dimensions can be three channels; false for a grey image, which has a dimension of 1 instead.
+    pub(crate) fn may_be_image(&self) -> bool {
+        let last = &self.dims[self.dims.len().saturating_sub(3)..];
+        let grey = last.iter().any(|dim| dim.known() == Some(1));
+        (3..=4).contains(&self.dims.len()) && !grey && last.iter().any(|dim| dim.can_be(3))
+    }
+
+    /// True if it can be an image with this many channels, height and width in a layout. Open dimensions can have any size.
+    pub(crate) fn can_be_image(
+        &self,
+        layout: TensorLayout,
+        count: usize,
+        [height, width]: [&Dim; 2],
+    ) -> bool {
+        let [channels, rows, columns] = layout.places();
+        let shape = self.dims.is_empty()
+            || self.dims.len() == layout.rank()
+                && self.dims[channels].can_be(count)
+                && self.dims[rows].can_equal(height)
+                && self.dims[columns].can_equal(width)
+                && !self.has_channels_as_side([rows, columns], [height, width])
+                && (layout.rank() == 3 || self.dims[0].can_be(1));
+        shape && self.element.is_read()
+    }
+
+    /// Whether one of two sides is a small number while the other, and those of the input, are free: a number of channels, not of
+    /// pixels.
+    fn has_channels_as_side(&self, sides: [usize; 2], input: [&Dim; 2]) -> bool {
+        let [one, other] = sides.map(|side| self.dims[side].known());
+        let is_free = input.iter().all(|side| side.known().is_none());
+        let small = |side: Option<usize>| side.is_some_and(|size| size <= MOST_CHANNELS);
+        is_free && (small(one) && other.is_none() || small(other) && one.is_none())
+    }
+
+    /// Sizes of the dimensions that can be channels, as far as the graph fixes them.
+    pub(crate) fn channel_counts(&self) -> Vec<usize> {
+        TensorLayout::ALL
+            .into_iter()
+            .filter(|layout| layout.rank() == self.dims.len())
+            .filter_map(|layout| self.dims[layout.places()[0]].known())
+            .filter(|count| *count <= MOST_CHANNELS)
+            .collect()
+    }
+
+    /// Number of channels that the graph states for an image; `None` if it does not.
+    pub(crate) fn channels(&self) -> Option<usize> {
+        let three = self.layout(3).map(|_| 3);
+        let first = self.dims.len().checked_sub(3);
+        three.or_else(|| self.dims.get(first?).and_then(Dim::known))
+    }
+
+    /// Whether an exporter generated its name: a number, a path of modules, or an operator's name.
+    ///
+    /// An exporter that gets fewer names than outputs names the first ones and numbers the rest. `output` is then the first
+    /// output, whatever that is (for Zero-DCE, the wrong one).
+    pub(crate) fn is_numbered(&self) -> bool {
+        const OPERATORS: [&str; 19] = [
+            "add", "cat", "clamp", "clip", "concat", "conv", "conv2d", "div", "getitem",
+            "identity", "max", "min", "mul", "pow", "relu", "sigmoid", "slice", "sub", "tanh",
+        ];
+        let name = &self.name;
+        let word = name
+            .trim_end_matches(|c: char| c.is_ascii_digit() || c == '_')
+            .to_ascii_lowercase();
+        word.is_empty() || name.contains(['/', ':', '.']) || OPERATORS.contains(&word.as_str())
+    }
+
+    /// Whether it holds one number: all dimensions are 1, except that one may be free, as a batch is.
+    pub(crate) fn is_scalar(&self) -> bool {
+        let others = || self.dims.iter().filter(|dim| dim.known() != Some(1));
+        others().count() <= 1 && others().all(|dim| dim.can_be(1))
+    }
+}
+
+/// The ports as text, for messages.
+pub(crate) fn list(ports: &[Port]) -> String {
+    if ports.is_empty() {
+        return "none".to_owned();
+    }
+    let ports: Vec<String> = ports.iter().map(Port::to_string).collect();
+    ports.join(", ")
+}

@@ -1,0 +1,321 @@
+//! Sessions of ONNX Runtime: creation, runs and early stop.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use ort::environment::Environment;
+use ort::session::builder::{GraphOptimizationLevel, SessionBuilder};
+use ort::session::{HasSelectedOutputs, OutputSelector, RunOptions, Session, SessionInputValue};
+use ort::value::{DynValue, Outlet, Tensor, TensorElementType, ValueType};
+
+use super::port::{Dim, Port};
+use crate::conventions::ElementType;
+use crate::inputs::{Tensor as InputTensor, TensorData};
+use crate::outputs::{Output, OutputTensor, TensorSamples};
+
+/// Options of the runs of a session: the selected outputs, and the signal to stop.
+pub(super) struct SessionOptions {
+    options: RunOptions<HasSelectedOutputs>,
+    /// Whether every later run is to be stopped too.
+    stopped: AtomicBool,
+}
+
+impl SessionOptions {
+    /// Options for runs that return these outputs.
+    pub(super) fn for_outputs(outputs: &[Output]) -> ort::Result<Self> {
+        let none = OutputSelector::no_default();
+        let selected = outputs
+            .iter()
+            .fold(none, |all, output| all.with(&output.port.name));
+        Ok(Self {
+            options: RunOptions::new()?.with_outputs(selected),
+            stopped: AtomicBool::new(false),
+        })
+    }
+
+    /// The same options for runs that give back the memory of ONNX Runtime's arena at their end.
+    pub(super) fn releasing_memory(outputs: &[Output]) -> ort::Result<Self> {
+        let mut own = Self::for_outputs(outputs)?;
+        own.options
+            .set("memory.enable_memory_arena_shrinkage", "cpu:0")?;
+        Ok(own)
+    }
+
+    /// Stops the current run. ONNX Runtime ends it between two nodes of the graph.
+    pub(super) fn end_run(&self) {
+        // If a run cannot be stopped, the program waits for it.
+        if let Err(e) = self.options.terminate() {
+            tracing::debug!("the enhancer cannot be stopped: {e}");
+        }
+    }
+
+    /// Lets later runs be, after [`Self::end_run`], unless all are to be stopped.
+    pub(super) fn allow_runs(&self) {
+        if let Err(e) = self.options.unterminate() {
+            tracing::debug!("the enhancer cannot go on: {e}");
+        }
+        if self.stopped.load(Ordering::SeqCst) {
+            self.end_run();
+        }
+    }
+}
+
+// SAFETY: `ort` withholds `Sync` because a selected output may hold a preallocated tensor, which two runs would write at
+// once. None is ever preallocated here (`SessionOptions::for_outputs` selects by name alone), and the session's mutex keeps runs
+// apart. The only calls during a run are `terminate` and `unterminate`, which ONNX Runtime documents for use from another
+// thread: they set one flag.
+#[expect(unsafe_code, reason = "there is no other way to stop a run")]
+unsafe impl Sync for SessionOptions {}
+
+/// Handle that stops an enhancer from another thread.
+#[derive(Clone)]
+pub struct Stopper(pub(super) Arc<SessionOptions>);
+
+impl Stopper {
+    /// Stops the current image, with an error, and every later one.
+    pub fn stop(&self) {
+        self.0.stopped.store(true, Ordering::SeqCst);
+        self.0.end_run();
+    }
+}
+
+/// Message of an error of ONNX Runtime, in one line.
+pub(super) fn one_line(error: &ort::Error) -> String {
+    let words: Vec<&str> = error.message().split_whitespace().collect();
+    words.join(" ")
+}
+
+/// Runs a session on its inputs, by name, and reads its outputs before another run overwrites them. A graph of a fixed batch gets
+/// each image as often as it asks for, and the first result is read.
+pub(super) fn run<T>(
+    session: &mut Session,
+    options: &SessionOptions,
+    batch: usize,
+    inputs: Vec<(String, InputTensor)>,
+    outputs: &[Output],
+    read: impl FnOnce(&[OutputTensor<'_>]) -> T,
+) -> ort::Result<T> {
+    let inputs = inputs
+        .into_iter()
+        .map(|(name, input)| Ok((name, SessionInputValue::from(tensor(input, batch)?))))
+        .collect::<ort::Result<Vec<_>>>()?;
+    let results = session.run_with_options(inputs, &options.options)?;
+    let tensors = outputs
+        .iter()
+        .map(|output| {
+            let value = &results[output.port.name.as_str()];
+            output_tensor(value, &output.port.element, batch)
+        })
+        .collect::<ort::Result<Vec<_>>>()?;
+    Ok(read(&tensors))
+}
+
+/// The first image of an output.
+fn output_tensor<'a>(
+    value: &'a DynValue,
+    element: &ElementType,
+    batch: usize,
+) -> ort::Result<OutputTensor<'a>> {
+    let (dims, samples) = match element {
+        ElementType::Uint8 => {
+            let (dims, samples) = value.try_extract_tensor::<u8>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Uint8(samples))
+        }
+        ElementType::Float16 => {
+            let (dims, samples) = value.try_extract_tensor::<half::f16>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Float16(samples))
+        }
+        ElementType::Float64 => {
+            let (dims, samples) = value.try_extract_tensor::<f64>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Float64(samples))
+        }
+        ElementType::Int32 => {
+            let (dims, samples) = value.try_extract_tensor::<i32>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Int32(samples))
+        }
+        ElementType::Int64 => {
+            let (dims, samples) = value.try_extract_tensor::<i64>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Int64(samples))
+        }
+        _ => {
+            let (dims, samples) = value.try_extract_tensor::<f32>()?;
+            let (dims, samples) = first_of(batch, dims, samples);
+            (dims, TensorSamples::Float32(samples))
+        }
+    };
+    Ok(OutputTensor { dims, samples })
+}
+
+/// Dimensions and samples of the first image of a batch.
+fn first_of<'a, T>(batch: usize, dims: &[i64], samples: &'a [T]) -> (Vec<i64>, &'a [T]) {
+    let mut dims = dims.to_vec();
+    match dims.first_mut() {
+        Some(first) if batch > 1 && usize::try_from(*first) == Ok(batch) => {
+            *first = 1;
+            (dims, &samples[..samples.len() / batch])
+        }
+        _ => (dims, samples),
+    }
+}
+
+/// A tensor; an image is repeated along the dimension of the batch, which is 1.
+fn tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
+    let InputTensor { mut dims, data } = input;
+    let times = match dims.as_mut_slice() {
+        [first @ 1, _, _, _] => {
+            *first = batch;
+            batch
+        }
+        _ => 1,
+    };
+    Ok(match data {
+        TensorData::Bool(values) => Tensor::from_array((dims, repeated(values, times)))?.into_dyn(),
+        TensorData::Int8(values) => Tensor::from_array((dims, repeated(values, times)))?.into_dyn(),
+        TensorData::Int16(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Int32(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Int64(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Uint8(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Uint16(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Uint32(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Uint64(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Float16(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Bfloat16(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Float32(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+        TensorData::Float64(values) => {
+            Tensor::from_array((dims, repeated(values, times)))?.into_dyn()
+        }
+    })
+}
+
+fn repeated<T: Copy>(values: Vec<T>, times: usize) -> Vec<T> {
+    if times == 1 {
+        values
+    } else {
+        values.repeat(times)
+    }
+}
+
+/// Source of the graph of a session.
+pub(crate) enum GraphSource {
+    Memory(Vec<u8>),
+    Path(PathBuf),
+}
+
+impl GraphSource {
+    pub(super) fn commit(self, mut builder: SessionBuilder) -> ort::Result<Session> {
+        match self {
+            Self::Memory(bytes) => builder.commit_from_memory(&bytes),
+            Self::Path(path) => builder.commit_from_file(path),
+        }
+    }
+}
+
+/// Builder of a session with this program's options. `threads` is the number of threads, by default that of the cores.
+pub(super) fn builder(
+    environment: &Environment,
+    threads: Option<NonZeroUsize>,
+) -> ort::Result<SessionBuilder> {
+    // By default ONNX Runtime pins one thread to each core, even if other programs use it.
+    let threads = threads
+        .or_else(|| std::thread::available_parallelism().ok())
+        .map_or(1, NonZeroUsize::get);
+    let builder = Session::builder(environment)?
+        .with_optimization_level(GraphOptimizationLevel::All)?
+        .with_intra_threads(threads)?
+        // A memory plan fits images of one size only, but all are kept: twice the memory without benefit.
+        .with_memory_pattern(false)?
+        .with_flush_to_zero()?;
+    Ok(builder)
+}
+
+/// Largest batch of a graph for which an image is repeated; chosen, exports of a few images exist.
+const MOST_BATCH: usize = 64;
+
+/// Images that each run takes, if the graph fixes a number above 1, and then makes the ports those of one image.
+pub(super) fn take_batch(inputs: &mut [Port], outputs: &mut [Port]) -> usize {
+    let fixed = |port: &Port| match port.dims.as_slice() {
+        [Dim::Known(batch @ 2..=MOST_BATCH), _, _, _] => Some(*batch),
+        _ => None,
+    };
+    let Some(batch) = inputs.iter().find_map(fixed) else {
+        return 1;
+    };
+    for port in inputs.iter_mut().chain(outputs) {
+        if fixed(port) == Some(batch) {
+            port.dims[0] = Dim::Known(1);
+        }
+    }
+    batch
+}
+
+/// Inputs or outputs of a session as ports.
+pub(super) fn ports(outlets: &[Outlet]) -> Vec<Port> {
+    outlets.iter().map(port).collect()
+}
+
+fn port(outlet: &Outlet) -> Port {
+    let (element, dims) = match outlet.dtype() {
+        ValueType::Tensor {
+            ty,
+            shape,
+            dimension_symbols,
+        } => {
+            let element = match ty {
+                TensorElementType::Float32 => ElementType::Float32,
+                TensorElementType::Float16 => ElementType::Float16,
+                TensorElementType::Float64 => ElementType::Float64,
+                TensorElementType::Bfloat16 => ElementType::Bfloat16,
+                TensorElementType::Bool => ElementType::Bool,
+                TensorElementType::Int8 => ElementType::Int8,
+                TensorElementType::Int16 => ElementType::Int16,
+                TensorElementType::Int32 => ElementType::Int32,
+                TensorElementType::Int64 => ElementType::Int64,
+                TensorElementType::Uint8 => ElementType::Uint8,
+                TensorElementType::Uint16 => ElementType::Uint16,
+                TensorElementType::Uint32 => ElementType::Uint32,
+                TensorElementType::Uint64 => ElementType::Uint64,
+                other => ElementType::Other(other.to_string()),
+            };
+            let dims = shape
+                .iter()
+                .zip(dimension_symbols.iter())
+                .map(|(size, symbol)| {
+                    usize::try_from(*size).map_or_else(|_| Dim::Free(symbol.clone()), Dim::Known)
+                });
+            (element, dims.collect())
+        }
+        other => (ElementType::Other(other.to_string()), Vec::new()),
+    };
+    Port {
+        name: outlet.name().to_owned(),
+        element,
+        dims,
+    }
+}

@@ -1,0 +1,227 @@
+//! Conversion of an image of bytes to the tensor that a model takes: [`Feeding`].
+//!
+//! It takes one pass: a table of 256 values per channel combines range, mean and deviation. With an expression, or for a model
+//! of the luma, the image goes through floats: `input`, channels, range, mean and deviation, in this order.
+
+use half::f16;
+
+use super::fed_image::FedImage;
+use super::tensor::{Tensor, TensorData};
+use crate::conventions::sidecar::ModelSidecar;
+use crate::conventions::{
+    ChannelOrder, Channels, ElementType, Padding, Signature, TensorLayout, ValueRange,
+};
+use crate::expressions::Expression;
+use crate::outputs::nearest;
+use crate::planes::Planes;
+use crate::sizing::TileWindow;
+use darkqa_ground::types::Rgb;
+
+/// Conversion of an image to a tensor.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Feeding {
+    pub(crate) layout: TensorLayout,
+    pub(crate) element: ElementType,
+    pub(crate) channels: Channels,
+    /// The model's input as an expression of `image`, the dark image in 0..1; `None` for the image itself.
+    pub(crate) input: Option<Expression>,
+    pub(crate) color: ChannelOrder,
+    pub(crate) range: ValueRange,
+    /// Subtracted from each channel, in the model's channel order and range; then `std` divides it.
+    pub(crate) mean: [f32; 3],
+    pub(crate) std: [f32; 3],
+    pub(crate) pad: Padding,
+}
+
+impl Feeding {
+    /// The conversion that signature and convention define.
+    pub(crate) fn new(signature: &Signature, convention: &ModelSidecar) -> Self {
+        let element = signature.input.port.element.clone();
+        Self {
+            layout: signature.input.layout,
+            range: convention.range_in.unwrap_or(element.usual_range()),
+            element,
+            channels: convention.channels.unwrap_or_default(),
+            input: convention.input.clone(),
+            color: convention.color.unwrap_or_default(),
+            mean: convention.mean.unwrap_or([0.0; 3]),
+            std: convention.std.unwrap_or([1.0; 3]),
+            pad: convention.pad.unwrap_or_default(),
+        }
+    }
+
+    /// The tensor of an image, or `None` if the sidecar's expression gives values that are not finite.
+    pub(crate) fn tensor(&self, fed: &FedImage<'_>) -> Option<Tensor> {
+        match fed {
+            FedImage::Window { dark, window, .. }
+                if self.input.is_none() && self.channels == Channels::Rgb =>
+            {
+                Some(self.window(dark.rgb, *window))
+            }
+            _ => {
+                let dark = fed.planes();
+                match &self.input {
+                    None => Some(self.planes(&dark.into_owned().with_channels(self.channels))),
+                    Some(expression) => {
+                        let image = expression
+                            .evaluate(&vec![&*dark; expression.names().len()], fed.size());
+                        let finite = image.samples.iter().all(|sample| sample.is_finite());
+                        let image = image.spread().with_channels(self.channels);
+                        finite.then(|| self.planes(&image))
+                    }
+                }
+            }
+        }
+    }
+
+    /// The tensor of a window of an image, padded beyond the image's edges.
+    fn window(&self, image: &Rgb, window: TileWindow) -> Tensor {
+        let sources = |from: usize, to: usize, side: usize| -> Vec<Option<usize>> {
+            (from..to).map(|at| self.pad.source(at, side)).collect()
+        };
+        let rows = sources(window.top, window.bottom, image.height());
+        let columns = sources(window.left, window.right, image.width());
+        let (samples, width) = (image.samples(), image.width());
+        // Without padded columns, the pixels of a row are contiguous.
+        let inside = window.right <= image.width();
+        let row_of = |row: Option<usize>, channel: usize| {
+            let channel = self.color.rgb_channel(channel);
+            let row = row.map(|row| &samples[row * width * 3..][..width * 3]);
+            let columns = &columns;
+            columns
+                .iter()
+                .enumerate()
+                .map(move |(i, column)| match row {
+                    Some(row) if inside => row[(window.left + i) * 3 + channel],
+                    Some(row) => column.map_or(0, |column| row[column * 3 + channel]),
+                    None => 0,
+                })
+        };
+        let order = if self.layout.is_planar() {
+            SampleOrder::Planar
+        } else {
+            SampleOrder::Packed
+        };
+        let size = window.size();
+        match self.element {
+            ElementType::Uint8 => {
+                let mut data = vec![0; 3 * size[0] * size[1]];
+                fill(&mut data, order, &rows, size[1], row_of, |_, byte| byte);
+                self.shaped(size, TensorData::Uint8(data))
+            }
+            ElementType::Float16 => {
+                let table = self.table().map(|values| values.map(f16::from_f32));
+                let mut data = vec![f16::ZERO; 3 * size[0] * size[1]];
+                let value = |channel: usize, byte: u8| table[channel][usize::from(byte)];
+                fill(&mut data, order, &rows, size[1], row_of, value);
+                self.shaped(size, TensorData::Float16(data))
+            }
+            _ => {
+                let table = self.table();
+                let mut data = vec![0.0; 3 * size[0] * size[1]];
+                let value = |channel: usize, byte: u8| table[channel][usize::from(byte)];
+                fill(&mut data, order, &rows, size[1], row_of, value);
+                self.shaped(size, TensorData::Float32(data))
+            }
+        }
+    }
+
+    /// The tensor of an image of floats that has the model's channels.
+    fn planes(&self, planes: &Planes) -> Tensor {
+        let [height, width] = [planes.height, planes.width];
+        let value = |channel: usize, pixel: usize| {
+            let plane = match self.channels {
+                Channels::Rgb => self.color.rgb_channel(channel),
+                Channels::Y => channel,
+            };
+            (channel, planes.samples[plane * height * width + pixel])
+        };
+        let channels = self.channels.count();
+        let order: Vec<(usize, f32)> = if self.layout.is_planar() {
+            (0..channels)
+                .flat_map(|channel| (0..height * width).map(move |pixel| value(channel, pixel)))
+                .collect()
+        } else {
+            (0..height * width)
+                .flat_map(|pixel| (0..channels).map(move |channel| value(channel, pixel)))
+                .collect()
+        };
+        let values = order.into_iter();
+        let float = |(channel, unit): (usize, f32)| {
+            let value = match self.range {
+                ValueRange::Unit => unit,
+                ValueRange::Bytes | ValueRange::Signed => self.range.scale_code(unit * 255.0),
+            };
+            (value - self.mean[channel]) / self.std[channel]
+        };
+        let data = match self.element {
+            ElementType::Uint8 => {
+                TensorData::Uint8(values.map(|(_, unit)| nearest(unit * 255.0)).collect())
+            }
+            ElementType::Float16 => {
+                TensorData::Float16(values.map(float).map(f16::from_f32).collect())
+            }
+            _ => TensorData::Float32(values.map(float).collect()),
+        };
+        self.shaped([height, width], data)
+    }
+
+    fn shaped(&self, size: [usize; 2], data: TensorData) -> Tensor {
+        Tensor {
+            dims: self.layout.dims(size, self.channels.count()),
+            data,
+        }
+    }
+
+    /// Value of each byte, for each channel of the model.
+    fn table(&self) -> [[f32; 256]; 3] {
+        [0, 1, 2].map(|channel: usize| {
+            std::array::from_fn(|byte| {
+                let value = self.range.scale_code(byte as f32);
+                (value - self.mean[channel]) / self.std[channel]
+            })
+        })
+    }
+}
+
+#[derive(Clone, Copy)]
+enum SampleOrder {
+    Planar,
+    Packed,
+}
+
+/// Fills a tensor row by row.
+fn fill<T, I: Iterator<Item = u8>>(
+    data: &mut [T],
+    order: SampleOrder,
+    rows: &[Option<usize>],
+    width: usize,
+    row_of: impl Fn(Option<usize>, usize) -> I,
+    value: impl Fn(usize, u8) -> T,
+) {
+    match order {
+        SampleOrder::Planar => {
+            for (channel, plane) in data.chunks_exact_mut(rows.len() * width).enumerate() {
+                for (row, line) in rows.iter().zip(plane.chunks_exact_mut(width)) {
+                    for (sample, byte) in line.iter_mut().zip(row_of(*row, channel)) {
+                        *sample = value(channel, byte);
+                    }
+                }
+            }
+        }
+        SampleOrder::Packed => {
+            for (row, line) in rows.iter().zip(data.chunks_exact_mut(3 * width)) {
+                for channel in 0..3 {
+                    for (sample, byte) in line
+                        .iter_mut()
+                        .skip(channel)
+                        .step_by(3)
+                        .zip(row_of(*row, channel))
+                    {
+                        *sample = value(channel, byte);
+                    }
+                }
+            }
+        }
+    }
+}

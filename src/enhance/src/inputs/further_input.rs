@@ -1,0 +1,330 @@
+//! An input of a graph beside the image: [`FurtherInput`].
+
+use super::fed_image::FedImage;
+use super::noise;
+use super::tensor::{Tensor, TensorData};
+use crate::conventions::{ElementType, ExtraValue, TensorLayout, preset};
+use crate::graphs::{Dim, Port};
+
+/// An input in addition to the image, with its value.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct FurtherInput {
+    /// Name, type and dimensions in the graph.
+    pub(crate) port: Port,
+    /// Value of the input.
+    pub(crate) value: ExtraValue,
+    /// Places of its channels, if it has any, its rows and its columns among its dimensions; `None` for one number.
+    places: Option<Places>,
+}
+
+/// Places of channels, rows and columns among the dimensions of a tensor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Places {
+    channels: Option<usize>,
+    rows: usize,
+    columns: usize,
+}
+
+impl Places {
+    /// The places in a tensor of the image's size. Its layout is the one in which it has one or three channels, first of all
+    /// the image's own.
+    fn for_port(port: &Port, image: TensorLayout) -> Option<Self> {
+        if port.is_scalar() || vector_length(port).is_some() {
+            return None;
+        }
+        if port.dims.len() == 2 {
+            return Some(Self {
+                channels: None,
+                rows: 0,
+                columns: 1,
+            });
+        }
+        let all = || std::iter::once(image).chain(TensorLayout::ALL);
+        let fitting = || all().filter(|layout| layout.rank() == port.dims.len());
+        let [channels, rows, columns] = fitting()
+            .find(|layout| {
+                let channels = port.dims[layout.places()[0]].known();
+                matches!(channels, Some(1 | 3))
+            })
+            .or_else(|| fitting().next())?
+            .places();
+        Some(Self {
+            channels: Some(channels),
+            rows,
+            columns,
+        })
+    }
+
+    /// The other dimensions.
+    fn others(self, port: &Port) -> impl Iterator<Item = &Dim> {
+        let own = [self.channels, Some(self.rows), Some(self.columns)];
+        port.dims
+            .iter()
+            .enumerate()
+            .filter(move |(place, _)| !own.contains(&Some(*place)))
+            .map(|(_, dim)| dim)
+    }
+
+    /// Number of channels, if the graph states it.
+    fn channels(self, port: &Port) -> Option<usize> {
+        self.channels
+            .map_or(Some(1), |place| port.dims[place].known())
+    }
+}
+
+impl FurtherInput {
+    /// The input with the value that sidecar or preset give it.
+    ///
+    /// # Errors
+    /// If there is no value, or it does not fit; the message follows the file's name.
+    pub(crate) fn new(
+        port: &Port,
+        value: Option<&ExtraValue>,
+        image: TensorLayout,
+    ) -> Result<Self, String> {
+        let places = Places::for_port(port, image);
+        let value = value.ok_or_else(|| missing(port, places))?;
+        let input = Self {
+            port: port.clone(),
+            value: value.clone(),
+            places,
+        };
+        input.check().map_err(|problem| {
+            format!("takes {port}; its sidecar or preset gives it {value}, but {problem}")
+        })?;
+        Ok(input)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let key = quoted(&self.port.name);
+        if let Some(places) = self.places
+            && let Some(other) = places.others(&self.port).find(|dim| !dim.can_be(1))
+        {
+            return Err(format!(
+                "a dimension of {other} is neither channels, rows nor columns"
+            ));
+        }
+        let floats = || TensorData::floats(&self.port.element, Vec::new()).is_some();
+        match (&self.value, self.places) {
+            (ExtraValue::Number(number), None) | (ExtraValue::Map(number), Some(_)) => {
+                TensorData::filled(&self.port.element, *number, 1).map(drop)
+            }
+            (ExtraValue::List(numbers), None) => {
+                let length = vector_length(&self.port).unwrap_or(1);
+                if numbers.len() != length {
+                    return Err(format!("it takes {length}: {}", list_line(&key, length)));
+                }
+                TensorData::listed(&self.port.element, numbers).map(drop)
+            }
+            (_, None) if vector_length(&self.port).is_some_and(|length| length > 1) => {
+                let length = vector_length(&self.port).unwrap_or(1);
+                Err(format!(
+                    "it is a list of {length}: {}",
+                    list_line(&key, length)
+                ))
+            }
+            (ExtraValue::List(_), Some(_)) => Err(
+                "it has the image's size; `{ map = NUMBER }` gives each of its samples a number"
+                    .to_owned(),
+            ),
+            (ExtraValue::Number(number), Some(_)) => Err(format!(
+                "it is not a single number; `{key} = {{ map = {number} }}` gives each of its samples this value"
+            )),
+            (_, None) => Err(format!("it is a single number: `{key} = NUMBER`")),
+            (ExtraValue::Noise(_) | ExtraValue::From(_), Some(_)) if !floats() => Err(format!(
+                "its type {} holds no such values; export it with floats",
+                self.port.element
+            )),
+            (ExtraValue::Noise(_), Some(_)) => Ok(()),
+            (ExtraValue::From(expression), Some(places)) => {
+                let made = expression.channels(&vec![3; expression.names().len()]);
+                match (places.channels(&self.port), made) {
+                    (None | Some(3), _) | (Some(1), 1) => Ok(()),
+                    (Some(1), _) => Err(
+                        "that has three channels, and it takes one; max(…) or mean(…) makes one of three"
+                            .to_owned(),
+                    ),
+                    (Some(other), _) => Err(format!("it takes {other} channels")),
+                }
+            }
+        }
+    }
+
+    /// Checks that a run on this image alone gives what a run on the whole image would.
+    ///
+    /// # Errors
+    /// If noise of another size than the image's would have to be cut.
+    pub(crate) fn check_cut(&self, fed: &FedImage<'_>) -> Result<(), String> {
+        match &self.value {
+            ExtraValue::Noise(noise) if noise.divide != 1 && !fed.is_whole() => Err(format!(
+                "takes noise of the image's size divided by {} ({:?}), which cannot be cut into tiles; enhance the whole image, without --llie-options tile, in a size that the model takes",
+                noise.divide, self.port.name
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Its tensor in a run on an image; `None` if the sidecar's expression gives values that are not finite.
+    pub(crate) fn tensor(&self, fed: &FedImage<'_>) -> Option<Tensor> {
+        let Some(places) = self.places else {
+            if let ExtraValue::List(numbers) = &self.value {
+                let free = self.port.dims.iter().map(|dim| dim.known().unwrap_or(1));
+                let data = TensorData::listed(&self.port.element, numbers).ok()?;
+                return Some(Tensor {
+                    dims: free.collect(),
+                    data,
+                });
+            }
+            return self.filled(vec![1; self.port.dims.len()]);
+        };
+        let channels = places.channels(&self.port);
+        match &self.value {
+            ExtraValue::Number(_) | ExtraValue::List(_) | ExtraValue::Map(_) => {
+                self.filled(self.dims(places, channels.unwrap_or(1), fed.size()))
+            }
+            ExtraValue::Noise(noise) => {
+                let channels = channels.unwrap_or(1);
+                let size = fed.size().map(|side| side.div_ceil(noise.divide));
+                let planes = noise::normal(noise, &self.port.name, channels, fed);
+                self.arranged(places, channels, size, planes)
+            }
+            ExtraValue::From(expression) => {
+                let dark = fed.planes();
+                let images = vec![&*dark; expression.names().len()];
+                let mut image = expression.evaluate(&images, fed.size());
+                if channels == Some(3) {
+                    image = image.spread();
+                }
+                let [height, width] = fed.size();
+                let channels = image.samples.len() / (height * width).max(1);
+                let finite = image.samples.iter().all(|sample| sample.is_finite());
+                let tensor = self.arranged(places, channels, fed.size(), image.samples);
+                tensor.filter(|_| finite)
+            }
+        }
+    }
+
+    /// The same number at all places.
+    fn filled(&self, dims: Vec<usize>) -> Option<Tensor> {
+        let (ExtraValue::Number(number) | ExtraValue::Map(number)) = self.value else {
+            return None;
+        };
+        let data = TensorData::filled(&self.port.element, number, dims.iter().product());
+        data.ok().map(|data| Tensor { dims, data })
+    }
+
+    /// Dimensions for an image of this size; those that are free otherwise are 1.
+    fn dims(&self, places: Places, channels: usize, [height, width]: [usize; 2]) -> Vec<usize> {
+        let mut dims: Vec<usize> = self
+            .port
+            .dims
+            .iter()
+            .map(|dim| dim.known().unwrap_or(1))
+            .collect();
+        if let Some(place) = places.channels {
+            dims[place] = channels;
+        }
+        dims[places.rows] = height;
+        dims[places.columns] = width;
+        dims
+    }
+
+    /// Planes in the order of the tensor's dimensions.
+    fn arranged(
+        &self,
+        places: Places,
+        channels: usize,
+        size: [usize; 2],
+        planes: Vec<f32>,
+    ) -> Option<Tensor> {
+        let plane = size[0] * size[1];
+        let planar = places.channels.is_none_or(|place| place < places.rows);
+        let values = if planar || channels == 1 {
+            planes
+        } else {
+            (0..plane)
+                .flat_map(|pixel| (0..channels).map(move |c| (c, pixel)))
+                .map(|(c, pixel)| planes[c * plane + pixel])
+                .collect()
+        };
+        let dims = self.dims(places, channels, size);
+        let data = TensorData::floats(&self.port.element, values);
+        data.map(|data| Tensor { dims, data })
+    }
+}
+
+/// Number of elements of an input with fixed dimensions, at most one of them not 1; `None` for others.
+fn vector_length(port: &Port) -> Option<usize> {
+    let sizes = port
+        .dims
+        .iter()
+        .map(Dim::known)
+        .collect::<Option<Vec<usize>>>()?;
+    let long = sizes.iter().filter(|size| **size > 1).count();
+    (long == 1 && sizes.len() <= 2).then(|| sizes.iter().product())
+}
+
+/// The line of a sidecar for a list.
+fn list_line(key: &str, length: usize) -> String {
+    let some = vec!["NUMBER"; length.min(4)].join(", ");
+    let rest = if length > 4 { ", …" } else { "" };
+    format!("`{key} = [{some}{rest}]`")
+}
+
+/// Message that names the sidecar lines needed for an input without a value.
+fn missing(port: &Port, places: Option<Places>) -> String {
+    let key = quoted(&port.name);
+    let beside = "state it in MODEL.onnx.toml beside the model: `[extra]` and below it";
+    let fits = |number| TensorData::filled(&port.element, number, 1).is_ok();
+    let known = preset::number_of(&port.name).filter(|(number, _)| fits(*number));
+    let Some(places) = places else {
+        if let ElementType::Other(_) = port.element {
+            return format!(
+                "takes {port} in addition to the image, whose type is not supported; export it with the value inside the graph"
+            );
+        }
+        let line = match (known, &port.element) {
+            _ if vector_length(port).is_some_and(|length| length > 1) => {
+                let length = vector_length(port).unwrap_or(1);
+                format!("{}, its authors' values", list_line(&key, length))
+            }
+            (Some((value, preset)), _) => format!("`{key} = {value}`, as preset {preset} has it"),
+            (None, ElementType::Bool) => format!("`{key} = true` or `{key} = false`"),
+            (None, _) => format!("`{key} = NUMBER`, its authors' value"),
+        };
+        return format!(
+            "takes {port} in addition to the image, and its value is unknown; {beside} {line}"
+        );
+    };
+    let name = port.name.to_lowercase();
+    if ATTENTION.iter().any(|word| name.contains(word)) {
+        return format!(
+            "takes {port} in addition to the image, which seems to be made from it; {beside} an expression, as `{key} = {{ from = \"1 - max(image)\" }}`, with its authors' formula"
+        );
+    }
+    let number = known.map_or("NUMBER".to_owned(), |(value, _)| value.to_string());
+    let channels = match places.channels(port) {
+        Some(1) => "one channel",
+        Some(3) => "three channels",
+        _ => "the image's size",
+    };
+    format!(
+        "takes {port} in addition to the image, of {channels}; {beside} what it is: a number at each pixel, `{key} = {{ map = {number} }}`, noise, `{key} = {{ noise = \"normal\", std = NUMBER, seed = 0 }}`, or an expression of the image, `{key} = {{ from = \"EXPRESSION\" }}`"
+    )
+}
+
+/// Words in the names of inputs that are made from the image.
+pub(crate) const ATTENTION: [&str; 4] = ["mask", "gray", "grey", "att"];
+
+/// A name as a key of a TOML file, in quotes if needed.
+fn quoted(name: &str) -> String {
+    if !name.is_empty()
+        && name
+            .chars()
+            .all(|c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-')
+    {
+        name.to_owned()
+    } else {
+        format!("{name:?}")
+    }
+}

@@ -1,0 +1,12 @@
+//! Inputs of a graph: the image as a tensor, and further values.
+
+mod fed_image;
+mod feeding;
+mod further_input;
+mod noise;
+mod tensor;
+
+pub(super) use fed_image::{DarkImage, FedImage};
+pub(super) use feeding::Feeding;
+pub(super) use further_input::{ATTENTION, FurtherInput};
+pub(super) use tensor::{Tensor, TensorData};

@@ -1,0 +1,240 @@
+//! [`Tensor`]: the value of one graph input.
+
+use half::{bf16, f16};
+
+use crate::conventions::{ElementType, Number};
+
+/// Elements of an input, and their dimensions.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Tensor {
+    pub(crate) dims: Vec<usize>,
+    pub(crate) data: TensorData,
+}
+
+/// Elements of an input.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum TensorData {
+    Bool(Vec<bool>),
+    Int8(Vec<i8>),
+    Int16(Vec<i16>),
+    Int32(Vec<i32>),
+    Int64(Vec<i64>),
+    Uint8(Vec<u8>),
+    Uint16(Vec<u16>),
+    Uint32(Vec<u32>),
+    Uint64(Vec<u64>),
+    Float16(Vec<f16>),
+    Bfloat16(Vec<bf16>),
+    Float32(Vec<f32>),
+    Float64(Vec<f64>),
+}
+
+impl TensorData {
+    /// `count` times the same number.
+    ///
+    /// A fraction becomes the nearest float. Everything else must fit exactly: whole numbers and truth values into their types,
+    /// and no float becomes infinite or 0.
+    ///
+    /// # Errors
+    /// If the number does not fit; the message names the number and the type.
+    pub(super) fn filled(
+        element: &ElementType,
+        number: Number,
+        count: usize,
+    ) -> Result<Self, String> {
+        let fitting = match element {
+            ElementType::Bool => match number {
+                Number::Bool(value) => Some(Self::Bool(vec![value; count])),
+                _ => None,
+            },
+            ElementType::Int8 => whole(number, count).map(Self::Int8),
+            ElementType::Int16 => whole(number, count).map(Self::Int16),
+            ElementType::Int32 => whole(number, count).map(Self::Int32),
+            ElementType::Int64 => whole(number, count).map(Self::Int64),
+            ElementType::Uint8 => whole(number, count).map(Self::Uint8),
+            ElementType::Uint16 => whole(number, count).map(Self::Uint16),
+            ElementType::Uint32 => whole(number, count).map(Self::Uint32),
+            ElementType::Uint64 => whole(number, count).map(Self::Uint64),
+            _ => float(element, number).map(|value| match element {
+                ElementType::Float16 => Self::Float16(vec![f16::from_f64(value); count]),
+                ElementType::Bfloat16 => Self::Bfloat16(vec![bf16::from_f64(value); count]),
+                ElementType::Float64 => Self::Float64(vec![value; count]),
+                _ => Self::Float32(vec![value as f32; count]),
+            }),
+        };
+        fitting.ok_or_else(|| format!("{number} does not fit its type {element}"))
+    }
+
+    /// These numbers, one after another; each must fit as in [`TensorData::filled`].
+    ///
+    /// # Errors
+    /// If a number does not fit; the message names the number and the type.
+    pub(super) fn listed(element: &ElementType, numbers: &[Number]) -> Result<Self, String> {
+        let mut all = Self::filled(element, Number::Integer(0), 0).or_else(|_| {
+            // A truth value has no 0.
+            Self::filled(element, Number::Bool(false), 0)
+        })?;
+        for number in numbers {
+            match (&mut all, Self::filled(element, *number, 1)?) {
+                (Self::Bool(all), Self::Bool(one)) => all.extend(one),
+                (Self::Int8(all), Self::Int8(one)) => all.extend(one),
+                (Self::Int16(all), Self::Int16(one)) => all.extend(one),
+                (Self::Int32(all), Self::Int32(one)) => all.extend(one),
+                (Self::Int64(all), Self::Int64(one)) => all.extend(one),
+                (Self::Uint8(all), Self::Uint8(one)) => all.extend(one),
+                (Self::Uint16(all), Self::Uint16(one)) => all.extend(one),
+                (Self::Uint32(all), Self::Uint32(one)) => all.extend(one),
+                (Self::Uint64(all), Self::Uint64(one)) => all.extend(one),
+                (Self::Float16(all), Self::Float16(one)) => all.extend(one),
+                (Self::Bfloat16(all), Self::Bfloat16(one)) => all.extend(one),
+                (Self::Float32(all), Self::Float32(one)) => all.extend(one),
+                (Self::Float64(all), Self::Float64(one)) => all.extend(one),
+                // Both are of the same type.
+                _ => {}
+            }
+        }
+        Ok(all)
+    }
+
+    /// Floats as elements of a float type; `None` for another type.
+    pub(super) fn floats(element: &ElementType, values: Vec<f32>) -> Option<Self> {
+        Some(match element {
+            ElementType::Float16 => Self::Float16(values.into_iter().map(f16::from_f32).collect()),
+            ElementType::Bfloat16 => {
+                Self::Bfloat16(values.into_iter().map(bf16::from_f32).collect())
+            }
+            ElementType::Float32 => Self::Float32(values),
+            ElementType::Float64 => Self::Float64(values.into_iter().map(f64::from).collect()),
+            _ => return None,
+        })
+    }
+}
+
+/// Converts a whole number to an integer type and repeats it `count` times.
+fn whole<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>> {
+    let whole = match number {
+        Number::Integer(value) => i128::from(value),
+        // 2^64 is beyond every type, and all floats below are exact.
+        Number::Float(value) if value.fract() == 0.0 && value.abs() < 2.0_f64.powi(65) => {
+            value as i128
+        }
+        Number::Float(_) | Number::Bool(_) => return None,
+    };
+    T::try_from(whole).ok().map(|value| vec![value; count])
+}
+
+/// A number as a float that the type can hold, see [`TensorData::filled`].
+fn float(element: &ElementType, number: Number) -> Option<f64> {
+    let rounded = |value: f64| match element {
+        ElementType::Float16 => Some(f16::from_f64(value).to_f64()),
+        ElementType::Bfloat16 => Some(bf16::from_f64(value).to_f64()),
+        ElementType::Float32 => Some(f64::from(value as f32)),
+        ElementType::Float64 => Some(value),
+        _ => None,
+    };
+    match number {
+        Number::Bool(_) => None,
+        Number::Integer(whole) => {
+            let value = rounded(whole as f64)?;
+            (value.is_finite() && value as i128 == i128::from(whole)).then_some(value)
+        }
+        Number::Float(value) => {
+            let kept = rounded(value)?;
+            (kept.is_finite() && (kept != 0.0 || value == 0.0)).then_some(value)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(element: &ElementType, number: Number) -> Result<TensorData, String> {
+        TensorData::filled(element, number, 1)
+    }
+
+    #[test]
+    fn every_type_takes_what_fits() {
+        let (whole, half) = (Number::Integer(3), Number::Float(0.5));
+        let rows = [
+            (
+                ElementType::Bool,
+                Number::Bool(true),
+                TensorData::Bool(vec![true]),
+            ),
+            (ElementType::Int8, whole, TensorData::Int8(vec![3])),
+            (ElementType::Int16, whole, TensorData::Int16(vec![3])),
+            (ElementType::Int32, whole, TensorData::Int32(vec![3])),
+            (
+                ElementType::Int64,
+                Number::Float(3.0),
+                TensorData::Int64(vec![3]),
+            ),
+            (ElementType::Uint8, whole, TensorData::Uint8(vec![3])),
+            (ElementType::Uint16, whole, TensorData::Uint16(vec![3])),
+            (ElementType::Uint32, whole, TensorData::Uint32(vec![3])),
+            (ElementType::Uint64, whole, TensorData::Uint64(vec![3])),
+            (
+                ElementType::Float16,
+                half,
+                TensorData::Float16(vec![f16::from_f32(0.5)]),
+            ),
+            (
+                ElementType::Bfloat16,
+                half,
+                TensorData::Bfloat16(vec![bf16::from_f32(0.5)]),
+            ),
+            (
+                ElementType::Float32,
+                Number::Float(0.1),
+                TensorData::Float32(vec![0.1]),
+            ),
+            (ElementType::Float32, whole, TensorData::Float32(vec![3.0])),
+            (
+                ElementType::Float64,
+                Number::Float(0.1),
+                TensorData::Float64(vec![0.1]),
+            ),
+        ];
+        for (element, number, data) in rows {
+            assert_eq!(one(&element, number), Ok(data), "{element} {number}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named_with_its_type() {
+        for (element, number, text) in [
+            (ElementType::Int32, Number::Float(3.5), "3.5"),
+            (
+                ElementType::Int32,
+                Number::Integer(1 << 40),
+                "1099511627776",
+            ),
+            (ElementType::Int64, Number::Float(1e30), "1e30"),
+            (ElementType::Int64, Number::Bool(true), "true"),
+            (ElementType::Uint8, Number::Integer(-1), "-1"),
+            (ElementType::Uint8, Number::Integer(256), "256"),
+            (ElementType::Bool, Number::Integer(1), "1"),
+            (ElementType::Float16, Number::Float(1e6), "1000000.0"),
+            (ElementType::Float16, Number::Integer(2049), "2049"),
+            (ElementType::Bfloat16, Number::Integer(257), "257"),
+            (
+                ElementType::Float32,
+                Number::Integer((1 << 24) + 1),
+                "16777217",
+            ),
+            (ElementType::Float32, Number::Float(1e39), "1e39"),
+            (ElementType::Float32, Number::Float(1e-60), "1e-60"),
+            (
+                ElementType::Float64,
+                Number::Integer((1 << 53) + 1),
+                "9007199254740993",
+            ),
+            (ElementType::Float32, Number::Bool(true), "true"),
+            (ElementType::Other("string".into()), Number::Integer(1), "1"),
+        ] {
+            let message = one(&element, number).unwrap_err();
+            assert_eq!(message, format!("{text} does not fit its type {element}"));
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Check whether a file is a usable library of ONNX Runtime: [`probe`].
+
+use std::error::Error as _;
+use std::ffi::CStr;
+use std::path::Path;
+
+use libloading::{Library, Symbol};
+use ort::sys::OrtApiBase;
+
+use super::library_file::LibraryFormat;
+
+/// Version of the library that is installed if none is found; its pins are in `install.rs`.
+pub(crate) const PINNED: &str = "1.31.1";
+
+/// Oldest usable minor version 1.x: the lowest version of the C API that the `ort` crate supports.
+pub(super) const OLDEST: u32 = ort::MINOR_VERSION;
+
+/// Whether a file has the name of ONNX Runtime's library on an operating system (named as in [`std::env::consts::OS`]).
+pub(super) fn is_library_name(os: &str, name: &str) -> bool {
+    match os {
+        "windows" => name.eq_ignore_ascii_case("onnxruntime.dll"),
+        "macos" => {
+            name.starts_with("libonnxruntime.")
+                && Path::new(name)
+                    .extension()
+                    .is_some_and(|extension| extension == "dylib")
+        }
+        _ => name == "libonnxruntime.so" || name.starts_with("libonnxruntime.so."),
+    }
+}
+
+/// Checks a library's file, loads it, asks it for its version and unloads it; returns the version.
+///
+/// Nothing is loaded that is not a whole library with ONNX Runtime's entry; libraries of custom operators never are. All that could fail later is tried here, because `ort` panics if a library does not give it the API.
+///
+/// # Errors
+/// A description of the fault, to follow its path.
+pub(super) fn probe(path: &Path) -> Result<String, String> {
+    let metadata = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
+    if !metadata.is_file() {
+        return Err("is not a file; name the library itself".to_owned());
+    }
+    LibraryFormat::for_this_system().check(path)?;
+    let version = version_of(path)?;
+    match minor(&version) {
+        Some(minor) if minor >= OLDEST => Ok(version),
+        Some(_) => Err(format!(
+            "is version {version}, and 1.{OLDEST} or later is needed"
+        )),
+        None => Err(format!("says its version is {version:?}, which is not 1.x")),
+    }
+}
+
+/// Minor version `x` of version `1.x.y`.
+fn minor(version: &str) -> Option<u32> {
+    let mut parts = version.split('.');
+    parts.next().filter(|major| *major == "1")?;
+    parts.next()?.parse().ok()
+}
+
+/// The version that a library's `OrtGetApiBase` gives.
+#[expect(
+    unsafe_code,
+    reason = "a dynamic library can be asked for its version in no other way"
+)]
+fn version_of(path: &Path) -> Result<String, String> {
+    // SAFETY: loading runs the library's initialisers. The file has the name of ONNX Runtime's library, or the user asked
+    // for it to be loaded; ONNX Runtime's initialisers have no preconditions.
+    let library = unsafe { Library::new(path) }.map_err(|e| {
+        // The loader's message is in the source; the error itself states only that loading failed.
+        let reason = e
+            .source()
+            .map_or_else(|| e.to_string(), ToString::to_string);
+        format!("cannot be loaded: {reason}")
+    })?;
+    // SAFETY: a symbol of this name has had this type, `const OrtApiBase* OrtGetApiBase(void)`, in every release of
+    // ONNX Runtime's C API since 1.0; it takes nothing and may be called at any time.
+    let base = unsafe {
+        let get: Symbol<unsafe extern "system" fn() -> *const OrtApiBase> = library
+            .get(b"OrtGetApiBase")
+            .map_err(|_| "is not ONNX Runtime: it exports no OrtGetApiBase".to_owned())?;
+        get()
+    };
+    // SAFETY: if it is not null, it points to a static of the library, which stays loaded to the end of this function.
+    let Some(base) = (unsafe { base.as_ref() }) else {
+        return Err("gives no API".to_owned());
+    };
+    // SAFETY: both functions may be called at any time; the version is a static string that ends with a zero.
+    let (version, api) = unsafe {
+        let version = (base.GetVersionString)();
+        let version = (!version.is_null()).then(|| CStr::from_ptr(version).to_string_lossy());
+        (
+            version.unwrap_or_default().into_owned(),
+            (base.GetApi)(ort::sys::ORT_API_VERSION),
+        )
+    };
+    // An older library gives no API either; the caller's error about its version is clearer.
+    if api.is_null() && minor(&version).is_none_or(|minor| minor >= OLDEST) {
+        return Err(format!(
+            "is version {version} but does not give API {OLDEST}"
+        ));
+    }
+    Ok(version)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn libraries_are_recognised_by_name() {
+        for (os, name, expected) in [
+            ("linux", "libonnxruntime.so", true),
+            ("linux", "libonnxruntime.so.1.31.1", true),
+            ("linux", "libonnxruntime_providers_shared.so", false),
+            ("linux", "libonnxruntime.dylib", false),
+            ("macos", "libonnxruntime.1.31.1.dylib", true),
+            ("macos", "libonnxruntime_providers.dylib", false),
+            ("windows", "onnxruntime.dll", true),
+            ("windows", "onnxruntime_providers_shared.dll", false),
+        ] {
+            assert_eq!(is_library_name(os, name), expected, "{os} {name}");
+        }
+    }
+
+    #[test]
+    fn versions_are_read() {
+        assert_eq!(minor("1.31.1"), Some(31));
+        assert_eq!(minor("1.17.0-dev"), Some(17));
+        for wrong in ["", "1", "2.1.0", "1.x", "one"] {
+            assert_eq!(minor(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_not_a_library_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = folder.path().join("libonnxruntime.so");
+        std::fs::write(&text, "not a library").unwrap();
+        for (path, part) in [
+            (folder.path().join("missing.so"), "cannot be read"),
+            (folder.path().to_owned(), "is not a file"),
+            (text, "is not a dynamic library"),
+        ] {
+            let problem = probe(&path).unwrap_err();
+            assert!(problem.contains(part), "{problem}");
+        }
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn another_library_is_refused() {
+        let loaded = std::fs::read_to_string("/proc/self/maps").unwrap();
+        let libc = loaded
+            .lines()
+            .filter_map(|line| line.split_whitespace().nth(5))
+            .find(|path| path.contains("libc.so"))
+            .unwrap();
+        let problem = probe(Path::new(libc)).unwrap_err();
+        assert!(problem.contains("OrtGetApiBase"), "{problem}");
+    }
+}

@@ -1,0 +1,208 @@
+//! Estimate of the memory that a run needs: [`MemoryCost`].
+//!
+//! ONNX Runtime does not report how much memory a graph needs. So small images are enhanced first, and the growth of the
+//! process between them gives the bytes per pixel, and per pixel squared where attention over all pixels makes it grow so.
+//! This needs Linux's `/proc`; on other systems nothing is estimated.
+
+use std::fs;
+
+use super::control_group::unused_memory;
+
+/// Sides of the images, in pixels; chosen: 64² pixels squared are 67 MB of 32-bit attention, 256² would be 17 GB,
+/// and is then left out.
+pub(super) const PROBES: [usize; 4] = [64, 128, 256, 512];
+
+/// Bytes of one pixel in input and output: three 32-bit floats each.
+const TENSORS: f64 = 24.0;
+
+/// Ratio of the growth between the last two probes to what a linear growth would give, from which on it counts as faster;
+/// chosen.
+const CURVED: f64 = 1.25;
+
+/// Bytes of growth that a probe may hide, because it reuses memory that was freed before: blocks above this size go back to
+/// the system at once (`DEFAULT_MMAP_THRESHOLD_MAX` of the GNU C library on 64 bits). With Zero-DCE and RUAS after an image
+/// of 1280 × 720, 22 MB were measured.
+const HIDDEN: f64 = (32 << 20) as f64;
+
+/// Memory that a model needs: bytes for a pixel, and for a pixel squared.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct MemoryCost {
+    linear: f64,
+    square: f64,
+}
+
+impl MemoryCost {
+    /// Cost of the tensors of input and output alone, the least that a run needs.
+    pub(super) fn for_tensors() -> Self {
+        Self {
+            linear: TENSORS,
+            square: 0.0,
+        }
+    }
+
+    /// Cost from the pixels of the last three probes and the resident bytes after each; `None` if they did not grow, or there
+    /// are fewer than two probes. With two probes all growth counts as that of squares: the third was left out because it
+    /// might be.
+    pub(super) fn from_probes(measured: &[(usize, u64)]) -> Option<Self> {
+        let points: Vec<(f64, f64)> = measured[measured.len().saturating_sub(3)..]
+            .iter()
+            .map(|(pixels, bytes)| (*pixels as f64, *bytes as f64))
+            .collect();
+        match points[..] {
+            [a, b] if b.1 > a.1 => Some(Self {
+                linear: 0.0,
+                square: (b.1 - a.1) / (b.0 * b.0 - a.0 * a.0),
+            }),
+            [a, b, c] if c.1 > b.1 => {
+                let (first, second) = ((b.1 - a.1).max(0.0), c.1 - b.1);
+                let linear = second / (c.0 - b.0);
+                if second <= CURVED * (first + HIDDEN) * (c.0 - b.0) / (b.0 - a.0) {
+                    return Some(Self {
+                        linear,
+                        square: 0.0,
+                    });
+                }
+                // Newton's divided differences of the parabola through the three probes.
+                let first = first / (b.0 - a.0);
+                let square = (linear - first) / (c.0 - a.0);
+                Some(Self {
+                    linear: (first - square * (a.0 + b.0)).max(0.0),
+                    square,
+                })
+            }
+            _ => None,
+        }
+    }
+
+    /// Bytes that a probe of `pixels` needs at worst: if all growth between the last two probes was that of squares. 0 with
+    /// fewer than two probes.
+    pub(super) fn at_worst(measured: &[(usize, u64)], pixels: usize) -> f64 {
+        let last = measured.len().saturating_sub(2)..;
+        let cost = Self::from_probes(&measured[last]);
+        cost.map_or(0.0, |cost| cost.bytes(pixels))
+    }
+
+    fn bytes(self, pixels: usize) -> f64 {
+        let pixels = pixels as f64;
+        pixels * (self.linear + self.square * pixels)
+    }
+
+    /// Checks that a run of `pixels` fits into the `available` bytes; the error is needed and available memory in gigabytes.
+    pub(super) fn fits(self, pixels: usize, available: u64) -> Result<(), [f64; 2]> {
+        const GIGABYTE: f64 = 1e9;
+        let needed = self.bytes(pixels);
+        if needed <= available as f64 {
+            Ok(())
+        } else {
+            Err([needed / GIGABYTE, available as f64 / GIGABYTE])
+        }
+    }
+}
+
+/// Resident memory of this process, in bytes.
+pub(crate) fn resident() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    kilobytes(&status, "VmRSS:")
+}
+
+/// Memory that this process may still use, in bytes: the smaller of the machine's free memory and the rest of its control groups.
+pub(crate) fn available() -> Option<u64> {
+    let free = kilobytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")?;
+    Some(unused_memory().map_or(free, |unused| unused.min(free)))
+}
+
+/// Value of a line like `VmRSS:  1234 kB`, in bytes.
+fn kilobytes(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    let value: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(1024 * value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Resident bytes after each probe, of a model with such a cost, where freed memory hides some.
+    fn measured(hidden: f64, cost: impl Fn(f64) -> f64) -> Vec<(usize, u64)> {
+        let pixels = PROBES.map(|side| side * side).into_iter();
+        pixels
+            .map(|pixels| {
+                let grown = (cost(pixels as f64) - hidden).max(0.0);
+                (pixels, 60_000_000 + grown as u64)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn growth_gives_the_cost() {
+        assert_eq!(
+            MemoryCost::from_probes(&[(64, 5), (128, 5), (256, 5)]),
+            None
+        );
+        assert_eq!(
+            MemoryCost::from_probes(&[(64, 7), (128, 6), (256, 5)]),
+            None
+        );
+        assert_eq!(MemoryCost::from_probes(&[(64, 7)]), None);
+        let cost = MemoryCost::from_probes(&measured(0.0, |pixels| 800.0 * pixels)).unwrap();
+        assert_eq!(cost.fits(1_000_000, 801_000_000), Ok(()));
+        let [needed, available] = cost.fits(1_000_000, 500_000_000).unwrap_err();
+        assert!((needed - 0.8).abs() < 1e-3 && (available - 0.5).abs() < 1e-9);
+    }
+
+    #[test]
+    fn memory_that_was_freed_before_does_not_make_a_linear_model_curved() {
+        // Zero-DCE after an image of 1280 × 720, in megabytes: 77, 79, 110, 344.
+        let zero_dce = [(64, 77), (128, 79), (256, 110), (512, 344)];
+        let zero_dce = zero_dce.map(|(side, bytes): (usize, u64)| (side * side, bytes << 20));
+        let cost = MemoryCost::from_probes(&zero_dce).unwrap();
+        let [needed, _] = cost.fits(2560 * 1440, 1).unwrap_err();
+        assert!((3.0..5.0).contains(&needed), "{needed}");
+        for per_pixel in [50.0, 200.0, 1000.0, 20_000.0] {
+            for hidden in [0.0, HIDDEN] {
+                let points = measured(hidden, |pixels| per_pixel * pixels);
+                if let Some(cost) = MemoryCost::from_probes(&points) {
+                    assert!(cost.square.abs() < 1e-12, "{per_pixel} {hidden}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn attention_over_all_pixels_is_not_taken_for_linear() {
+        let attention = measured(0.0, |pixels| 100.0 * pixels + 4.0 * pixels * pixels);
+        let cost = MemoryCost::from_probes(&attention).unwrap();
+        // 640 × 480: 378 GB of attention.
+        let [needed, _] = cost.fits(640 * 480, 8_000_000_000).unwrap_err();
+        assert!((needed - 377.5).abs() < 1.0, "{needed}");
+        // At a quarter of the size within the graph, with memory hidden.
+        let coarse = measured(HIDDEN, |pixels| 500.0 * pixels + pixels * pixels / 64.0);
+        let [needed, _] = MemoryCost::from_probes(&coarse)
+            .unwrap()
+            .fits(2560 * 1440, 1)
+            .unwrap_err();
+        assert!((200.0..250.0).contains(&needed), "{needed}");
+        // The third probe would need 17 GB, as two show; without it the estimate is no smaller.
+        let worst = MemoryCost::at_worst(&attention[..2], 256 * 256);
+        assert!((worst / 17.2e9 - 1.0).abs() < 0.1, "{worst}");
+        let two = MemoryCost::from_probes(&attention[..2]).unwrap();
+        assert!(two.fits(640 * 480, 370_000_000_000).is_err());
+        // A linear model passes this bound.
+        let linear = measured(0.0, |pixels| 1000.0 * pixels);
+        assert!(MemoryCost::at_worst(&linear[..3], 512 * 512) < 2e9);
+        assert!(MemoryCost::at_worst(&linear[..1], 256 * 256).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_system_is_read() {
+        assert_eq!(
+            kilobytes("A: 1 kB\nVmRSS:\t  12 kB\n", "VmRSS:"),
+            Some(12_288)
+        );
+        assert_eq!(kilobytes("VmRSS: much", "VmRSS:"), None);
+        if cfg!(target_os = "linux") {
+            let resident = resident().unwrap();
+            assert!(resident > 100_000 && available().unwrap() > 0);
+        }
+    }
+}

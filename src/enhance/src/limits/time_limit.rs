@@ -1,0 +1,130 @@
+//! Time that one image may take: [`TimeLimit`], [`ImageClock`].
+
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+
+use darkqa_ground::types::flags::seconds;
+
+/// Longest time that one image may take (`--llie-options timeout`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimeLimit(Option<Duration>);
+
+/// Images in a row that may take too much time or memory before the enhancer is not run any more; chosen.
+pub(crate) const MOST_ENDED: usize = 3;
+
+/// Time, as a multiple of the limit, after which a run that was told to end counts as stuck; chosen. ONNX Runtime ends a run
+/// only between two nodes of its graph.
+pub(crate) const PATIENCE: u32 = 10;
+
+impl TimeLimit {
+    /// No limit.
+    pub const NONE: Self = Self(None);
+
+    /// A limit in seconds; 0 is none.
+    #[must_use]
+    pub fn new(limit: Duration) -> Self {
+        Self((!limit.is_zero()).then_some(limit))
+    }
+
+    /// The limit; `None` for none.
+    pub(crate) fn get(self) -> Option<Duration> {
+        self.0
+    }
+}
+
+impl Default for TimeLimit {
+    /// Ten minutes; chosen.
+    fn default() -> Self {
+        Self(Some(Duration::from_mins(10)))
+    }
+}
+
+impl fmt::Display for TimeLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.0.unwrap_or_default().as_secs_f64())
+    }
+}
+
+impl FromStr for TimeLimit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.parse::<f64>() {
+            Ok(0.0) => Ok(Self::NONE),
+            _ => seconds(text).map(Self::new),
+        }
+    }
+}
+
+/// Time that is left for the runs of one image.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ImageClock {
+    limit: TimeLimit,
+    used: Duration,
+}
+
+impl ImageClock {
+    /// A clock for one image.
+    pub(crate) fn new(limit: TimeLimit) -> Self {
+        Self {
+            limit,
+            used: Duration::ZERO,
+        }
+    }
+
+    /// Time that is left; `None` without a limit.
+    pub(crate) fn left(self) -> Option<Duration> {
+        Some(self.limit.get()?.saturating_sub(self.used))
+    }
+
+    /// The limit of the whole image.
+    pub(crate) fn time_limit(self) -> TimeLimit {
+        self.limit
+    }
+
+    /// The limit of the whole image; `None` for none.
+    pub(crate) fn limit(self) -> Option<Duration> {
+        self.limit.get()
+    }
+
+    /// Counts the time of one run.
+    pub(crate) fn add(&mut self, time: Duration) {
+        self.used += time;
+    }
+
+    /// Sets the clock to the start of another image or trial.
+    pub(crate) fn restart(&mut self) {
+        self.used = Duration::ZERO;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_are_seconds_and_zero_is_none() {
+        for (text, limit) in [("600", Some(600.0)), ("0.5", Some(0.5)), ("0", None)] {
+            let read: TimeLimit = text.parse().unwrap();
+            assert_eq!(read.get(), limit.map(Duration::from_secs_f64));
+            assert_eq!(read.to_string(), text);
+        }
+        for wrong in ["-1", "long", "nan", "inf", "1e99"] {
+            assert!(wrong.parse::<TimeLimit>().is_err(), "{wrong}");
+        }
+        assert_eq!(TimeLimit::default().to_string(), "600");
+    }
+
+    #[test]
+    fn the_runs_of_an_image_share_its_time() {
+        let mut clock = ImageClock::new("2".parse().unwrap());
+        clock.add(Duration::from_millis(1500));
+        assert_eq!(clock.left(), Some(Duration::from_millis(500)));
+        clock.add(Duration::from_secs(9));
+        assert_eq!(clock.left(), Some(Duration::ZERO));
+        clock.restart();
+        assert_eq!(clock.left(), Some(Duration::from_secs(2)));
+        assert_eq!(ImageClock::new(TimeLimit::NONE).left(), None);
+    }
+}

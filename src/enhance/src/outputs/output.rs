@@ -1,0 +1,334 @@
+//! Choice of the outputs of a graph that are the enhanced image, or from which it is made: [`Output`].
+
+use crate::conventions::sidecar::OutputChoice;
+use crate::conventions::{Channels, ElementType, TensorLayout, preset};
+use crate::expressions::{ChannelSlice, Expression};
+use crate::graphs::{Dim, Port, list};
+
+/// Names that exporters give the enhanced image if a model has other outputs too.
+const IMAGE_NAMES: [&str; 8] = [
+    "enhanced",
+    "enhanced_image",
+    "enhance_image",
+    "enhance",
+    "output",
+    "output_image",
+    "result",
+    "image",
+];
+
+/// An output that is the enhanced image, or a name in the expression of it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Output {
+    /// Name, type and dimensions in the graph.
+    pub(crate) port: Port,
+    /// Order of its dimensions; `None` if only a run shows it.
+    pub(crate) layout: Option<TensorLayout>,
+    /// Numbers of channels that it may have.
+    pub(super) channels: Vec<usize>,
+    /// The channels that are read; `None` for all.
+    pub(crate) slice: Option<ChannelSlice>,
+    /// Reason for the choice, for users; `stated` if sidecar or preset state it.
+    pub(crate) reason: &'static str,
+}
+
+impl Output {
+    /// The image among the outputs: the stated one, the only one, else the one on which names and structure agree. `fits` tells whether an
+    /// output can be the image.
+    ///
+    /// # Errors
+    /// The message follows the file's name.
+    pub(crate) fn choose(
+        outputs: &[Port],
+        stated: Option<&OutputChoice>,
+        channels: Channels,
+        fits: impl Fn(&Port, usize) -> bool,
+    ) -> Result<Self, String> {
+        if let Some(OutputChoice::Name(name)) = stated
+            && let Some((port, slice)) = sliced(outputs, name)
+        {
+            if slice.count() != channels.count() {
+                return Err(format!(
+                    "its sidecar or preset states output = {name:?}, {} channels; expected {}",
+                    slice.count(),
+                    channels.words()
+                ));
+            }
+            return Self::from_slice(port, slice, fits);
+        }
+        let fits_count = &fits;
+        let fits = |port: &Port| fits_count(port, channels.count());
+        let images: Vec<usize> = (0..outputs.len()).filter(|&i| fits(&outputs[i])).collect();
+        let (index, reason) = match (images.as_slice(), stated) {
+            ([only], None) => (*only, "the only output that can be the image"),
+            // An index may count the outputs of the authors' model. An export may have fewer.
+            ([only], Some(OutputChoice::Index(_))) if outputs.len() == 1 => {
+                (*only, "the only output")
+            }
+            (_, Some(choice)) => (stated_output(outputs, choice, fits)?, "stated"),
+            ([], None) => return Err(no_image(outputs, channels, fits_count)),
+            (several, None) => match (by_name(outputs, several), by_structure(outputs)) {
+                (Some(name), None) => (name, "its name"),
+                (None, Some(structure)) => (structure, "the second of Zero-DCE's three outputs"),
+                (Some(name), Some(structure)) if name == structure => (name, "its name"),
+                _ => return Err(ambiguous(outputs)),
+            },
+        };
+        let port = outputs[index].clone();
+        Ok(Self {
+            layout: port.layout(channels.count()),
+            port,
+            channels: vec![channels.count()],
+            slice: None,
+            reason,
+        })
+    }
+
+    /// The outputs that an expression of the image names, in its order.
+    ///
+    /// # Errors
+    /// If a name is neither an output nor `input`, or an output is no image of one or three channels.
+    pub(crate) fn named(
+        outputs: &[Port],
+        image: &Expression,
+        channels: Channels,
+        fits: impl Fn(&Port, usize) -> bool,
+    ) -> Result<Vec<Self>, String> {
+        let channels: &[usize] = match channels {
+            Channels::Rgb => &[3, 1],
+            Channels::Y => &[1],
+        };
+        let names = outputs.iter().map(|port| port.name.as_str());
+        let known: Vec<&str> = names.chain([INPUT]).collect();
+        let slices: Vec<&str> = image
+            .names()
+            .iter()
+            .filter(|name| sliced(outputs, name).is_some())
+            .map(String::as_str)
+            .collect();
+        let known_names = [&known[..], &slices].concat();
+        image
+            .check_names("image", &known_names)
+            .map_err(|problem| {
+                format!(
+                    "cannot be read: {problem}; its outputs are {}",
+                    list(outputs)
+                )
+            })?;
+        let outputs: Vec<Self> = image.names().iter().filter(|name| *name != INPUT)
+            .map(|name| {
+                if let Some((port, slice)) = sliced(outputs, name) {
+                    return Self::from_slice(port, slice, &fits);
+                }
+                let port = outputs.iter().find(|port| port.name == *name);
+                let port = port.filter(|port| channels.iter().any(|count| fits(port, *count))).ok_or_else(|| {
+                    format!(
+                        "gives {name:?}, which image = \"{image}\" names, but which is not an image of {}; it has {}",
+                        if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" },
+                        list(outputs)
+                    )
+                })?;
+                Ok(Self {
+                    layout: channels.iter().find_map(|count| port.layout(*count)),
+                    port: port.clone(),
+                    channels: channels.to_vec(),
+                    slice: None,
+                    reason: "stated",
+                })
+            })
+            .collect::<Result<_, String>>()?;
+        if outputs.is_empty() {
+            return Err(format!(
+                "is not used: image = \"{image}\" names none of its outputs, which are {}",
+                known[..known.len() - 1].join(", ")
+            ));
+        }
+        Ok(outputs)
+    }
+}
+
+impl Output {
+    /// Some channels of an output.
+    ///
+    /// # Errors
+    /// If it has fewer channels, or another size than the input.
+    fn from_slice(
+        port: &Port,
+        slice: ChannelSlice,
+        fits: impl Fn(&Port, usize) -> bool,
+    ) -> Result<Self, String> {
+        let count = port
+            .channel_counts()
+            .into_iter()
+            .find(|count| *count >= slice.end && fits(port, *count))
+            .ok_or_else(|| {
+                format!(
+                    "has no channels {} to {} (counted from 0) of the input's size in {port}",
+                    slice.first,
+                    slice.end - 1
+                )
+            })?;
+        Ok(Self {
+            layout: port.layout(count),
+            port: port.clone(),
+            channels: vec![count],
+            slice: Some(slice),
+            reason: "stated",
+        })
+    }
+}
+
+/// The output and the channels that a name such as `x[4:7]` means; `None` if it means no channels of an output.
+fn sliced<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice)> {
+    if outputs.iter().any(|port| port.name == name) {
+        return None;
+    }
+    let (name, slice) = ChannelSlice::split(name)?;
+    let port = outputs.iter().find(|port| port.name == name)?;
+    Some((port, slice))
+}
+
+/// A name as expressions write it, in backticks if needed.
+pub(crate) fn in_expression(name: &str) -> String {
+    if name
+        .chars()
+        .all(|c: char| c.is_ascii_alphanumeric() || c == '_')
+        && !name.starts_with(|c: char| c.is_ascii_digit())
+    {
+        name.to_owned()
+    } else {
+        format!("`{name}`")
+    }
+}
+
+/// Why none of the outputs is the image, and what to state or export.
+fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) -> bool) -> String {
+    let wide = |port: &&Port| {
+        port.channel_counts()
+            .into_iter()
+            .filter(|count| *count > 1 && *count != 3)
+            .find(|count| fits(port, *count))
+    };
+    if channels == Channels::Rgb
+        && let Some((port, count)) = outputs.iter().find_map(|port| Some((port, wide(&port)?)))
+    {
+        let name = &port.name;
+        return match count {
+            4 => format!(
+                "gives {port}, 4 channels, and an image has 3; if the fourth is opacity, state in MODEL.onnx.toml beside it: `output = \"{name}[0:3]\"`"
+            ),
+            24 => format!(
+                "gives {port}, 24 channels, and an image has 3; if they are the curves of Zero-DCE, state in MODEL.onnx.toml beside it: `image = \"curves(input, {0}[0:3], {0}[3:6], {0}[6:9], {0}[9:12], {0}[12:15], {0}[15:18], {0}[18:21], {0}[21:24])\"`",
+                in_expression(name)
+            ),
+            _ => format!(
+                "gives {port}, {count} channels, and an image has 3; state which are the image in MODEL.onnx.toml beside it, from 0 and without the last: `output = \"{name}[{}:{count}]\"`",
+                count.saturating_sub(3)
+            ),
+        };
+    }
+    if channels == Channels::Rgb
+        && let Some(port) = outputs.iter().find(|port| fits(port, 1))
+    {
+        return format!(
+            "gives {port}, one channel, which is no image: perhaps a light map, which its authors divide by; state their formula in MODEL.onnx.toml beside it: `image = \"clip(input / {}, 0, 1)\"`",
+            in_expression(&port.name)
+        );
+    }
+    if let [port] = outputs {
+        let problem = match (&port.element, port.dims.len()) {
+            (ElementType::Other(_), _) => Some(
+                "which is no tensor of numbers; export it so that it gives one image as float32"
+                    .to_owned(),
+            ),
+            (element, _) if !element.is_read() => Some(
+                "a type that is not read; export it so that it gives float32 or uint8".to_owned(),
+            ),
+            (_, 1 | 2) => Some(
+                "flat values; export it so that it gives an image of [1, 3, height, width]"
+                    .to_owned(),
+            ),
+            (_, 5..) => Some(
+                "several frames at a time; export it for single images of [1, 3, height, width]"
+                    .to_owned(),
+            ),
+            _ => None,
+        };
+        if let Some(problem) = problem {
+            return format!("gives {port}, {problem}");
+        }
+    }
+    let what = match channels {
+        Channels::Rgb => "an image",
+        Channels::Y => "an image of one channel (channels = \"y\")",
+    };
+    format!(
+        "has no output that is {what} of the input's size; it has {}",
+        list(outputs)
+    )
+}
+
+/// Name of the dark image in an expression of the image.
+pub(super) const INPUT: &str = "input";
+
+/// Question to the user if the image among the outputs is unknown. Presets that know such a list are named.
+fn ambiguous(outputs: &[Port]) -> String {
+    let presets = preset::that_know(outputs);
+    let presets = match presets.as_slice() {
+        [] => String::new(),
+        names => {
+            let known = "; the models of these presets have such outputs:";
+            format!("{known} {} (--llie PRESET:FILE)", names.join(", "))
+        }
+    };
+    format!(
+        "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0{presets}; `darkqa-eval enhance doctor` draws what each gives, and which are plausible",
+        list(outputs)
+    )
+}
+
+/// Index of the stated output, which must exist and be able to be the image.
+fn stated_output(
+    outputs: &[Port],
+    choice: &OutputChoice,
+    fits: impl Fn(&Port) -> bool,
+) -> Result<usize, String> {
+    let found = match choice {
+        OutputChoice::Index(index) => (*index < outputs.len()).then_some(*index),
+        OutputChoice::Name(name) => outputs.iter().position(|port| port.name == *name),
+    };
+    let problem = match found {
+        Some(index) if fits(&outputs[index]) => return Ok(index),
+        Some(_) => "which is not one of its image outputs",
+        None => "which it does not have",
+    };
+    Err(format!(
+        "its sidecar or preset states {choice}, {problem}; it has {}",
+        list(outputs)
+    ))
+}
+
+/// The only image output that has one of [`IMAGE_NAMES`].
+///
+/// A name of the first output counts only if the others are named too: see [`Port::is_numbered`].
+fn by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
+    let mut matching = images
+        .iter()
+        .copied()
+        .filter(|i: &usize| IMAGE_NAMES.contains(&outputs[*i].name.as_str()));
+    let only = matching.next().filter(|_| matching.next().is_none())?;
+    let named_by_hand = only > 0 || !outputs.iter().any(Port::is_numbered);
+    named_by_hand.then_some(only)
+}
+
+/// Index of the second of Zero-DCE's three outputs, which is the image whatever their names are.
+///
+/// `enhance_net_nopool.forward` of <https://github.com/Li-Chongyi/Zero-DCE> returns the image after four curves, the
+/// image after all eight, and the 8 × 3 = 24 channels of the curves themselves. No other published model has this shape.
+fn by_structure(outputs: &[Port]) -> Option<usize> {
+    let channels: Vec<Option<usize>> = outputs
+        .iter()
+        .map(|port| port.dims.get(1).and_then(Dim::known))
+        .collect();
+    (channels == [Some(3), Some(3), Some(24)]).then_some(1)
+}

@@ -1,0 +1,276 @@
+use super::*;
+use crate::conventions::{Channels, Padding};
+use crate::inputs::{DarkImage, FedImage, Feeding, Tensor, TensorData};
+use darkqa_ground::types::Rgb;
+
+const FEEDING: Feeding = Feeding {
+    layout: TensorLayout::Nchw,
+    element: ElementType::Float32,
+    channels: Channels::Rgb,
+    input: None,
+    color: ChannelOrder::Rgb,
+    range: ValueRange::Unit,
+    mean: [0.0; 3],
+    std: [1.0; 3],
+    pad: Padding::Reflect,
+};
+fn reading() -> OutputReading {
+    OutputReading {
+        layout: None,
+        preferred: TensorLayout::Nchw,
+        channels: vec![3],
+        slice: None,
+        mean_and_std: None,
+        color: ChannelOrder::Rgb,
+        range: ValueRange::Unit,
+        certainty: Certainty::Known,
+        rounding: Rounding::Round,
+    }
+}
+
+fn image(height: usize, width: usize) -> Rgb {
+    let samples = (0..height * width * 3).map(|i| (i * 37 % 256) as u8);
+    Rgb::new(height, width, samples.collect()).unwrap()
+}
+
+fn whole(image: &Rgb) -> TileWindow {
+    TileWindow::whole([image.height(), image.width()])
+}
+
+fn near(a: &TensorData, b: &TensorData) -> bool {
+    match (a, b) {
+        (TensorData::Float32(a), TensorData::Float32(b)) => {
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-4)
+        }
+        (a, b) => a == b,
+    }
+}
+
+/// The tensor of a window of an image.
+fn fed(feeding: &Feeding, image: &Rgb, window: TileWindow) -> Tensor {
+    let dark = DarkImage::new(image);
+    let fed = FedImage::Window {
+        dark: &dark,
+        window,
+        pad: feeding.pad,
+    };
+    feeding.tensor(&fed).unwrap()
+}
+
+fn floats(input: &Tensor) -> &[f32] {
+    match &input.data {
+        TensorData::Float32(values) => values,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn every_convention_gives_every_byte_back() {
+    let image = image(11, 24);
+    for layout in TensorLayout::ALL {
+        for (element, range) in [
+            (ElementType::Float32, ValueRange::Unit),
+            (ElementType::Float32, ValueRange::Bytes),
+            (ElementType::Float32, ValueRange::Signed),
+            (ElementType::Float16, ValueRange::Unit),
+            (ElementType::Uint8, ValueRange::Bytes),
+        ] {
+            for color in [ChannelOrder::Rgb, ChannelOrder::Bgr] {
+                let feeding = Feeding {
+                    layout,
+                    element: element.clone(),
+                    color,
+                    range,
+                    ..FEEDING
+                };
+                let input = fed(&feeding, &image, whole(&image));
+                let reading = OutputReading {
+                    preferred: layout,
+                    color,
+                    range,
+                    ..reading()
+                };
+                let samples = match &input.data {
+                    TensorData::Float32(values) => TensorSamples::Float32(values),
+                    TensorData::Float16(values) => TensorSamples::Float16(values),
+                    TensorData::Uint8(values) => TensorSamples::Uint8(values),
+                    other => panic!("{other:?}"),
+                };
+                let dims: Vec<i64> = input
+                    .dims
+                    .iter()
+                    .map(|dim| i64::try_from(*dim).unwrap())
+                    .collect();
+                assert_eq!(reading.layout(&dims, [11, 24]), Some((layout, 3)));
+                let bytes = reading
+                    .bytes(samples, layout, [11, 24], whole(&image))
+                    .unwrap();
+                assert_eq!(bytes, image.samples(), "{layout} {element} {range} {color}");
+                let part = TileWindow {
+                    left: 3,
+                    top: 2,
+                    right: 7,
+                    bottom: 3,
+                };
+                let bytes = reading.bytes(samples, layout, [11, 24], part).unwrap();
+                assert_eq!(bytes, image.samples()[(2 * 24 + 3) * 3..][..12]);
+                // Planes of floats, for models of a fixed size, are fed and read in the same way.
+                let certainty = Certainty::Known;
+                let read = |part| {
+                    let planes = reading.planes(samples, (layout, 3), [11, 24], part, certainty);
+                    planes.unwrap().to_rgb(Rounding::Round).unwrap()
+                };
+                assert_eq!(read(part).samples(), bytes);
+                assert_eq!(read(whole(&image)), image);
+                if element != ElementType::Float16 {
+                    let planes = Planes::from_rgb(&image);
+                    let fed = feeding.tensor(&FedImage::Whole(&planes)).unwrap();
+                    assert!(near(&fed.data, &input.data) && fed.dims == input.dims);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn mean_and_deviation_are_the_models_channels() {
+    let image = Rgb::new(1, 1, vec![255, 0, 51]).unwrap();
+    let feeding = Feeding {
+        mean: [0.5, 0.25, 0.0],
+        std: [0.5, 0.25, 0.1],
+        ..FEEDING
+    };
+    let input = fed(&feeding, &image, whole(&image));
+    assert_eq!(floats(&input), [1.0, -1.0, 2.0]);
+    let blue_first = Feeding {
+        color: ChannelOrder::Bgr,
+        ..feeding
+    };
+    let input = fed(&blue_first, &image, whole(&image));
+    assert_eq!(floats(&input), [(0.2 - 0.5) / 0.5, -1.0, 10.0]);
+}
+
+#[test]
+fn pixels_beyond_the_image_are_padded() {
+    let image = Rgb::new(1, 3, vec![1, 1, 1, 2, 2, 2, 3, 3, 3]).unwrap();
+    let wide = TileWindow {
+        right: 8,
+        bottom: 2,
+        ..whole(&image)
+    };
+    for (pad, row, below) in [
+        (Padding::Reflect, [1, 2, 3, 2, 1, 2, 3, 2], 1),
+        (Padding::Replicate, [1, 2, 3, 3, 3, 3, 3, 3], 1),
+        (Padding::Zero, [1, 2, 3, 0, 0, 0, 0, 0], 0),
+    ] {
+        let feeding = Feeding {
+            pad,
+            element: ElementType::Uint8,
+            range: ValueRange::Bytes,
+            ..FEEDING
+        };
+        let TensorData::Uint8(bytes) = fed(&feeding, &image, wide).data else {
+            panic!("no bytes");
+        };
+        assert_eq!(bytes[..8], row, "{pad}");
+        assert_eq!(bytes[8], below, "{pad}");
+    }
+}
+
+#[test]
+fn samples_are_clamped_and_rounded() {
+    let values = [-0.1, 1.1, 0.5, f32::INFINITY, 1.4 / 255.0, 1.6 / 255.0];
+    let part = TileWindow {
+        left: 0,
+        top: 0,
+        right: 2,
+        bottom: 1,
+    };
+    let bytes = |rounding| {
+        let reading = OutputReading {
+            rounding,
+            ..reading()
+        };
+        let samples = TensorSamples::Float32(&values);
+        reading
+            .bytes(samples, TensorLayout::Nchw, [1, 2], part)
+            .unwrap()
+    };
+    // 0.5 · 255 = 127.5
+    assert_eq!(bytes(Rounding::Round), [0, 128, 1, 255, 255, 2]);
+    assert_eq!(bytes(Rounding::Truncate), [0, 127, 1, 255, 255, 1]);
+    for i in 0..=u16::MAX {
+        let code = f32::from(i) / 257.0;
+        assert_eq!(nearest(code), code.round() as u8);
+    }
+    assert_eq!((nearest(0.499_999_97), nearest(254.5)), (0, 255));
+}
+
+#[test]
+fn values_of_another_range_are_refused() {
+    let checked = |values: &[f32], range, certainty| check(values, range, certainty).err();
+    let likely = |values: &[f32], range| match checked(values, range, Certainty::Assumed) {
+        Some(OutOfRange::Beyond { likely, .. }) => Some(likely),
+        other => {
+            assert_eq!(other, None);
+            None
+        }
+    };
+    assert_eq!(
+        likely(&[0.0, 200.0], ValueRange::Unit),
+        Some(ValueRange::Bytes)
+    );
+    assert_eq!(
+        likely(&[-0.9, 0.3], ValueRange::Unit),
+        Some(ValueRange::Signed)
+    );
+    assert_eq!(
+        likely(&[0.0, 0.9], ValueRange::Bytes),
+        Some(ValueRange::Unit)
+    );
+    // A model that does not clamp overshoots by a little, or rarely by much.
+    assert_eq!(likely(&[-0.1, 1.4], ValueRange::Unit), None);
+    let mut rare = vec![0.5; 1000];
+    rare[0] = -3.0;
+    rare[1] = 40.0;
+    assert_eq!(likely(&rare, ValueRange::Unit), None);
+    assert_eq!(
+        checked(&[0.0, 200.0], ValueRange::Unit, Certainty::Known),
+        None
+    );
+    let broken = checked(&[0.0, f32::NAN], ValueRange::Unit, Certainty::Known);
+    assert_eq!(broken, Some(OutOfRange::NotNumbers));
+}
+
+#[test]
+fn the_luma_of_an_expression_is_fed_in_its_range() {
+    let image = Rgb::new(1, 2, vec![255, 0, 51, 51, 51, 51]).unwrap();
+    let luma = Feeding {
+        channels: Channels::Y,
+        range: ValueRange::Signed,
+        ..FEEDING
+    };
+    let input = fed(&luma, &image, whole(&image));
+    assert_eq!(input.dims, [1, 1, 1, 2]);
+    let near = |values: &[f32], expected: [f32; 2]| {
+        let pairs = values.iter().zip(expected);
+        assert!(
+            pairs.clone().all(|(a, b)| (a - b).abs() < 1e-6),
+            "{values:?}"
+        );
+    };
+    near(floats(&input), [2.0 * (0.299 + 0.114 * 0.2) - 1.0, -0.6]);
+    // The expression is of the dark image in 0..1, before luma and range.
+    let squared = Feeding {
+        input: "image ^ 2".parse().ok(),
+        ..luma
+    };
+    let input = fed(&squared, &image, whole(&image));
+    near(floats(&input), [2.0 * (0.299 + 0.114 * 0.04) - 1.0, -0.92]);
+    let endless = Feeding {
+        input: "image / 0".parse().ok(),
+        ..FEEDING
+    };
+    let planes = Planes::from_rgb(&image);
+    assert_eq!(endless.tensor(&FedImage::Whole(&planes)), None);
+}

@@ -1,0 +1,325 @@
+//! Examination of a model with an unknown convention: [`Enhancer::examine`].
+//!
+//! The model runs on a few dark frames with each possible convention. If exactly one of them gives plausible images, it is proposed.
+
+mod proposal;
+
+use std::collections::BTreeSet;
+
+use super::plausible::{Codes, Facts};
+use super::probe::{PairTrial, Probe, RangePair};
+use super::probe_run::{Trials, made};
+use crate::conventions::sidecar::{ModelSidecar, OutputChoice};
+use crate::conventions::{ChannelOrder, ValueScale};
+use crate::enhancer::Enhancer;
+use crate::graphs::Port;
+use crate::outputs::in_expression;
+use crate::sizing::TakenSizes;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::Rgb;
+use proposal::{Found, propose};
+pub use proposal::{ProposedLine, Settled};
+
+/// Results of a model on dark frames, by convention.
+#[derive(Debug)]
+pub struct Examination {
+    /// The dark frames as they are fed.
+    pub frames: Vec<Rgb>,
+    /// The conventions that were tried.
+    pub columns: Vec<ExaminedConvention>,
+    /// The lines of a sidecar that are proposed.
+    pub proposal: Vec<ProposedLine>,
+    /// Why they are proposed, or why nothing is.
+    pub conclusion: String,
+    /// How the sizes of the frames were handled, or why the model failed.
+    pub sizes: String,
+    /// Parts of the convention that the frames decide.
+    pub settled: Settled,
+}
+
+/// Whether it is known which output is the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ImageOutput {
+    /// One output is the image.
+    Known,
+    /// Several could be, and the first of them is read.
+    Unknown,
+}
+
+/// The images of one convention.
+#[derive(Debug)]
+pub struct ExaminedConvention {
+    /// Heading that describes the convention.
+    pub title: String,
+    /// Output of the model for each frame.
+    pub images: Vec<ExaminedImage>,
+    /// Flaw of at least half of the images; `None` if they are plausible.
+    pub problem: Option<String>,
+}
+
+/// One image of a model.
+#[derive(Debug)]
+pub struct ExaminedImage {
+    /// The image, clamped and rounded.
+    pub image: Rgb,
+    /// Its figures before it was clamped.
+    pub facts: Facts,
+    /// Flaw of the image; `None` if it is plausible.
+    pub problem: Option<String>,
+}
+
+impl Enhancer {
+    /// Runs the model on dark frames with each convention that could be meant.
+    ///
+    /// # Errors
+    /// If it takes none of the sizes of the probe.
+    pub fn examine(&mut self, dark: &[Rgb], image: ImageOutput) -> Result<Examination> {
+        let sizes = self.try_sizes(dark);
+        let order = self.other_order();
+        let trials = self.trials_of_all(dark)?.ok_or_else(|| {
+            self.fault("it takes none of the small sizes of the probe; state `multiple` or `fixed` in MODEL.onnx.toml beside it")
+        })?;
+        let Trials {
+            frames,
+            probes: [probe, swapped],
+        } = trials;
+        let mut others = self.other_outputs(&frames, probe.best())?;
+        let plausible: Vec<String> = others
+            .iter()
+            .filter(|output| output.problem.is_none())
+            .map(|output| output.title.clone())
+            .collect();
+        let stated = self.stated_pair();
+        let is_plausible = |pair: &RangePair| probe.plausible().contains(pair);
+        let mut found = match (image, stated) {
+            (ImageOutput::Unknown, _) => Found::no_output(&self.output_title(), &probe, &plausible),
+            (ImageOutput::Known, Some(pair)) if is_plausible(&pair) => Found::stated(pair),
+            (ImageOutput::Known, _) => propose(&probe, stated, &swapped, order),
+        };
+        if !found.lines.is_empty() {
+            found.lines.extend(self.found_size());
+        }
+        if image == ImageOutput::Known {
+            found.mention(&plausible);
+        }
+        if image == ImageOutput::Known && self.may_be_residual(probe.best())? {
+            let sums = self.sums(&frames, probe.best())?;
+            if sums.iter().any(|sum| sum.problem.is_none()) {
+                found.settled = Settled::No;
+                found.conclusion += " Its output of a white image is nearly black, so it may have to be added to the input; both are possible and are drawn below.";
+            }
+            others.extend(sums);
+        }
+        let convention = self.convention();
+        let is_stated = convention.color.is_some()
+            || convention.color_out.is_some()
+            || self.stated_ranges().iter().any(Option::is_some);
+        let as_stated = is_stated.then_some(probe.usual);
+        let output = match image {
+            ImageOutput::Known => String::new(),
+            ImageOutput::Unknown => self.output_title() + ", ",
+        };
+        let columns = conventions_to_draw(&output, &probe, as_stated, &swapped, order, others);
+        Ok(Examination {
+            settled: found.settled,
+            frames,
+            columns,
+            proposal: found.lines,
+            conclusion: found.conclusion,
+            sizes,
+        })
+    }
+
+    /// The order of the output's colours that is not stated.
+    fn other_order(&self) -> ChannelOrder {
+        let stated = self.convention();
+        swapped(stated.color_out.or(stated.color).unwrap_or_default())
+    }
+
+    /// Runs the model on dark frames with all ranges, in the stated order of colours and in the other.
+    fn trials_of_all(&self, dark: &[Rgb]) -> Result<Option<Trials<2>>> {
+        let stated = self.convention().clone();
+        let swapped = ModelSidecar {
+            color_out: Some(self.other_order()),
+            ..stated.clone()
+        };
+        self.trials(dark, [&stated, &swapped], [None; 2])
+    }
+
+    /// The lines of the sidecar with which the images of dark frames can be enhanced images, in a sentence; `None` if no lines are the
+    /// only ones.
+    pub(super) fn better_lines(&self, dark: &[Rgb]) -> Result<Option<String>> {
+        let Some(trials) = self.trials_of_all(dark)? else {
+            return Ok(None);
+        };
+        let [mut probe, mut swapped] = trials.probes;
+        // A pair is advised only if no frame speaks against it.
+        for probe in [&mut probe, &mut swapped] {
+            probe.leave_out_mixed();
+        }
+        let found = propose(&probe, self.stated_pair(), &swapped, self.other_order());
+        let lines: Vec<String> = found
+            .lines
+            .iter()
+            .map(|line| format!("`{}`", line.line))
+            .collect();
+        Ok((!lines.is_empty()).then(|| {
+            format!(
+                "{} If its authors do that, state in MODEL.onnx.toml beside it, in place of what is stated: {}",
+                found.conclusion,
+                lines.join(" and ")
+            )
+        }))
+    }
+
+    /// The output that is read, as a title.
+    fn output_title(&self) -> String {
+        format!("output {:?}", self.graph().signature.outputs[0].port.name)
+    }
+
+    /// The ranges that are stated; `None` if one is not.
+    fn stated_pair(&self) -> Option<RangePair> {
+        let [input, output] = self.stated_ranges();
+        Some(RangePair {
+            input: ValueScale::Range(input?),
+            output: ValueScale::Range(output?),
+        })
+    }
+
+    /// Runs the model on a frame of each size to find the sizes that it accepts. The images are not checked here.
+    fn try_sizes(&mut self, frames: &[Rgb]) -> String {
+        let mut tried = BTreeSet::new();
+        for frame in frames {
+            if tried.insert([frame.height(), frame.width()])
+                && let Err(problem) = self.enhance(frame)
+            {
+                return problem.to_string();
+            }
+        }
+        self.usage().note().sizes
+    }
+
+    /// The line for the size that was found by trial.
+    fn found_size(&self) -> Option<ProposedLine> {
+        let line = match self.found_sizes()? {
+            TakenSizes::Multiple(multiple) => format!("multiple = {multiple}"),
+            TakenSizes::Traced([height, width]) => format!("fixed = [{width}, {height}]"),
+        };
+        let reason = "found by trial: it fails at other sizes".to_owned();
+        Some(ProposedLine { line, reason })
+    }
+
+    /// The sum of the input and of the output that is read.
+    fn sums(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
+        let name = &self.graph().signature.outputs[0].port.name;
+        let text = format!("input + {}", in_expression(name));
+        let convention = ModelSidecar {
+            output: None,
+            image: Some(
+                text.parse()
+                    .map_err(|problem: String| self.fault(problem))?,
+            ),
+            ..self.convention().clone()
+        };
+        let convention = convention.fed(ranges.input).read(ranges.output);
+        let graph = self.graph().with_convention(convention);
+        let graph = graph.map_err(|problem| self.fault(problem))?;
+        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
+        let made = made(&[graph], frames)?.unwrap_or_default();
+        Ok(made
+            .into_iter()
+            .map(|made| {
+                let pair = PairTrial::new(ranges, &seen, made);
+                column(&pair, format!("image = \"{text}\", {ranges}"))
+            })
+            .collect())
+    }
+
+    /// The images of the outputs that are not read.
+    fn other_outputs(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
+        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
+        let mut columns = Vec::new();
+        for Port { name, .. } in &self.graph().signature.unread {
+            let convention = ModelSidecar {
+                output: Some(OutputChoice::Name(name.clone())),
+                image: None,
+                ..self.convention().clone()
+            };
+            let convention = convention.fed(ranges.input).read(ranges.output);
+            // An output that is no image, such as curves, is left out.
+            let Ok(graph) = self.graph().with_convention(convention) else {
+                continue;
+            };
+            let made = made(&[graph], frames)?;
+            if let Some(made) = made.and_then(|mut made| made.pop()) {
+                let pair = PairTrial::new(ranges, &seen, made);
+                columns.push(column(&pair, format!("output {name:?}, {ranges}")));
+            }
+        }
+        Ok(columns)
+    }
+}
+
+fn swapped(order: ChannelOrder) -> ChannelOrder {
+    match order {
+        ChannelOrder::Rgb => ChannelOrder::Bgr,
+        ChannelOrder::Bgr => ChannelOrder::Rgb,
+    }
+}
+
+/// The conventions to draw: the plausible ones, and the partly stated one that a run would use. If none is plausible, all of them. `output`
+/// names the output to read if the image is not known.
+fn conventions_to_draw(
+    output: &str,
+    probe: &Probe,
+    stated: Option<RangePair>,
+    swapped: &Probe,
+    order: ChannelOrder,
+    others: Vec<ExaminedConvention>,
+) -> Vec<ExaminedConvention> {
+    let stated_title = stated.map(|pair| format!("{output}{pair}, as stated"));
+    let mut shown = columns(probe, |ranges| match &stated_title {
+        Some(title) if stated == Some(ranges) => title.clone(),
+        _ => format!("{output}{ranges}"),
+    });
+    let swapped = columns(swapped, |ranges| {
+        format!("{output}{ranges}, {order} in the output")
+    });
+    // Nine more pictures of what cannot be would only distract.
+    let plausible = swapped
+        .into_iter()
+        .filter(|column| column.problem.is_none());
+    shown.extend(plausible);
+    shown.extend(others);
+    if shown.iter().any(|column| column.problem.is_none()) {
+        shown.retain(|column| {
+            column.problem.is_none() || stated_title.as_ref() == Some(&column.title)
+        });
+    }
+    shown
+}
+
+fn columns(probe: &Probe, title: impl Fn(RangePair) -> String) -> Vec<ExaminedConvention> {
+    probe
+        .pairs
+        .iter()
+        .map(|pair| column(pair, title(pair.ranges)))
+        .collect()
+}
+
+fn column(pair: &PairTrial, title: String) -> ExaminedConvention {
+    let images = pair
+        .made
+        .iter()
+        .zip(&pair.verdicts)
+        .map(|(made, verdict)| ExaminedImage {
+            image: made.to_rgb(),
+            facts: made.facts(),
+            problem: verdict.map(|verdict| verdict.to_string()),
+        });
+    ExaminedConvention {
+        title,
+        images: images.collect(),
+        problem: pair.verdict().map(|seen| seen.to_string()),
+    }
+}

@@ -1,0 +1,159 @@
+//! Conclusion of an examination ([`Found`]): the proposed lines of a sidecar, with the reason.
+
+use crate::conventions::ChannelOrder;
+use crate::probes::probe::{Conclusion, Probe, RangePair};
+use darkqa_ground::types::Flaw;
+
+/// Whether an examination found one convention.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Settled {
+    /// Exactly one convention is plausible.
+    Yes,
+    /// Several are, or none is.
+    No,
+}
+
+/// A line of a sidecar.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProposedLine {
+    /// The line, as `range_in = "0..1"`.
+    pub line: String,
+    /// Why it is proposed.
+    pub reason: String,
+}
+
+/// Findings of an examination.
+pub(super) struct Found {
+    pub(super) lines: Vec<ProposedLine>,
+    pub(super) conclusion: String,
+    pub(super) settled: Settled,
+}
+
+impl Found {
+    fn nothing(conclusion: String) -> Self {
+        Self {
+            lines: Vec::new(),
+            conclusion,
+            settled: Settled::No,
+        }
+    }
+
+    /// The ranges that are stated are plausible.
+    pub(super) fn stated(pair: RangePair) -> Self {
+        let conclusion = format!(
+            "With {pair}, as its sidecar, its preset or its types state, its images can be enhanced images."
+        );
+        Self {
+            settled: Settled::Yes,
+            ..Self::nothing(conclusion)
+        }
+    }
+
+    /// Several outputs could be the image: that which is read, and the plausible others.
+    pub(super) fn no_output(first: &str, probe: &Probe, others: &[String]) -> Self {
+        let mut plausible: Vec<&str> = Vec::new();
+        if !probe.plausible().is_empty() {
+            plausible.push(first);
+        }
+        plausible.extend(others.iter().map(String::as_str));
+        Self::nothing(format!(
+            "Which output is the image is not stated, and cannot be found: plausible are {}. State the one that its authors use, `output = \"NAME\"`, or name their preset.",
+            if plausible.is_empty() {
+                "none".to_owned()
+            } else {
+                plausible.join("; ")
+            }
+        ))
+    }
+
+    /// Names the other outputs whose images could be enhanced ones.
+    pub(super) fn mention(&mut self, others: &[String]) {
+        for output in others {
+            let found = " gives plausible images: check which output its authors use.";
+            self.conclusion += &[" The ", output, found].concat();
+        }
+    }
+
+    fn ranges(pair: RangePair, conclusion: String) -> Self {
+        let reason = "the only value ranges with which its images can be enhanced images";
+        let lines = pair.lines().into_iter().map(|line| ProposedLine {
+            line,
+            reason: reason.to_owned(),
+        });
+        Self {
+            lines: lines.collect(),
+            conclusion,
+            settled: Settled::Yes,
+        }
+    }
+}
+
+/// Conclusion from the pairs of ranges: the only plausible one is proposed. `swapped` is the probe with the output's colours in the other
+/// order; it counts if the colours are the reason that nothing else is plausible. If several of its pairs are plausible, the `stated` one
+/// is taken.
+pub(super) fn propose(
+    probe: &Probe,
+    stated: Option<RangePair>,
+    swapped: &Probe,
+    order: ChannelOrder,
+) -> Found {
+    match probe.plausible().as_slice() {
+        several @ [_, _, ..] if stated.is_none() && probe.conclusion() == Conclusion::Assumed => {
+            let others: Vec<String> = several
+                .iter()
+                .filter(|pair| **pair != probe.usual)
+                .map(ToString::to_string)
+                .collect();
+            return Found::nothing(format!(
+                "With {} its images can be enhanced images: a run assumes these usual ranges and says so. They can with {} too; compare them below with the model's own examples.",
+                probe.usual,
+                others.join("; ")
+            ));
+        }
+        [pair] => {
+            let stated = stated.map_or_else(String::new, |stated| {
+                format!(" Stated are {stated}, with which they cannot.")
+            });
+            let conclusion = format!(
+                "With {pair}, and with no other ranges, its images can be enhanced images.{stated}"
+            );
+            return Found::ranges(*pair, conclusion);
+        }
+        [] => {}
+        several => {
+            let list: Vec<String> = several.iter().map(ToString::to_string).collect();
+            let stated = stated.map_or_else(String::new, |pair| {
+                format!(" {pair}, which is stated, is not one of them.")
+            });
+            return Found::nothing(format!(
+                "Its images can be enhanced images with several value ranges: {}.{stated} Compare them below with the model's own examples, and state those that its authors use.",
+                list.join("; ")
+            ));
+        }
+    }
+    let is_hue = probe.pairs.iter().any(|pair| {
+        let seen = pair.verdict();
+        pair.ranges == probe.usual && seen.is_some_and(|seen| seen.example.flaw == Flaw::Hue)
+    });
+    let plausible = swapped.plausible();
+    let pair = match &plausible[..] {
+        [pair] => Some(*pair),
+        several => stated.filter(|pair| several.contains(pair)),
+    };
+    if let Some(pair) = pair.filter(|_| is_hue) {
+        let conclusion =
+            format!("With {pair} and {order} in the output its images can be enhanced images.");
+        let mut found = Found::ranges(pair, conclusion);
+        if stated == Some(pair) {
+            found.lines.clear();
+        }
+        found.lines.push(ProposedLine {
+            line: format!("color_out = \"{}\"", order.to_string().to_lowercase()),
+            reason: "with the other order, its images are blue where the frames are red".to_owned(),
+        });
+        return found;
+    }
+    Found::nothing(
+        "With none of the conventions of the output that is read its images can be enhanced images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
+    )
+}

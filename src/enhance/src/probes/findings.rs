@@ -1,0 +1,104 @@
+//! [`Findings`]: cached results of opening and probing an enhancer.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::usage::{Implausible, Usage};
+use crate::enhancer::Enhancer;
+use crate::sizing::TakenSizes;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::EnhancerName;
+use darkqa_ground::types::manifests::{ConventionLine, ProbeNote, ProbeOutcome};
+
+/// Results of opening an enhancer and trying it on dark frames: the content of its note before the first image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Findings {
+    /// How the model is fed and read.
+    convention: Vec<ConventionLine>,
+    /// Result of the probe; `None` if the model accepts none of its sizes.
+    probe: Option<ProbeNote>,
+    /// Caveats for readers of the results.
+    #[serde(default)]
+    remarks: Vec<String>,
+    /// The sizes that the model takes, in words, if they were found by trial.
+    sizes: Option<String>,
+}
+
+impl Findings {
+    /// Whether a run that treats implausible images like this may go on with them.
+    pub fn allow(&self, implausible: Implausible) -> bool {
+        let probe = self.probe.as_ref();
+        let is_overruled = probe.is_some_and(|probe| probe.outcome == ProbeOutcome::Overruled);
+        implausible != Implausible::Refused || !is_overruled
+    }
+
+    /// A note that begins with them.
+    pub fn usage(&self) -> Usage {
+        let usage = Usage::default();
+        usage.update(|note| {
+            note.convention.clone_from(&self.convention);
+            note.probe.clone_from(&self.probe);
+            note.remarks.clone_from(&self.remarks);
+        });
+        usage
+    }
+
+    /// Repeats the probe's warning.
+    pub fn warn(&self, name: &EnhancerName, path: &Path) {
+        if let Some(sizes) = &self.sizes {
+            tracing::warn!("{}: {sizes}", path.display());
+        }
+        for remark in &self.remarks {
+            tracing::warn!("{name}: {remark}");
+        }
+        match &self.probe {
+            None => warn_of_untried(name),
+            Some(probe) => {
+                if let Some(problem) = &probe.problem {
+                    tracing::warn!("{name}: {problem}");
+                }
+            }
+        }
+    }
+}
+
+/// Warns about a model that takes none of the sizes of the probe.
+pub(super) fn warn_of_untried(name: &EnhancerName) {
+    tracing::warn!(
+        "{name}: it takes none of the small sizes of the probe, so nothing is known of whether its images can be enhanced images"
+    );
+}
+
+impl Enhancer {
+    /// Why its images may be read in a wrong way, if it is used in spite of it; to be called after the probe.
+    pub fn used_anyway(&self) -> Option<String> {
+        let probe = self.usage().note().probe?;
+        let is_overruled = probe.outcome == ProbeOutcome::Overruled;
+        probe.problem.filter(|_| is_overruled)
+    }
+
+    /// The findings so far; to be called after the probe.
+    pub fn findings(&self) -> Findings {
+        let note = self.usage().note();
+        Findings {
+            convention: note.convention,
+            probe: note.probe,
+            remarks: note.remarks,
+            sizes: self.found_sizes().map(TakenSizes::words),
+        }
+    }
+
+    /// The same enhancer as if the probe had found this now, with a note that it goes on with.
+    ///
+    /// # Errors
+    /// If the graph contradicts its own convention, which is a bug.
+    pub fn tried_before(self, findings: &Findings, usage: Usage) -> Result<Self> {
+        let mut enhancer = self.with_usage(usage);
+        enhancer.set_remarks(&findings.remarks);
+        if let Some(probe) = &findings.probe {
+            enhancer.set_probed(probe.clone())?;
+        }
+        Ok(enhancer)
+    }
+}

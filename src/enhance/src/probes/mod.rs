@@ -1,0 +1,16 @@
+//! Probes of a model on dark frames, and judgement of its images.
+
+mod doctor;
+mod findings;
+mod plausible;
+mod probe;
+mod probe_run;
+mod usage;
+
+pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
+pub use findings::Findings;
+pub(super) use plausible::Codes;
+pub use plausible::{DARK, brightness};
+pub use probe::FRAMES;
+pub(super) use probe::RangePair;
+pub use usage::{ImageUse, Implausible, Usage};

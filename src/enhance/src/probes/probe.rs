@@ -1,0 +1,499 @@
+//! The probe: whether a model's images of a few dark frames can be enhanced images, and in which value ranges ([`Probe`]).
+//!
+//! A graph does not state its value ranges. So where they are not stated, each pair of ranges is tried. The verdict on a pair is
+//! that of at least half of the frames.
+
+use std::fmt;
+
+use super::plausible::{Codes, Gravity, Verdict, judge};
+use crate::conventions::{Normalisation, ValueRange, ValueScale};
+use darkqa_ground::types::Flaw;
+
+/// Number of dark frames that a model is tried on: with 6, none of 9 trained models was flagged; with one, 5 % were.
+pub const FRAMES: usize = 6;
+
+/// The range in which a model is fed, and the one in which it is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RangePair {
+    pub(crate) input: ValueScale,
+    pub(crate) output: ValueScale,
+}
+
+impl RangePair {
+    /// The pairs with these ranges; `None` stands for each range in turn.
+    pub(super) fn all(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
+        let of = |stated: Option<ValueRange>| {
+            ValueRange::ALL
+                .into_iter()
+                .filter(move |range| stated.is_none_or(|stated| stated == *range))
+                .map(ValueScale::Range)
+        };
+        of(input)
+            .flat_map(|input| of(output).map(move |output| Self { input, output }))
+            .collect()
+    }
+
+    /// The pairs with an input that has a mean and a deviation; the output is in 0..1, or has them too, unless its range is stated.
+    pub(super) fn normalised(output: Option<ValueRange>) -> Vec<Self> {
+        Normalisation::ALL
+            .into_iter()
+            .flat_map(|normalisation| {
+                let input = ValueScale::Normalised(normalisation);
+                let outputs = match output {
+                    Some(range) => vec![ValueScale::Range(range)],
+                    None => vec![ValueScale::Range(ValueRange::Unit), input],
+                };
+                outputs
+                    .into_iter()
+                    .map(move |output| Self { input, output })
+            })
+            .collect()
+    }
+
+    /// The lines of a sidecar that state it.
+    pub(super) fn lines(self) -> Vec<String> {
+        let side = |scale: ValueScale, keys: [&str; 3]| match scale.mean_and_std() {
+            None => vec![format!("{} = \"{}\"", keys[0], scale.range())],
+            Some([mean, std]) => vec![
+                format!("{} = {mean:?}", keys[1]),
+                format!("{} = {std:?}", keys[2]),
+            ],
+        };
+        let mut lines = side(self.input, ["range_in", "mean", "std"]);
+        lines.extend(side(self.output, ["range_out", "mean_out", "std_out"]));
+        lines
+    }
+
+    /// These lines in a sentence.
+    fn stated(self) -> String {
+        self.lines()
+            .into_iter()
+            .map(|line| format!("`{line}`"))
+            .collect::<Vec<_>>()
+            .join(" and ")
+    }
+}
+
+impl fmt::Display for RangePair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} in and {} out", self.input, self.output)
+    }
+}
+
+/// A model's images of the dark frames, with one pair of ranges.
+#[derive(Debug, Clone)]
+pub(super) struct PairTrial {
+    pub(super) ranges: RangePair,
+    /// Output of the model for each frame.
+    pub(super) made: Vec<Codes>,
+    /// Flaw of each output.
+    pub(super) verdicts: Vec<Option<Verdict>>,
+}
+
+impl PairTrial {
+    pub(super) fn new(ranges: RangePair, dark: &[Codes], made: Vec<Codes>) -> Self {
+        let verdicts = dark.iter().zip(&made).map(|(dark, made)| judge(dark, made));
+        Self {
+            ranges,
+            verdicts: verdicts.collect(),
+            made,
+        }
+    }
+
+    /// Whether no frame has a flaw.
+    fn is_clean(&self) -> bool {
+        self.verdicts.iter().all(Option::is_none)
+    }
+
+    /// The verdict on the model: the most frequent flaw, if at least half of the frames have one.
+    pub(super) fn verdict(&self) -> Option<FlawedFrames> {
+        self.seen().filter(|seen| 2 * seen.flawed >= seen.frames)
+    }
+
+    /// The most frequent flaw, if a frame has one.
+    fn seen(&self) -> Option<FlawedFrames> {
+        let flawed: Vec<Verdict> = self.verdicts.iter().flatten().copied().collect();
+        let half = |count: usize| 2 * count >= self.verdicts.len().max(1);
+        let count = |flaw: Flaw| flawed.iter().filter(|one| one.flaw == flaw).count();
+        // Reversed, because `max_by_key` returns the last of equally frequent flaws and the first is wanted.
+        let example = flawed.iter().rev().max_by_key(|one| count(one.flaw))?;
+        let impossible = flawed
+            .iter()
+            .filter(|one| one.gravity == Gravity::Impossible);
+        Some(FlawedFrames {
+            gravity: if half(impossible.count()) {
+                Gravity::Impossible
+            } else {
+                Gravity::Doubtful
+            },
+            example: *example,
+            flawed: flawed.len(),
+            frames: self.verdicts.len(),
+        })
+    }
+}
+
+/// The verdict on a model with one pair of ranges.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct FlawedFrames {
+    pub(super) gravity: Gravity,
+    /// The first image with the most frequent flaw.
+    pub(super) example: Verdict,
+    pub(super) flawed: usize,
+    pub(super) frames: usize,
+}
+
+impl fmt::Display for FlawedFrames {
+    /// The finding as it follows the file's name.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            example,
+            flawed,
+            frames,
+            ..
+        } = self;
+        write!(
+            f,
+            "on {flawed} of {frames} dark frames its images {example}"
+        )
+    }
+}
+
+/// Ranges that the user, a preset or the element types state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ranges {
+    /// Both.
+    Stated,
+    /// Range of either the input or the output.
+    OneStated,
+    /// None.
+    Open,
+}
+
+/// All that was tried.
+#[derive(Debug, Clone)]
+pub(super) struct Probe {
+    pub(super) ranges: Ranges,
+    /// The ranges that are used if the probe does not decide.
+    pub(super) usual: RangePair,
+    pub(super) pairs: Vec<PairTrial>,
+}
+
+/// Conclusion of a probe.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Conclusion {
+    /// The ranges are stated, and the images can be enhanced images.
+    Plausible,
+    /// The images can be enhanced images with the usual ranges, which nothing states.
+    Assumed,
+    /// The ranges are stated, and the images are odd, but some models do that.
+    Doubtful(FlawedFrames),
+    /// The ranges are stated or all were tried, and the images cannot be enhanced images.
+    Implausible(FlawedFrames),
+    /// Only these ranges give plausible images, and they are not the usual ones.
+    Other(RangePair, FlawedFrames),
+    /// Several pairs of ranges give plausible images, but not the usual ones.
+    Several(Vec<RangePair>, FlawedFrames),
+}
+
+impl Probe {
+    /// The pairs whose images are plausible.
+    pub(super) fn plausible(&self) -> Vec<RangePair> {
+        self.pairs
+            .iter()
+            .filter(|pair| pair.verdict().is_none())
+            .map(|pair| pair.ranges)
+            .collect()
+    }
+
+    /// Draws the conclusion.
+    pub(super) fn conclusion(&self) -> Conclusion {
+        let usual = self.pairs.iter().find(|pair| pair.ranges == self.usual);
+        let advised = self.advised();
+        let seen = usual.and_then(|usual| {
+            // With a flaw on some frames, other than dim images, it gives way to a pair without any.
+            let mixed = usual.seen().filter(|seen| {
+                let is_open = self.ranges != Ranges::Stated && !advised.is_empty();
+                is_open && seen.example.flaw != Flaw::Unlit
+            });
+            usual.verdict().or(mixed)
+        });
+        match (self.ranges, seen, advised.as_slice()) {
+            (Ranges::Stated, None, _) => Conclusion::Plausible,
+            (_, None, _) => Conclusion::Assumed,
+            (Ranges::Stated, Some(seen), _) if seen.gravity == Gravity::Doubtful => {
+                Conclusion::Doubtful(seen)
+            }
+            (_, Some(seen), []) | (Ranges::Stated, Some(seen), _) => Conclusion::Implausible(seen),
+            (_, Some(seen), [other]) => Conclusion::Other(*other, seen),
+            (_, Some(seen), several) => Conclusion::Several(several.to_vec(), seen),
+        }
+    }
+
+    /// The pairs that may be advised in place of the usual one: those whose images of all frames are plausible.
+    fn advised(&self) -> Vec<RangePair> {
+        self.pairs
+            .iter()
+            .filter(|pair| pair.ranges != self.usual && pair.is_clean())
+            .map(|pair| pair.ranges)
+            .collect()
+    }
+
+    /// Leaves out pairs that are plausible on most frames, but not on all.
+    pub(super) fn leave_out_mixed(&mut self) {
+        self.pairs
+            .retain(|pair| pair.is_clean() || pair.verdict().is_some());
+    }
+
+    /// Whether the images in the usual ranges are merely not brighter.
+    fn is_dim(&self, seen: &FlawedFrames) -> bool {
+        self.ranges != Ranges::Stated
+            && seen.example.flaw == Flaw::Unlit
+            && seen.gravity == Gravity::Doubtful
+    }
+
+    /// The first plausible pair, else the usual one.
+    pub(super) fn best(&self) -> RangePair {
+        self.plausible().first().copied().unwrap_or(self.usual)
+    }
+
+    /// The finding and the sidecar lines that would repair it, to follow the file's name; `None` if the images are plausible.
+    pub(super) fn problem(&self) -> Option<String> {
+        let usual = self.usual.stated();
+        let dim = |seen: &FlawedFrames| {
+            if self.is_dim(seen) {
+                format!(
+                    "If it is meant to be so dim, state the usual ranges in MODEL.onnx.toml beside it: {usual}. "
+                )
+            } else {
+                String::new()
+            }
+        };
+        Some(match self.conclusion() {
+            Conclusion::Plausible | Conclusion::Assumed => return None,
+            Conclusion::Doubtful(seen) => format!("{seen}"),
+            Conclusion::Implausible(seen) => {
+                format!("{seen}. {}", self.remedy(&seen))
+            }
+            Conclusion::Other(pair, seen) => format!(
+                "{seen}. {}With {pair} they can be enhanced images; if its authors use these values, state in MODEL.onnx.toml beside it: {}",
+                dim(&seen),
+                pair.stated()
+            ),
+            Conclusion::Several(pairs, seen) => {
+                let list: Vec<String> = pairs.iter().map(ToString::to_string).collect();
+                format!(
+                    "{seen}. {}With other value ranges they can be enhanced images ({}); state those that its authors use in MODEL.onnx.toml beside it, as {}",
+                    dim(&seen),
+                    list.join("; "),
+                    pairs[0].stated()
+                )
+            }
+        })
+    }
+
+    /// Remedy for a flaw that no other range explains.
+    fn remedy(&self, seen: &FlawedFrames) -> String {
+        match (seen.example.flaw, self.ranges) {
+            (Flaw::Unlit, Ranges::Open | Ranges::OneStated) => format!(
+                "If it is meant to be so dim, state its ranges in MODEL.onnx.toml beside it: {}",
+                self.usual.stated()
+            ),
+            (Flaw::White | Flaw::Haze, Ranges::Open | Ranges::OneStated) => {
+                "Its values are none of 0..1, 0..255 and -1..1, with and without the mean and std of ImageNet; take those of its authors' code, `range_in`, `mean`, `std` and `range_out`, into MODEL.onnx.toml beside it".to_owned()
+            }
+            (flaw, ranges) => remedy(flaw, ranges).to_owned(),
+        }
+    }
+}
+
+/// Remedy for a flaw that no other range explains.
+fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
+    match (flaw, ranges) {
+        (Flaw::Hue, _) => {
+            "If its output has blue first, state in MODEL.onnx.toml beside it: `color_out = \"bgr\"` (or \"rgb\", if that is stated)"
+        }
+        (Flaw::Inverted, _) => {
+            "Perhaps another output is the image, or its authors subtract it from white: `image = \"1 - output\"` in MODEL.onnx.toml beside it"
+        }
+        (Flaw::Shuffled, _) => {
+            "Perhaps another output is the image, or the dimensions have another order: `layout_in`, `layout_out` and `output` in MODEL.onnx.toml beside it"
+        }
+        (Flaw::Nan, Ranges::Open) => "Check its weights and its divisions by zero",
+        (Flaw::Nan, _) => {
+            "Check `range_in` in its sidecar: values that are too large can do that; else its weights and its divisions by zero"
+        }
+        (_, Ranges::Stated) => {
+            "Check `range_in`, `range_out` and `output` in its sidecar, and the preset"
+        }
+        (_, Ranges::OneStated) => {
+            "Beside the one range that its sidecar states, or its element type, no other explains that: without a line in the sidecar all are tried"
+        }
+        (_, Ranges::Open) => {
+            "No value range explains that; perhaps another output is the image, or the export has lost its weights"
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UNIT: RangePair = RangePair {
+        input: ValueScale::Range(ValueRange::Unit),
+        output: ValueScale::Range(ValueRange::Unit),
+    };
+    const BYTES: RangePair = RangePair {
+        input: ValueScale::Range(ValueRange::Bytes),
+        output: ValueScale::Range(ValueRange::Bytes),
+    };
+
+    fn pair(ranges: RangePair, flaws: &[Option<(Flaw, Gravity)>]) -> PairTrial {
+        let verdict = |(flaw, gravity)| Verdict {
+            flaw,
+            gravity,
+            figure: 0.0,
+        };
+        PairTrial {
+            ranges,
+            made: Vec::new(),
+            verdicts: flaws.iter().map(|flaw| flaw.map(verdict)).collect(),
+        }
+    }
+
+    fn probe(ranges: Ranges, pairs: Vec<PairTrial>) -> Probe {
+        Probe {
+            ranges,
+            usual: UNIT,
+            pairs,
+        }
+    }
+
+    const FLAT: Option<(Flaw, Gravity)> = Some((Flaw::Flat, Gravity::Impossible));
+    const WHITE: Option<(Flaw, Gravity)> = Some((Flaw::White, Gravity::Doubtful));
+    const UNLIT: Option<(Flaw, Gravity)> = Some((Flaw::Unlit, Gravity::Doubtful));
+
+    #[test]
+    fn usual_ranges_are_assumed_if_they_are_plausible() {
+        for bytes in [None, FLAT] {
+            let usual = probe(
+                Ranges::Open,
+                vec![pair(UNIT, &[None; 6]), pair(BYTES, &[bytes; 6])],
+            );
+            assert_eq!(usual.conclusion(), Conclusion::Assumed);
+            assert_eq!(usual.problem(), None);
+        }
+    }
+
+    #[test]
+    fn another_pair_is_advised_if_the_usual_one_is_implausible() {
+        let other = probe(
+            Ranges::Open,
+            vec![pair(UNIT, &[FLAT; 6]), pair(BYTES, &[None; 6])],
+        );
+        assert!(matches!(other.conclusion(), Conclusion::Other(BYTES, _)));
+        let problem = other.problem().unwrap();
+        assert!(
+            problem.contains("on 6 of 6 dark frames its images are flat"),
+            "{problem}"
+        );
+        assert!(
+            problem.contains("`range_in = \"0..255\"` and `range_out = \"0..255\"`"),
+            "{problem}"
+        );
+    }
+
+    #[test]
+    fn usual_ranges_with_a_flaw_give_way_to_a_pair_without() {
+        let mut flaws = [None; 6];
+        flaws[2] = WHITE;
+        let one_white = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
+        let other = probe(Ranges::Open, one_white.clone()).conclusion();
+        assert!(matches!(other, Conclusion::Other(BYTES, _)), "{other:?}");
+        let alone = probe(Ranges::Open, one_white[..1].to_vec());
+        assert_eq!(alone.conclusion(), Conclusion::Assumed);
+        flaws[2] = UNLIT;
+        let dim = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
+        assert_eq!(probe(Ranges::Open, dim).conclusion(), Conclusion::Assumed);
+    }
+
+    #[test]
+    fn a_pair_with_a_flaw_on_one_frame_is_not_advised() {
+        let mut flaws = [None; 6];
+        flaws[2] = WHITE;
+        let dim = probe(
+            Ranges::Open,
+            vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &flaws)],
+        );
+        let problem = dim.problem().unwrap();
+        assert!(!problem.contains("0..255"), "{problem}");
+        assert!(problem.contains("`range_in = \"0..1\"`"), "{problem}");
+    }
+
+    #[test]
+    fn the_usual_ranges_are_named_first_if_the_images_are_dim() {
+        let dim = probe(
+            Ranges::Open,
+            vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &[None; 6])],
+        );
+        let problem = dim.problem().unwrap();
+        let place = |words: &str| problem.find(words).unwrap();
+        assert!(place("range_in = \"0..1\"") < place("range_in = \"0..255\""));
+    }
+
+    #[test]
+    fn a_mean_and_a_deviation_are_lines_of_a_sidecar() {
+        let pairs = RangePair::normalised(None);
+        assert_eq!(pairs.len(), 4);
+        assert_eq!(
+            pairs[0].lines(),
+            [
+                "mean = [0.485, 0.456, 0.406]",
+                "std = [0.229, 0.224, 0.225]",
+                "range_out = \"0..1\""
+            ]
+        );
+        assert_eq!(pairs[3].lines()[2], "mean_out = [0.5, 0.5, 0.5]");
+    }
+
+    #[test]
+    fn no_plausible_pair_names_the_flaw_of_the_usual_one() {
+        let none = probe(
+            Ranges::Open,
+            vec![pair(UNIT, &[WHITE; 6]), pair(BYTES, &[FLAT; 6])],
+        );
+        let Conclusion::Implausible(seen) = none.conclusion() else {
+            panic!("{:?}", none.conclusion());
+        };
+        assert_eq!(seen.example.flaw, Flaw::White);
+    }
+
+    #[test]
+    fn half_of_the_frames_decide() {
+        let flawed = |count: usize| {
+            let flaws: Vec<_> = (0..6).map(|i| FLAT.filter(|_| i < count)).collect();
+            probe(Ranges::Stated, vec![pair(UNIT, &flaws)]).conclusion()
+        };
+        assert_eq!(flawed(2), Conclusion::Plausible);
+        assert!(matches!(flawed(3), Conclusion::Implausible(_)));
+    }
+
+    #[test]
+    fn stated_ranges_may_be_doubtful_but_not_impossible() {
+        let doubtful = probe(Ranges::Stated, vec![pair(UNIT, &[WHITE; 6])]);
+        assert!(matches!(doubtful.conclusion(), Conclusion::Doubtful(_)));
+        let mixed = probe(
+            Ranges::Stated,
+            vec![pair(UNIT, &[WHITE, WHITE, WHITE, FLAT, FLAT, FLAT])],
+        );
+        assert!(matches!(mixed.conclusion(), Conclusion::Implausible(_)));
+    }
+
+    #[test]
+    fn only_ranges_that_are_not_stated_are_tried() {
+        assert_eq!(RangePair::all(None, None).len(), 9);
+        assert_eq!(RangePair::all(Some(ValueRange::Signed), None).len(), 3);
+        let stated = RangePair::all(Some(ValueRange::Unit), Some(ValueRange::Unit));
+        assert_eq!(stated, [UNIT]);
+    }
+}

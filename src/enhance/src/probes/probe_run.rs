@@ -1,0 +1,259 @@
+//! Running the probe of a model on dark frames: [`Enhancer::probe`].
+
+use super::findings::warn_of_untried;
+use super::plausible::Codes;
+use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
+use super::usage::{ImageUse, Implausible, Seen};
+use crate::conventions::sidecar::{self, ModelSidecar};
+use crate::conventions::{Rounding, ValueRange};
+use crate::enhancer::Enhancer;
+use crate::graphs::{Graph, RunResult};
+use crate::outputs::in_expression;
+use crate::planes::Planes;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
+use darkqa_ground::types::{EnhancerName, Rgb};
+
+/// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
+const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
+
+/// Results of a model on dark frames.
+pub(super) struct Trials<const N: usize> {
+    /// The frames as they were fed.
+    pub(super) frames: Vec<Rgb>,
+    /// Results by convention.
+    pub(super) probes: [Probe; N],
+}
+
+impl Enhancer {
+    /// Tries the model on dark frames, and decides in which value ranges it is fed and read where they are not stated.
+    ///
+    /// # Errors
+    /// If its images cannot be enhanced images, or several ranges would do, with the lines of a sidecar that would repair it; not if
+    /// implausible images are used.
+    pub fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
+        let mut trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
+        if let (None, Some(frame)) = (&trials, dark.first()) {
+            // It may take the size of a frame, or show which sizes it takes.
+            self.enhance(frame)?;
+            trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
+        }
+        let Some(Trials {
+            probes: [probe], ..
+        }) = trials
+        else {
+            warn_of_untried(self.name());
+            return Ok(());
+        };
+        let outcome = match probe.conclusion() {
+            Conclusion::Plausible | Conclusion::Assumed => ProbeOutcome::Plausible,
+            Conclusion::Doubtful(_) => ProbeOutcome::Doubtful,
+            _ => ProbeOutcome::Overruled,
+        };
+        let problem = self.problem(&probe, dark)?;
+        match (&problem, outcome, implausible) {
+            (Some(problem), ProbeOutcome::Overruled, Implausible::Refused) => {
+                return Err(self.fault(format!(
+                    "{problem}. `darkqa-eval enhance doctor {} FRAMES… --out DIR` draws what it makes with each convention; --allow bad-enhancer uses it as it is",
+                    self.path().display()
+                )));
+            }
+            (Some(problem), ..) => tracing::warn!("{}: {problem}", self.name()),
+            (None, ..) => {}
+        }
+        if problem.is_none() && self.may_be_residual(probe.usual)? {
+            let name = in_expression(&self.graph().signature.outputs[0].port.name);
+            self.remark(&format!(
+                "its output of a white image is nearly black, as if it had to be added to the input; if its authors add it, state in MODEL.onnx.toml beside it: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` draws both"
+            ));
+        }
+        self.warn_of_remarks();
+        if probe.conclusion() == Conclusion::Assumed {
+            warn_of_assumed(self.name(), probe.usual);
+        }
+        let note = ProbeNote {
+            frames: dark.len(),
+            plausible: probe.plausible().iter().map(ToString::to_string).collect(),
+            problem,
+            outcome,
+        };
+        self.set_probed(note)
+    }
+
+    /// Flaw of a probe's images, with a remedy; `None` if they are plausible. If lines of the sidecar are wrong, the right ones are found
+    /// by trial.
+    fn problem(&self, probe: &Probe, dark: &[Rgb]) -> Result<Option<String>> {
+        let problem = match probe.conclusion() {
+            // The convention of a preset's authors is not contradicted.
+            Conclusion::Implausible(seen) | Conclusion::Doubtful(seen)
+                if !self.follows_preset() =>
+            {
+                let better = self.better_lines(dark)?;
+                better.map(|better| format!("{seen}. {better}"))
+            }
+            _ => None,
+        };
+        let problem = problem.or_else(|| probe.problem());
+        Ok(problem.map(|problem| sidecar::named(&problem, self.path())))
+    }
+
+    /// Enhances a frame in a condition, and looks at the result; with what its note got from it.
+    ///
+    /// # Errors
+    /// As by [`Self::enhance`], and if most of its images of dark frames so far cannot be enhanced images.
+    pub fn enhance_noted(
+        &mut self,
+        image: &Rgb,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<(Rgb, ImageUse)> {
+        let before = self.sizes().clone();
+        let enhanced = self.enhance(image)?;
+        let used = ImageUse {
+            // Looked at in any case: another run may read the image from a store and look for such images.
+            seen: Seen::on([image, &enhanced]),
+            sizes: self.sizes().since(&before),
+        };
+        self.judge(&used.seen, place, implausible)?;
+        Ok((enhanced, used))
+    }
+
+    /// Notes an image of a frame in a condition that it made in another run or process, as if it was made now.
+    ///
+    /// # Errors
+    /// If most of its images of dark frames so far cannot be enhanced images.
+    pub fn note_stored(
+        &self,
+        used: &ImageUse,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        used.note_in(&self.usage(), self.path(), place, implausible)
+    }
+
+    fn judge(
+        &self,
+        seen: &Seen,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        seen.judge_in(&self.usage(), self.path(), place, implausible)
+    }
+
+    /// Runs the model on dark frames by each of these conventions, which differ in how the output is read, and with each pair of ranges
+    /// that is not stated. The model runs once for each frame and input range. Returns `None` if it fails at all sizes that are tried.
+    pub(super) fn trials<const N: usize>(
+        &self,
+        dark: &[Rgb],
+        conventions: [&ModelSidecar; N],
+        [input, output]: [Option<ValueRange>; 2],
+    ) -> Result<Option<Trials<N>>> {
+        let usual = self.ranges();
+        let ranges = match (input, output) {
+            (Some(_), Some(_)) => Ranges::Stated,
+            (None, None) => Ranges::Open,
+            _ => Ranges::OneStated,
+        };
+        'sizes: for size in SIZES {
+            let frames: Vec<Rgb> = dark
+                .iter()
+                .map(|frame| self.probe_image(frame, size))
+                .collect::<Result<_>>()?;
+            let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
+            let mut pairs = [(); N].map(|()| Vec::new());
+            for fed_alike in RangePair::all(input, output).chunk_by(|a, b| a.input == b.input) {
+                let graphs: Vec<Graph> = conventions
+                    .iter()
+                    .flat_map(|convention| {
+                        fed_alike
+                            .iter()
+                            .map(|ranges| self.read_by(convention, *ranges))
+                    })
+                    .collect::<Result<_>>()?;
+                // A failure in one range does not predict failure in the others at this size.
+                let Some(made) = made(&graphs, &frames)? else {
+                    continue 'sizes;
+                };
+                let mut made = made.into_iter();
+                for pairs in &mut pairs {
+                    let trials = fed_alike.iter().zip(&mut made);
+                    pairs.extend(trials.map(|(ranges, made)| PairTrial::new(*ranges, &seen, made)));
+                }
+            }
+            if !pairs[0].iter().any(|pair| pair.verdict().is_none())
+                && self.may_be_normalised(input)
+            {
+                for pair in RangePair::normalised(output) {
+                    let graphs: Vec<Graph> = conventions
+                        .iter()
+                        .map(|convention| self.read_by(convention, pair))
+                        .collect::<Result<_>>()?;
+                    // The sizes are those of the plain ranges, so what fails here is no reason to try others.
+                    let made = made(&graphs, &frames)?.unwrap_or_default();
+                    for (pairs, made) in pairs.iter_mut().zip(made) {
+                        pairs.push(PairTrial::new(pair, &seen, made));
+                    }
+                }
+            }
+            let probes = pairs.map(|pairs| Probe {
+                ranges,
+                usual,
+                pairs,
+            });
+            return Ok(Some(Trials { frames, probes }));
+        }
+        Ok(None)
+    }
+
+    /// The model, fed and read by a convention with these ranges.
+    fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
+        let convention = convention.clone().fed(ranges.input).read(ranges.output);
+        let graph = self.graph().with_convention(convention);
+        graph.map_err(|problem| self.fault(problem))
+    }
+
+    /// A frame in a size of the probe, or in the size that the graph fixes.
+    pub(super) fn probe_image(&self, frame: &Rgb, [longer, shorter]: [usize; 2]) -> Result<Rgb> {
+        let size = if frame.height() > frame.width() {
+            [longer, shorter]
+        } else {
+            [shorter, longer]
+        };
+        let [height, width] = self.probe_size(size);
+        let planes = Planes::from_rgb(frame).resized(height, width);
+        let planes = planes.map_err(|problem| self.fault(problem))?;
+        planes
+            .to_rgb(Rounding::Round)
+            .ok_or_else(|| self.fault("a frame of the probe has no pixel"))
+    }
+}
+
+/// Says that nothing states the value ranges.
+fn warn_of_assumed(name: &EnhancerName, usual: RangePair) {
+    tracing::warn!(
+        "{name}: {usual} assumed, because neither sidecar nor preset states its value ranges; its images of dark frames are plausible with them"
+    );
+}
+
+/// Outputs of a model for each frame, read by each of these graphs, which share the input; `None` if it fails on a frame.
+pub(super) fn made(graphs: &[Graph], frames: &[Rgb]) -> Result<Option<Vec<Vec<Codes>>>> {
+    let mut all = vec![Vec::with_capacity(frames.len()); graphs.len()];
+    let Some(graph) = graphs.first() else {
+        return Ok(Some(all));
+    };
+    for frame in frames {
+        graph.restart_clock();
+        let readings = match graph.readings(frame, graphs)? {
+            RunResult::Output(readings) => readings,
+            RunResult::Failed(_) => return Ok(None),
+            // The rules about plausible images name it.
+            RunResult::Unusable(_) => {
+                vec![Codes::unusable([frame.height(), frame.width()]); graphs.len()]
+            }
+        };
+        for (made, codes) in all.iter_mut().zip(readings) {
+            made.push(codes);
+        }
+    }
+    Ok(Some(all))
+}

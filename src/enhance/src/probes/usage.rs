@@ -1,0 +1,307 @@
+//! Counters of an enhancer in a run, shared by all threads that use it ([`Usage`]), and the reaction to implausible images
+//! ([`Implausible`]).
+
+use std::collections::{BTreeMap, HashSet};
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+
+use super::plausible::{Codes, DARK, Gravity, Verdict, brightness, judge};
+use darkqa_ground::error::{Error, Result};
+use darkqa_ground::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
+use darkqa_ground::types::{Digest, Rgb, SizeLog};
+
+/// Number of dark images from which on a verdict on the enhancer is possible; chosen as the number of frames of the probe.
+const ENOUGH: usize = super::probe::FRAMES;
+/// Number of the twin that stands for images that were read from a store.
+const STORED: usize = usize::MAX;
+
+/// Reaction to a model with implausible images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Implausible {
+    /// It is refused.
+    #[default]
+    Refused,
+    /// It is used (`--allow bad-enhancer`).
+    Used,
+    /// Its images are not looked at, because they are those of a run that is there.
+    NotLookedFor,
+}
+
+/// Finding about one enhanced image.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub(super) enum Seen {
+    /// It was not looked at, because the degraded image is not dark: good models fail the rules on those.
+    #[default]
+    Bright,
+    /// The degraded image is dark. Holds the flaw of the enhanced one, if it has one.
+    Dark(Option<Verdict>),
+}
+
+impl Seen {
+    /// Compares the enhanced image with the degraded one.
+    pub(super) fn on([degraded, made]: [&Rgb; 2]) -> Self {
+        if brightness(degraded) > DARK {
+            Self::Bright
+        } else {
+            Self::Dark(judge(&Codes::small(degraded), &Codes::small(made)))
+        }
+    }
+}
+
+/// Contribution of one image to the enhancer's note; stored with the image.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct ImageUse {
+    pub(super) seen: Seen,
+    /// How the size of the image was handled.
+    pub(super) sizes: SizeLog,
+}
+
+impl ImageUse {
+    /// Notes an image of a frame in a condition that was made in another run or process, as if the enhancer in this file made it now.
+    ///
+    /// # Errors
+    /// If most of its images of dark frames so far cannot be enhanced images.
+    pub fn note_in(
+        &self,
+        usage: &Usage,
+        model: &Path,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        usage.add_sizes_of_stored(&self.sizes);
+        self.seen.judge_in(usage, model, place, implausible)
+    }
+}
+
+impl ImageUse {
+    /// The use of an image that was enhanced elsewhere, made of a degraded one.
+    #[must_use]
+    pub fn made_elsewhere([degraded, made]: [&Rgb; 2]) -> Self {
+        Self {
+            seen: Seen::on([degraded, made]),
+            sizes: SizeLog::default(),
+        }
+    }
+
+    /// Notes an image of a frame in a condition that was enhanced elsewhere.
+    ///
+    /// # Errors
+    /// If most images of dark frames so far cannot be enhanced images; names the folder.
+    pub fn note_made_elsewhere(
+        &self,
+        usage: &Usage,
+        folder: &Path,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        let judged = usage.judge(&self.seen, place, implausible);
+        judged.map_err(|problem| {
+            let remedy = "check that each has the name of its own dark image; --allow bad-enhancer uses them as they are";
+            Error::data(folder.display(), format_args!("{problem}; {remedy}"))
+        })
+    }
+}
+
+impl Seen {
+    /// Counts the finding about a frame's image in a condition, unless images are not checked. The model is named by its file.
+    ///
+    /// # Errors
+    /// If most images of dark frames so far cannot be enhanced images.
+    pub(super) fn judge_in(
+        &self,
+        usage: &Usage,
+        model: &Path,
+        place: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<()> {
+        let judged = usage.judge(self, place, implausible);
+        judged.map_err(|problem| Error::EnhancerEnded {
+            path: model.to_owned(),
+            problem: format!(
+                "{problem}. `darkqa-eval enhance doctor MODEL FRAMES… --out DIR` draws what it makes with each convention; --allow bad-enhancer uses it as it is"
+            ),
+        })
+    }
+}
+
+/// A handle to the note of an enhancer, which grows while it is used.
+#[derive(Debug, Clone, Default)]
+pub struct Usage(Arc<Mutex<UsageState>>);
+
+#[derive(Debug, Default)]
+struct UsageState {
+    note: EnhancerNote,
+    /// Number of images that cannot be enhanced images.
+    impossible: usize,
+    /// The digests of the frames and conditions whose images were looked at.
+    judged: HashSet<Digest>,
+    /// Size adaptations by twin.
+    sizes: BTreeMap<usize, SizeLog>,
+}
+
+impl Usage {
+    /// The handle of images that were enhanced elsewhere.
+    #[must_use]
+    pub fn made_elsewhere() -> Self {
+        let usage = Self::default();
+        usage.update(|note| {
+            note.convention.push(ConventionLine {
+                key: ELSEWHERE.to_owned(),
+                value: "not by this program".to_owned(),
+                source: "--enhanced".to_owned(),
+            });
+        });
+        usage
+    }
+
+    /// The note as it is now.
+    pub fn note(&self) -> EnhancerNote {
+        self.with(|state| state.note.clone())
+    }
+
+    /// Notes what a twin did so far because of sizes.
+    pub(crate) fn set_sizes(&self, twin: usize, log: &SizeLog) {
+        self.change_sizes(twin, |sizes| sizes.clone_from(log));
+    }
+
+    fn change_sizes(&self, twin: usize, change: impl FnOnce(&mut SizeLog)) {
+        self.with(|state| {
+            change(state.sizes.entry(twin).or_default());
+            let mut all = SizeLog::default();
+            state.sizes.values().for_each(|log| all.add(log));
+            state.note.sizes = all.summary();
+            state.note.resized = all.resized + all.reduced > 0;
+            state.note.size_counts = all;
+        });
+    }
+
+    /// Adds the size adaptations of an image that was made earlier and is read now.
+    pub(super) fn add_sizes_of_stored(&self, log: &SizeLog) {
+        self.change_sizes(STORED, |sizes| sizes.add(log));
+    }
+
+    /// Resets the size adaptations of stored images.
+    pub(crate) fn count_stored_anew(&self) {
+        self.set_sizes(STORED, &SizeLog::default());
+    }
+
+    /// Changes the note.
+    pub(crate) fn update(&self, change: impl FnOnce(&mut EnhancerNote)) {
+        self.with(|state| change(&mut state.note));
+    }
+
+    /// Counts the finding about a frame's image in a condition; an image that is made again counts once.
+    ///
+    /// # Errors
+    /// The finding, if more than half of at least six images cannot be enhanced images, unless such images are used.
+    pub(super) fn judge(
+        &self,
+        seen: &Seen,
+        [frame, condition]: [&dyn ToString; 2],
+        implausible: Implausible,
+    ) -> Result<(), String> {
+        let &Seen::Dark(verdict) = seen else {
+            return Ok(());
+        };
+        if implausible == Implausible::NotLookedFor {
+            return Ok(());
+        }
+        let place = [frame, condition].map(ToString::to_string);
+        let key = Digest::from_parts(place.iter().map(String::as_bytes));
+        if !self.with(|state| state.judged.insert(key)) {
+            return Ok(());
+        }
+        let [frame, condition] = place;
+        let flawed = verdict.map(|verdict| FlawedImage {
+            frame,
+            condition,
+            flaw: verdict.flaw,
+        });
+        self.with(|state| {
+            state.note.judged.count(flawed);
+            let impossible = verdict.filter(|verdict| verdict.gravity == Gravity::Impossible);
+            state.impossible += usize::from(impossible.is_some());
+            let judged = state.note.judged.images;
+            match (impossible, implausible) {
+                (Some(example), Implausible::Refused)
+                    if judged >= ENOUGH && 2 * state.impossible > judged =>
+                {
+                    Err(format!(
+                        "{} of its {judged} images of dark frames cannot be enhanced images; they {example}",
+                        state.impossible
+                    ))
+                }
+                _ => Ok(()),
+            }
+        })
+    }
+
+    fn with<T>(&self, use_state: impl FnOnce(&mut UsageState) -> T) -> T {
+        use_state(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image of squares of different light, `gain` times as bright.
+    fn squares(gain: f32) -> Rgb {
+        let samples = (0..96 * 96).flat_map(|place| {
+            let light = (place / 12 % 8 * 5 + place / 1152 * 3) as f32;
+            [gain * light; 3].map(|code| code as u8)
+        });
+        Rgb::new(96, 96, samples.collect()).unwrap()
+    }
+
+    fn judged(usage: &Usage, frame: usize, made: &Rgb, how: Implausible) -> Result<(), String> {
+        usage.judge(&Seen::on([&squares(1.0), made]), [&frame, &"L3+ev+m"], how)
+    }
+
+    #[test]
+    fn an_enhancer_ends_when_most_of_its_images_are_impossible() {
+        let usage = Usage::default();
+        let (good, flat) = (squares(3.0), Rgb::black(96, 96));
+        for frame in 0..3 {
+            judged(&usage, frame, &good, Implausible::Refused).unwrap();
+        }
+        for frame in 3..6 {
+            judged(&usage, frame, &flat, Implausible::Refused).unwrap();
+        }
+        let problem = judged(&usage, 6, &flat, Implausible::Refused).unwrap_err();
+        assert!(problem.starts_with("4 of its 7 images"), "{problem}");
+        judged(&usage, 7, &flat, Implausible::Used).unwrap();
+        assert_eq!(usage.note().judged.flaws(), 5);
+    }
+
+    #[test]
+    fn an_image_that_is_made_again_counts_once() {
+        let usage = Usage::default();
+        let flat = Rgb::black(96, 96);
+        for frame in [0, 1, 0, 1, 1] {
+            judged(&usage, frame, &flat, Implausible::Used).unwrap();
+        }
+        let again = Seen::on([&squares(1.0), &flat]);
+        usage
+            .judge(&again, [&0, &"L4+ev+m"], Implausible::Used)
+            .unwrap();
+        let judged = usage.note().judged;
+        assert_eq!((judged.images, judged.flaws()), (3, 3));
+        assert_eq!(judged.examples.len(), 3);
+    }
+
+    #[test]
+    fn bright_frames_are_not_judged() {
+        let usage = Usage::default();
+        let bright = squares(6.0);
+        let made = Rgb::black(96, 96);
+        let seen = Seen::on([&bright, &made]);
+        assert_eq!(seen, Seen::Bright);
+        usage
+            .judge(&seen, [&"frame", &"L0"], Implausible::Refused)
+            .unwrap();
+        assert_eq!(usage.note().judged.images, 0);
+    }
+}

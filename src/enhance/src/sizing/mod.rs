@@ -1,0 +1,15 @@
+//! Sizes of images that a model takes: whole, padded, in tiles, or found by trial.
+
+pub(super) mod reach;
+mod size_plan;
+mod size_search;
+mod sizes;
+mod texture;
+mod tiles;
+
+pub(super) use size_plan::{MAX_WHOLE, NoPlan, SeamRule, SizePlan, SizeRule, global, seams_differ};
+pub(super) use size_search::{MULTIPLES, SizeSearch, TakenSizes, not_found};
+pub(super) use sizes::{count_image, count_planned};
+pub(super) use texture::{CODES, texture};
+pub use tiles::Tiling;
+pub(super) use tiles::{TileWindow, TiledImage};

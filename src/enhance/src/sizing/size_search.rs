@@ -1,0 +1,180 @@
+//! Search by trial for the sizes that a model takes, if it fails at the size of an image: [`SizeSearch`].
+
+use super::texture::{CODES, texture};
+use super::tiles::TileWindow;
+use crate::failure::{RunFailure, by};
+use crate::graphs::{Graph, RunResult};
+use darkqa_ground::error::Result;
+
+/// Multiples of sides that are tried, in this order.
+pub(crate) const MULTIPLES: [usize; 12] = [1, 4, 8, 12, 16, 20, 24, 32, 48, 64, 96, 128];
+
+/// Least side of a trial image, in pixels; chosen: enough for networks that halve the image five times.
+const LEAST_SIDE: usize = 64;
+
+/// Sizes that a model takes, found by trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum TakenSizes {
+    /// Sides of multiples of this number, above 1.
+    Multiple(usize),
+    /// One height and width alone, frozen by tracing.
+    Traced([usize; 2]),
+}
+
+impl TakenSizes {
+    /// The finding, with the sidecar line that states it.
+    pub(crate) fn words(self) -> String {
+        match self {
+            Self::Multiple(multiple) => format!(
+                "by trial it takes images whose sides are multiples of {multiple}, to which others are filled; state it in MODEL.onnx.toml beside it: `multiple = {multiple}`"
+            ),
+            Self::Traced(size) => format!(
+                "its graph was traced for {} and takes no other size, so other images are filled or cut; state it in MODEL.onnx.toml beside it: `fixed = [{}, {}]`, or export it again without int(x.shape[..]) in its code",
+                by(size),
+                size[1],
+                size[0]
+            ),
+        }
+    }
+}
+
+/// The search, which is made once for a model.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SizeSearch {
+    /// Sizes that may be frozen into the graph.
+    traced: Vec<[usize; 2]>,
+    state: SearchState,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum SearchState {
+    /// The search has not been made yet.
+    #[default]
+    Open,
+    /// It found nothing, or that the model takes any size of that order.
+    Nothing,
+    Found(TakenSizes),
+}
+
+impl SizeSearch {
+    /// A search that also tries these heights and widths.
+    pub(crate) fn new(traced: Vec<[usize; 2]>) -> Self {
+        Self {
+            traced,
+            state: SearchState::Open,
+        }
+    }
+
+    /// Result of the search; `None` before it was made or if it found nothing.
+    pub(crate) fn found(&self) -> Option<TakenSizes> {
+        match self.state {
+            SearchState::Found(found) => Some(found),
+            SearchState::Open | SearchState::Nothing => None,
+        }
+    }
+
+    /// Searches at the first call, and returns the result.
+    pub(crate) fn run(&mut self, graph: &Graph) -> Result<Option<TakenSizes>> {
+        if self.state == SearchState::Open {
+            let found = match multiple(graph)? {
+                Some(1) => None,
+                Some(multiple) => Some(TakenSizes::Multiple(multiple)),
+                None => self.traced_size(graph)?.map(TakenSizes::Traced),
+            };
+            self.state = found.map_or(SearchState::Nothing, SearchState::Found);
+        }
+        Ok(self.found())
+    }
+
+    /// The first of the traced sizes at which the model runs.
+    fn traced_size(&self, graph: &Graph) -> Result<Option<[usize; 2]>> {
+        for size in &self.traced {
+            match trial(graph, *size)? {
+                Trial::Runs => return Ok(Some(*size)),
+                Trial::Fails => {}
+                Trial::Ended => return Ok(None),
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// The smallest of [`MULTIPLES`] that the model needs the sides of images to be multiples of; `None` if none of them suits.
+///
+/// A multiple is tried at a size that is not a multiple of any larger one, so that a success is evidence for this one.
+fn multiple(graph: &Graph) -> Result<Option<usize>> {
+    for multiple in MULTIPLES {
+        match trial(graph, trial_size(multiple))? {
+            Trial::Runs => return Ok(Some(multiple)),
+            Trial::Fails => {}
+            Trial::Ended => return Ok(None),
+        }
+    }
+    Ok(None)
+}
+
+/// Height and width of the trial of a multiple: two different primes, from 3 on, times the multiple.
+fn trial_size(multiple: usize) -> [usize; 2] {
+    let mut primes = (3..)
+        .filter(|n: &usize| (2..*n).all(|divisor| !n.is_multiple_of(divisor)))
+        .skip_while(|n| n * multiple < LEAST_SIDE);
+    [(); 2].map(|()| primes.next().map_or(multiple, |prime| prime * multiple))
+}
+
+/// Result of a trial.
+enum Trial {
+    /// The model gave an image of the input's size, whatever its values.
+    Runs,
+    Fails,
+    /// It took more time or memory than an image may, so that no further trial makes sense.
+    Ended,
+}
+
+fn trial(graph: &Graph, size: [usize; 2]) -> Result<Trial> {
+    let window = TileWindow::whole(size);
+    graph.restart_clock();
+    let result = graph.probe(&texture(size, &CODES[1]), window)?;
+    Ok(match result {
+        RunResult::Output(()) | RunResult::Unusable(_) => Trial::Runs,
+        RunResult::Failed(RunFailure::TooLong(_) | RunFailure::TooLarge(_)) => Trial::Ended,
+        RunResult::Failed(_) => Trial::Fails,
+    })
+}
+
+/// Message for a model whose sizes were not found, after `failure`.
+pub(crate) fn not_found(failure: &RunFailure, search: &SizeSearch) -> String {
+    let words = failure.words();
+    if !failure.is_of_size() {
+        return words;
+    }
+    let traced = if search.traced.is_empty() {
+        ""
+    } else {
+        ", and the sizes in its constants"
+    };
+    format!(
+        "{words}. Multiples of {} up to {}{traced} were tried and do not help: export it for any size (dynamic_axes), without int(x.shape[..]) in its code, or for the size of the images",
+        MULTIPLES[1],
+        MULTIPLES[MULTIPLES.len() - 1]
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trial_shows_its_multiple_alone() {
+        for (index, multiple) in MULTIPLES.into_iter().enumerate() {
+            let size = trial_size(multiple);
+            assert!(
+                size.iter()
+                    .all(|side| *side >= LEAST_SIDE && side % multiple == 0)
+            );
+            for larger in &MULTIPLES[index + 1..] {
+                let fits = size.iter().all(|side| side % larger == 0);
+                assert!(!fits, "{size:?} is a multiple of {larger}");
+            }
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The values of the columns `level` and `variant` of tables: [`AxisLevel`] and [`KindReading`].
+
+use std::borrow::Cow;
+use std::fmt;
+
+use super::degradation::{Degradation, Kind, ReadingName};
+use super::light_group::LightGroup;
+use super::pair_dark::{PairDark, PhotoName};
+use super::severity::{Axis, Severity};
+use super::treatment::Treatment;
+use crate::types::text::words::written_as_text;
+
+/// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds of one axis share their points. The points of
+/// an axis follow each other by severity. The darkness of pairs is on no axis, because it differs by frame; it follows all others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct AxisLevel(Point);
+
+/// Position of an [`AxisLevel`] on its axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+enum Point {
+    Untouched,
+    Degraded(Kind, Severity),
+    Pair,
+}
+
+impl AxisLevel {
+    /// The untouched frame, the first point of every axis.
+    pub const L0: Self = Self(Point::Untouched);
+
+    /// The darkness of pairs, photographed or synthetic.
+    pub const PAIR: Self = Self(Point::Pair);
+
+    /// The level of a severity of a kind.
+    #[must_use]
+    pub fn new(kind: Kind, severity: Severity) -> Self {
+        Self(Point::Degraded(kind.first_of_axis(), severity))
+    }
+
+    /// The severity; `None` for L0 and for pairs.
+    #[must_use]
+    pub fn severity(self) -> Option<Severity> {
+        match self.0 {
+            Point::Degraded(_, severity) => Some(severity),
+            Point::Untouched | Point::Pair => None,
+        }
+    }
+
+    /// The axis; `None` for L0, which is on all axes, and for pairs, which are on none.
+    #[must_use]
+    pub fn axis(self) -> Option<Axis> {
+        match self.0 {
+            Point::Degraded(kind, _) => Some(kind.axis()),
+            Point::Untouched | Point::Pair => None,
+        }
+    }
+
+    /// True if the level belongs in the tables of an axis: L0 in all of them, photographed pairs in those of light.
+    #[must_use]
+    pub fn is_shown_on(self, axis: Axis) -> bool {
+        match self.0 {
+            Point::Untouched => true,
+            Point::Degraded(kind, _) => kind.axis() == axis,
+            Point::Pair => axis == Axis::LIGHT,
+        }
+    }
+
+    /// The distance from L0 in the unit of the axis; 0 for pairs, which have none of their own.
+    #[must_use]
+    pub fn value(self) -> f64 {
+        self.severity().map_or(0.0, Severity::value)
+    }
+}
+
+impl From<Option<&Degradation>> for AxisLevel {
+    fn from(degradation: Option<&Degradation>) -> Self {
+        degradation.map_or(Self::L0, |how| Self::new(how.kind(), how.severity()))
+    }
+}
+
+impl From<&Treatment> for AxisLevel {
+    fn from(treatment: &Treatment) -> Self {
+        match treatment {
+            Treatment::Paired(_) => Self::PAIR,
+            Treatment::Untouched | Treatment::Degraded(_) => treatment.degradation().into(),
+        }
+    }
+}
+
+impl fmt::Display for AxisLevel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Point::Untouched => f.pad("L0"),
+            Point::Degraded(kind, severity) => f.pad(&kind.label(severity)),
+            Point::Pair => f.pad("dark"),
+        }
+    }
+}
+
+/// A kind of degradation in one light reading, at any severity: the levels of one curve share it. Or the darkness of pairs, which is
+/// on no curve: it has no kind.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct KindReading {
+    /// The darkness of pairs; `None` for untouched frames and degradations. It is the first field, so that pairs follow all others.
+    pub pair: Option<PairDark>,
+    /// The kind; `None` for untouched frames and pairs.
+    pub kind: Option<Kind>,
+    /// The light reading; `None` if the kind has none.
+    pub reading: Option<ReadingName>,
+    /// The runs that show these images, in a report on runs that show different ones; else `None`.
+    pub group: Option<LightGroup>,
+}
+
+impl KindReading {
+    /// The value for untouched frames: no kind and no reading.
+    pub const NONE: Self = Self {
+        kind: None,
+        reading: None,
+        pair: None,
+        group: None,
+    };
+
+    /// Whether these are untouched frames, of whichever runs.
+    #[must_use]
+    pub fn is_untouched(&self) -> bool {
+        self.kind.is_none() && self.pair.is_none()
+    }
+
+    /// Whether these frames have less light than untouched ones, or a degradation of another kind.
+    #[must_use]
+    pub fn is_degraded(&self) -> bool {
+        !self.is_untouched()
+    }
+
+    /// The kind's word in files and flags, or `none`; for pairs the name of their darkness.
+    #[must_use]
+    pub fn word(&self) -> Cow<'static, str> {
+        match &self.pair {
+            None => Cow::Borrowed(self.kind.map_or("none", Kind::word)),
+            Some(pair) => Cow::Owned(pair.to_string()),
+        }
+    }
+
+    /// The name of the photograph in the dark; `None` for all other images.
+    #[must_use]
+    pub fn photograph(&self) -> Option<&PhotoName> {
+        self.pair.as_ref().and_then(PairDark::photograph)
+    }
+
+    /// The kind of synthesis with a light exposure drop, also one that differs by frame; `None` for images that are not synthetic.
+    #[must_use]
+    pub fn synthetic_kind(&self) -> Option<Kind> {
+        match &self.pair {
+            Some(PairDark::Match(kind, _)) => Some(*kind),
+            Some(PairDark::Photograph(_)) => None,
+            None => self.kind,
+        }
+    }
+
+    /// The name in captions, as `with noise`; with the light reading if it is not the paper's, without the group of runs.
+    #[must_use]
+    pub fn title(&self) -> String {
+        if let Some(pair) = &self.pair {
+            return pair.title();
+        }
+        let kind = self.kind.map_or("untouched", Kind::title);
+        self.named_reading()
+            .map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
+    }
+
+    /// The kind's word with the light reading if it is not the paper's, as `noise@eld`, or the name of a pair's darkness; without
+    /// the group of runs.
+    #[must_use]
+    pub fn kind_and_reading(&self) -> String {
+        match self.named_reading() {
+            None => self.word().into_owned(),
+            Some(reading) => format!("{}@{reading}", self.word()),
+        }
+    }
+
+    /// The group of runs as names end with it, ` @RUN`; empty without a group.
+    #[must_use]
+    pub fn group_suffix(&self) -> String {
+        self.group
+            .as_ref()
+            .map_or_else(String::new, ToString::to_string)
+    }
+
+    fn named_reading(&self) -> Option<&ReadingName> {
+        self.reading
+            .as_ref()
+            .filter(|name| **name != ReadingName::PAPER)
+    }
+}
+
+impl From<Option<&Degradation>> for KindReading {
+    fn from(degradation: Option<&Degradation>) -> Self {
+        Self {
+            kind: degradation.map(Degradation::kind),
+            reading: degradation.and_then(|how| how.reading().cloned()),
+            ..Self::NONE
+        }
+    }
+}
+
+impl From<&Treatment> for KindReading {
+    fn from(treatment: &Treatment) -> Self {
+        Self {
+            pair: treatment.pair().cloned(),
+            ..treatment.degradation().into()
+        }
+    }
+}
+
+impl fmt::Display for KindReading {
+    /// `none`, `ev`, `noise`, `noise@eld` or `noise @RUN`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&(self.kind_and_reading() + &self.group_suffix()))
+    }
+}
+
+written_as_text!(AxisLevel, KindReading);

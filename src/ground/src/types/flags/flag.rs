@@ -1,0 +1,102 @@
+//! Parsers for flags whose values are numbers or words, and the macro `flag_words`.
+//!
+//! Errors name the expected value; the command line adds the name of the flag.
+
+use std::fmt;
+use std::num::NonZeroUsize;
+use std::time::Duration;
+
+use clap::ValueEnum;
+
+use crate::error::{self, Error};
+
+/// The maximum of `--threads`; chosen: more than any machine needs, and few enough not to exhaust one.
+const MAX_THREADS: usize = 1024;
+
+/// Reads a finite number above 0.
+///
+/// # Errors
+/// The text names the expected value.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let value = text.trim().parse().ok();
+    value
+        .filter(|value: &f64| value.is_finite() && *value > 0.0)
+        .ok_or_else(|| "a number above 0 expected".to_owned())
+}
+
+/// Reads a duration above 0, in seconds.
+///
+/// # Errors
+/// The text names the expected value.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    let duration = positive(text)
+        .ok()
+        .and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    duration
+        .filter(|duration| !duration.is_zero())
+        .ok_or_else(|| "a number of seconds above 0 expected".to_owned())
+}
+
+/// Reads a number of threads.
+///
+/// # Errors
+/// The text names the expected value.
+pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
+    let threads = text.trim().parse().ok();
+    threads
+        .filter(|threads: &NonZeroUsize| threads.get() <= MAX_THREADS)
+        .ok_or_else(|| format!("a number from 1 to {MAX_THREADS} expected"))
+}
+
+/// Writes an enum's value as its word on the command line.
+pub fn write_word(value: &impl ValueEnum, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    value
+        .to_possible_value()
+        .map_or(Ok(()), |value| f.pad(value.get_name()))
+}
+
+/// Reads an enum's value from its word, as a manifest stores it.
+///
+/// # Errors
+/// If no value of the enum has this word.
+pub fn read_word<T: ValueEnum>(word: &str) -> error::Result<T> {
+    T::from_str(word, false).map_err(|_| {
+        let words: Vec<String> = T::value_variants()
+            .iter()
+            .filter_map(|value| Some(value.to_possible_value()?.get_name().to_owned()))
+            .collect();
+        let problem = format_args!("it is not one of {}", words.join(", "));
+        Error::data(format_args!("{word:?}"), problem)
+    })
+}
+
+/// Implements `Display` for enums: the word of the value on the command line.
+#[macro_export]
+macro_rules! flag_words {
+    ($($type:ty),+ $(,)?) => {
+        $(impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                $crate::types::flags::write_word(self, f)
+            }
+        })+
+    };
+}
+pub use flag_words;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_limits() {
+        assert_eq!(positive("0.5"), Ok(0.5));
+        assert_eq!(seconds("1.5"), Ok(Duration::from_millis(1500)));
+        assert_eq!(threads("1024").map(NonZeroUsize::get), Ok(1024));
+        for wrong in ["0", "-2", "NaN", "inf", "", "x"] {
+            assert!(positive(wrong).is_err(), "{wrong}");
+            assert!(seconds(wrong).is_err(), "{wrong}");
+        }
+        assert!(seconds("1e-12").is_err() && seconds("1e300").is_err());
+        assert!(threads("0").is_err() && threads("1025").is_err());
+    }
+}

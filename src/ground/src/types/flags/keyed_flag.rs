@@ -1,0 +1,409 @@
+//! Flags that take several settings as `KEY=VALUE[,…]`: [`KeyedFlag`], and the table of them, [`KEYED_FLAGS`].
+//!
+//! Each setting also has a flag of its own, which is hidden: `--gain 3` is `--noise gain=3`.
+
+use crate::types::text::near_name::{is_nearly, suggestion};
+
+/// A flag that takes several settings, such as `--noise gain=3,fixed`.
+#[derive(Debug)]
+pub struct KeyedFlag {
+    /// The name of the flag.
+    pub name: &'static str,
+    /// The heading of the flag in the help.
+    pub heading: &'static str,
+    /// The help; empty if the flag has a value without a key, whose own help stands first.
+    pub about: &'static str,
+    /// The value of a key that stands alone; `None` if a key alone is a switch, or has only one possible value.
+    pub alone: Option<&'static str>,
+    /// Each key with the name of the hidden flag that sets the same. The key of a value without a key is empty.
+    pub keys: &'static [(&'static str, &'static str)],
+}
+
+/// A setting in the value of a keyed flag.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KeyedSetting {
+    /// The name of the hidden flag.
+    pub flag: &'static str,
+    /// The value; `None` for a key alone.
+    pub value: Option<String>,
+}
+
+/// All keyed flags. A command takes those for whose keys it has hidden flags.
+pub const KEYED_FLAGS: [KeyedFlag; 14] = [
+    KeyedFlag {
+        name: "noise",
+        heading: "Light",
+        about: "The sensor, and single choices of --profile; default: as --profile says, of sony-a7s2",
+        alone: None,
+        keys: &[
+            ("camera", "camera"),
+            ("gain", "gain"),
+            ("ratio", "ratio"),
+            ("fixed", "fixed"),
+            ("amplify", "amplify"),
+            ("tone", "tone"),
+            ("draws", "draws"),
+            ("coupling", "coupling"),
+        ],
+    },
+    KeyedFlag {
+        name: "read",
+        heading: "Ready-made sets",
+        about: "How a ready-made set is read; default: as its card and its files say",
+        alone: None,
+        keys: &[
+            ("config", "config-name"),
+            ("split", "split"),
+            ("rows", "rows"),
+            ("keep-instructions", "keep-instructions"),
+        ],
+    },
+    KeyedFlag {
+        name: "skip",
+        heading: "Ready-made sets",
+        about: "Which rows of a ready-made set are left out instead of stopping, with their number; default: none",
+        alone: Some("skip"),
+        keys: &[
+            ("no-image", "no-image"),
+            ("open", "open"),
+            ("several", "several"),
+            ("bad", "bad"),
+        ],
+    },
+    KeyedFlag {
+        name: "decode",
+        heading: "Data",
+        about: "How image files are decoded; default: to sRGB, without scaling",
+        alone: None,
+        keys: &[
+            ("colour", "colour"),
+            ("transfer", "transfer"),
+            ("exposure", "exposure"),
+            ("max-pixels", "max-pixels"),
+        ],
+    },
+    KeyedFlag {
+        name: "choice-order",
+        heading: "Data",
+        about: "In which orders the choices of a question are shown; default: as in the data",
+        alone: None,
+        keys: &[("shuffle", "shuffle-options"), ("circular", "circular")],
+    },
+    KeyedFlag {
+        name: "ask",
+        heading: "Data",
+        about: "",
+        alone: None,
+        keys: &[("", "ask"), ("per-image", "ask-per-image")],
+    },
+    KeyedFlag {
+        name: "llie-options",
+        heading: "Enhancement",
+        about: "How enhancers are run; default: in tiles where that is exact, with the ONNX Runtime that is found",
+        alone: None,
+        keys: &[
+            ("tile", "tile"),
+            ("max-side", "llie-max-side"),
+            ("resize", "llie-resize"),
+            ("timeout", "llie-timeout"),
+            ("max-memory", "llie-max-memory"),
+            ("ort-lib", "ort-lib"),
+            ("offline", "offline"),
+        ],
+    },
+    KeyedFlag {
+        name: "request",
+        heading: "Model",
+        about: "Further settings of requests; default: what every server takes",
+        alone: None,
+        keys: &[
+            ("token-field", "token-field"),
+            ("wire", "wire"),
+            ("omit-field", "omit-field"),
+            ("constrain", "constrain"),
+            ("probabilities", "probabilities"),
+        ],
+    },
+    KeyedFlag {
+        name: "allow",
+        heading: "Model",
+        about: "What is refused unless it is named here; default: none",
+        alone: None,
+        keys: &[
+            ("http", "allow-http"),
+            ("key-mismatch", "key-anyway"),
+            ("models-file", "trust-models"),
+            ("bad-enhancer", "llie-anyway"),
+        ],
+    },
+    KeyedFlag {
+        name: "retries",
+        heading: "Sending",
+        about: "",
+        alone: None,
+        keys: &[
+            ("", "retries"),
+            ("paid", "paid-retries"),
+            ("max-wait", "max-wait"),
+            ("patience", "patience"),
+        ],
+    },
+    KeyedFlag {
+        name: "stop",
+        heading: "Sending",
+        about: "When a run stops before its end; default: when no model can be asked any more",
+        alone: None,
+        keys: &[
+            ("failures", "max-failures"),
+            ("first-model", "fail-fast"),
+            ("grace", "grace"),
+        ],
+    },
+    KeyedFlag {
+        name: "image",
+        heading: "Sending",
+        about: "",
+        alone: None,
+        keys: &[
+            ("", "image"),
+            ("max-side", "max-side"),
+            ("max-mb", "max-image"),
+            ("detail", "detail"),
+            ("first", "image-first"),
+        ],
+    },
+    KeyedFlag {
+        name: "images-cache",
+        heading: "Scale",
+        about: "",
+        alone: None,
+        keys: &[
+            ("", "images-cache"),
+            ("what", "images-cache-what"),
+            ("size", "images-cache-size"),
+        ],
+    },
+    KeyedFlag {
+        name: "shard",
+        heading: "Scale",
+        about: "",
+        alone: None,
+        keys: &[("", "shard"), ("workers", "workers")],
+    },
+];
+
+/// The keyed flag that sets the same as a hidden flag, and the key in it: `noise` and `gain` for `gain`.
+#[must_use]
+pub fn keyed_form(flag: &str) -> Option<(&'static KeyedFlag, &'static str)> {
+    KEYED_FLAGS.iter().find_map(|keyed| {
+        let (key, _) = keyed
+            .keys
+            .iter()
+            .find(|(key, own)| *own == flag && !key.is_empty())?;
+        Some((keyed, *key))
+    })
+}
+
+/// The spelling of a flag in messages: `--noise gain` for `gain`, `--model` for `model`.
+#[must_use]
+pub fn spelled(flag: &str) -> String {
+    match keyed_form(flag) {
+        Some((keyed, key)) => format!("--{} {key}", keyed.name),
+        None => format!("--{flag}"),
+    }
+}
+
+/// The name of a setting in a manifest for a message: `--noise camera or fixed` for `--camera or --fixed`.
+#[must_use]
+pub fn spelled_setting(setting: &str) -> String {
+    let is_name = |c: char| c == '-' || c.is_ascii_alphanumeric();
+    let (mut spelling, mut last) = (String::new(), "");
+    for word in setting.split_inclusive(' ') {
+        let name = word.strip_prefix("--").unwrap_or_default();
+        let end = name.find(|c| !is_name(c)).unwrap_or(name.len());
+        let (flag, rest) = name.split_at(end);
+        match keyed_form(flag) {
+            Some((keyed, key)) if keyed.name == last => spelling.extend([key, rest]),
+            Some((keyed, key)) => {
+                spelling.extend(["--", keyed.name, " ", key, rest]);
+                last = keyed.name;
+            }
+            None => spelling.push_str(word),
+        }
+    }
+    spelling
+}
+
+impl KeyedFlag {
+    /// The keyed flag with this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        KEYED_FLAGS.iter().find(|keyed| keyed.name == name)
+    }
+
+    /// Whether it has a value without a key.
+    #[must_use]
+    pub fn has_plain_value(&self) -> bool {
+        self.keys.iter().any(|(key, _)| key.is_empty())
+    }
+
+    /// Parses a text such as `gain=3,fixed`; `has` tells which hidden flags the command has.
+    ///
+    /// A text without any of the keys is the value without a key, whatever commas it has.
+    ///
+    /// # Errors
+    /// The text names a key that does not exist, or a part that is empty.
+    pub fn settings(
+        &self,
+        text: &str,
+        has: impl Fn(&str) -> bool,
+    ) -> Result<Vec<KeyedSetting>, String> {
+        let known = self.keys.iter().filter(|(_, flag)| has(flag));
+        let (plain, known): (Vec<_>, Vec<_>) = known.partition(|(key, _)| key.is_empty());
+        let keyed = |part: &str| {
+            let (key, value) = match part.split_once('=') {
+                Some((key, value)) => (key.trim(), Some(value.trim().to_owned())),
+                None => (part.trim(), None),
+            };
+            let (_, flag) = known.iter().find(|(own, _)| *own == key)?;
+            Some(KeyedSetting { flag, value })
+        };
+        let parts: Vec<&str> = text.split(',').collect();
+        let names: Vec<&str> = known.iter().map(|(key, _)| *key).collect();
+        let name = |part: &str| part.split('=').next().unwrap_or_default().trim().to_owned();
+        // A part after the first that is nearly a key is a mistyped key.
+        let is_mistyped = parts
+            .iter()
+            .skip(1)
+            .any(|part| names.iter().any(|key| is_nearly(&name(part), key)));
+        if let [(_, flag)] = plain[..]
+            && !is_mistyped
+            && parts.iter().all(|part| keyed(part).is_none())
+        {
+            let value = Some(text.to_owned());
+            return Ok(vec![KeyedSetting { flag, value }]);
+        }
+        parts
+            .iter()
+            .enumerate()
+            .map(|(place, part)| {
+                if let Some(setting) = keyed(part) {
+                    return Ok(setting);
+                }
+                if let (0, [(_, flag)]) = (place, &plain[..]) {
+                    let value = Some((*part).to_owned());
+                    return Ok(KeyedSetting { flag, value });
+                }
+                let key = name(part);
+                let near = match suggestion(&key, &names) {
+                    near if near.is_empty() => format!("; keys: {}", names.join(", ")),
+                    near => near,
+                };
+                Err(format!("unknown key {key:?}{near}"))
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(flag: &str, text: &str) -> Result<Vec<(&'static str, Option<String>)>, String> {
+        let keyed = KeyedFlag::named(flag).unwrap();
+        Ok(keyed
+            .settings(text, |_| true)?
+            .into_iter()
+            .map(|one| (one.flag, one.value))
+            .collect())
+    }
+
+    fn with(flag: &'static str, value: &str) -> (&'static str, Option<String>) {
+        (flag, Some(value.to_owned()))
+    }
+
+    #[test]
+    fn keys_have_values_or_stand_alone() {
+        assert_eq!(
+            settings("noise", "gain=3, fixed,camera=a=b.toml"),
+            Ok(vec![
+                with("gain", "3"),
+                ("fixed", None),
+                with("camera", "a=b.toml")
+            ])
+        );
+    }
+
+    #[test]
+    fn a_plain_value_stands_first() {
+        assert_eq!(
+            settings("image", "jpeg:90,max-side=512,first"),
+            Ok(vec![
+                with("image", "jpeg:90"),
+                with("max-side", "512"),
+                ("image-first", None)
+            ])
+        );
+        assert_eq!(
+            settings("image", "max-side=512"),
+            Ok(vec![with("max-side", "512")])
+        );
+    }
+
+    #[test]
+    fn a_plain_value_without_keys_may_have_commas() {
+        assert_eq!(
+            settings("images-cache", "a,b=c"),
+            Ok(vec![with("images-cache", "a,b=c")])
+        );
+    }
+
+    #[test]
+    fn an_unknown_key_is_refused_with_the_nearest_or_all() {
+        let problem = settings("noise", "gian=3").unwrap_err();
+        assert_eq!(problem, "unknown key \"gian\"; did you mean gain?");
+        let problem = settings("stop", "").unwrap_err();
+        assert_eq!(
+            problem,
+            "unknown key \"\"; keys: failures, first-model, grace"
+        );
+        let problem = settings("image", "png,maxside=9").unwrap_err();
+        assert_eq!(problem, "unknown key \"maxside\"; did you mean max-side?");
+        let problem = settings("image", "png,max-side=9,zoom").unwrap_err();
+        assert!(problem.starts_with("unknown key \"zoom\""), "{problem}");
+    }
+
+    #[test]
+    fn a_key_of_another_command_is_unknown() {
+        let keyed = KeyedFlag::named("request").unwrap();
+        let problem = keyed.settings("constrain=json", |flag| flag != "constrain");
+        assert!(
+            problem
+                .unwrap_err()
+                .starts_with("unknown key \"constrain\"")
+        );
+    }
+
+    #[test]
+    fn hidden_flags_are_spelled_as_keys() {
+        assert_eq!(spelled("gain"), "--noise gain");
+        assert_eq!(spelled("image"), "--image");
+        assert_eq!(spelled("model"), "--model");
+    }
+
+    #[test]
+    fn settings_of_manifests_are_spelled_as_keys() {
+        for (setting, spelling) in [
+            (
+                "--camera, --gain or --fixed",
+                "--noise camera, gain or fixed",
+            ),
+            ("--camera (name) of paper", "--noise camera (name) of paper"),
+            ("--model", "--model"),
+            ("--levels of the run --", "--levels of the run --"),
+            ("the version", "the version"),
+        ] {
+            assert_eq!(spelled_setting(setting), spelling);
+        }
+    }
+}

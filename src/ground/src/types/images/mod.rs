@@ -1,0 +1,16 @@
+//! Images, frames with their maps, and pixels.
+
+mod frame;
+mod image;
+mod isa;
+mod labels;
+mod pixels;
+mod shown_codes;
+
+#[cfg(feature = "program")]
+pub use frame::Frame;
+pub use frame::{DepthKind, FrameId, Intrinsics, Segmentation, is_image_ending};
+pub use image::{Codes16, Image, Light, Rgb, Sample};
+pub use isa::{Isa, Kernel};
+pub use labels::{Label, Labels, OTHER_PLACES, SegmentName};
+pub use pixels::Pixels;

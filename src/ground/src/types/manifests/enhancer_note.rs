@@ -1,0 +1,231 @@
+//! [`EnhancerNote`]: the manifest's entry about an enhancer.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::types::{Flaw, SizeLog};
+
+/// Key of the statement that images were enhanced elsewhere.
+pub const ELSEWHERE: &str = "enhanced";
+
+/// Key of the statement of the data that the model was trained on.
+pub const TRAINED_ON: &str = "trained_on";
+
+/// How a run used an enhancer, and whether its images can be enhanced images.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct EnhancerNote {
+    /// How the model is fed and read.
+    #[serde(default)]
+    pub convention: Vec<ConventionLine>,
+    /// How image sizes were adapted to the model, in words; empty before the first image.
+    #[serde(default)]
+    pub sizes: String,
+    /// The counts behind these words. An image that was enhanced again, after an interruption, counts again.
+    #[serde(default)]
+    pub size_counts: SizeLog,
+    /// True if an image was resized for the model: the results are then not those of the model at the image's own size.
+    #[serde(default)]
+    pub resized: bool,
+    /// Findings of the probe before the first question; `None` if it was not run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub probe: Option<ProbeNote>,
+    /// Caveats for readers of the results, as sentences that follow the enhancer's name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
+    /// Flaws of the images enhanced during the run.
+    #[serde(default)]
+    pub judged: JudgedImages,
+}
+
+/// One statement of how a model is fed or read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ConventionLine {
+    /// The key of the sidecar, or a fact of the graph.
+    pub key: String,
+    /// The value.
+    pub value: String,
+    /// Origin of the value: the sidecar, a preset, the graph, the probe, or the default.
+    pub source: String,
+}
+
+/// Result of probing an enhancer.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ProbeNote {
+    /// The number of dark frames.
+    pub frames: usize,
+    /// The value ranges with which its images can be enhanced images.
+    pub plausible: Vec<String>,
+    /// The problem found; `None` if there was none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub problem: Option<String>,
+    /// Consequence for the run.
+    pub outcome: ProbeOutcome,
+}
+
+/// Consequence of a probe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ProbeOutcome {
+    /// The images can be enhanced images.
+    Plausible,
+    /// The images are odd, but the user states how the model is fed and read, and some models do that.
+    Doubtful,
+    /// The images cannot be enhanced images; the run went on because the user said so.
+    Overruled,
+}
+
+/// The enhanced images of dark frames that were looked at, and those with a flaw.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct JudgedImages {
+    /// The number of images.
+    pub images: usize,
+    /// The numbers of images with a flaw, by flaw.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub flawed: BTreeMap<Flaw, usize>,
+    /// The first of them, at most [`JudgedImages::EXAMPLES`].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub examples: Vec<FlawedImage>,
+}
+
+/// One image with a flaw.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct FlawedImage {
+    /// The frame.
+    pub frame: String,
+    /// The condition.
+    pub condition: String,
+    /// Flaw of the image.
+    pub flaw: Flaw,
+}
+
+impl EnhancerNote {
+    /// Data that the model was trained on; `None` if nobody stated them.
+    #[must_use]
+    pub fn trained_on(&self) -> Option<&str> {
+        let line = self.convention.iter().find(|line| line.key == TRAINED_ON)?;
+        Some(&line.value)
+    }
+
+    /// The note of a run that used the enhancer before, with this one for what came later.
+    #[must_use]
+    pub fn after(mut self, earlier: Option<Self>) -> Self {
+        let Some(earlier) = earlier else { return self };
+        self.judged.add(&earlier.judged);
+        self.resized |= earlier.resized;
+        self.probe = self.probe.or(earlier.probe);
+        for remark in earlier.remarks {
+            if !self.remarks.contains(&remark) {
+                self.remarks.push(remark);
+            }
+        }
+        if self.sizes.is_empty() {
+            self.sizes = earlier.sizes;
+            self.size_counts = earlier.size_counts;
+        } else if earlier.size_counts != SizeLog::default() {
+            self.size_counts.add(&earlier.size_counts);
+            self.sizes = self.size_counts.summary();
+        }
+        self
+    }
+}
+
+impl JudgedImages {
+    /// Largest number of examples; chosen.
+    pub const EXAMPLES: usize = 6;
+
+    /// The number of images with a flaw.
+    #[must_use]
+    pub fn flaws(&self) -> usize {
+        self.flawed.values().sum()
+    }
+
+    /// Counts one more image.
+    pub fn count(&mut self, flawed: Option<FlawedImage>) {
+        self.images += 1;
+        let Some(image) = flawed else { return };
+        *self.flawed.entry(image.flaw).or_default() += 1;
+        // The same examples whatever the order of the images.
+        let place = self.examples.partition_point(|known| *known < image);
+        self.examples.insert(place, image);
+        self.examples.truncate(Self::EXAMPLES);
+    }
+
+    /// Adds the images of an earlier command or of another part.
+    pub fn add(&mut self, other: &Self) {
+        self.images += other.images;
+        for (flaw, count) in &other.flawed {
+            *self.flawed.entry(*flaw).or_default() += count;
+        }
+        self.examples.extend(other.examples.iter().cloned());
+        self.examples.sort();
+        self.examples.dedup();
+        self.examples.truncate(Self::EXAMPLES);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn image(frame: &str) -> FlawedImage {
+        FlawedImage {
+            frame: frame.to_owned(),
+            condition: "L3+noise+m".to_owned(),
+            flaw: Flaw::Flat,
+        }
+    }
+
+    #[test]
+    fn sizes_of_all_sessions_are_counted() {
+        let note = |whole: usize, reduced: usize| {
+            let counts = SizeLog {
+                images: whole + reduced,
+                whole,
+                reduced,
+                ..SizeLog::default()
+            };
+            EnhancerNote {
+                sizes: counts.summary(),
+                size_counts: counts,
+                ..EnhancerNote::default()
+            }
+        };
+        let earlier = || Some(note(9, 0));
+        let both = note(31, 2).after(earlier());
+        assert_eq!(both.size_counts, note(40, 2).size_counts);
+        assert_eq!(both.sizes, note(40, 2).sizes);
+        // A session without images keeps the earlier counts.
+        assert_eq!(EnhancerNote::default().after(earlier()), note(9, 0));
+        // A manifest of an earlier version has the words alone.
+        let words = EnhancerNote {
+            sizes: "9 images: as they are".to_owned(),
+            ..EnhancerNote::default()
+        };
+        assert_eq!(note(31, 0).after(Some(words)), note(31, 0));
+    }
+
+    #[test]
+    fn examples_do_not_depend_on_the_order() {
+        let names: Vec<String> = (0..9).map(|i| format!("f{i}")).collect();
+        let [mut one, mut other] = [JudgedImages::default(), JudgedImages::default()];
+        for name in &names {
+            one.count(Some(image(name)));
+        }
+        names
+            .iter()
+            .rev()
+            .for_each(|name| other.count(Some(image(name))));
+        assert_eq!(one, other);
+        assert_eq!((one.flaws(), one.examples.len()), (9, 6));
+        let mut parts = JudgedImages::default();
+        parts.count(None);
+        parts.count(Some(image("f0")));
+        let mut rest = JudgedImages::default();
+        names[1..]
+            .iter()
+            .for_each(|name| rest.count(Some(image(name))));
+        parts.add(&rest);
+        assert_eq!((parts.images, &parts.examples), (10, &one.examples));
+    }
+}

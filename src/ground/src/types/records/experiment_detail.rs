@@ -1,0 +1,112 @@
+//! Details of the two experiments' records, as reports keep them.
+
+use std::borrow::Cow;
+
+use super::detail::{ChoiceLine, OpenLine};
+use super::trials::{AskedParts, ChoiceFacts, ChoiceTables, SentImages};
+use crate::types::{ChoiceDetail, Digest, Family, FrameId, OpenDetail, Record, StoredDetail};
+
+impl StoredDetail for ChoiceDetail {
+    type Line = ChoiceLine;
+
+    type Facts = ChoiceFacts;
+
+    type Tables = ChoiceTables;
+
+    const SCHEMA: &'static str = "darkqa.run/2";
+
+    fn asked(&self) -> AskedParts<'_> {
+        AskedParts {
+            frame: &self.frame.0,
+            family: Cow::Borrowed(&self.family),
+            choices: &self.choices,
+            truth: self.truth,
+            repeat: self.repeat,
+        }
+    }
+
+    fn keep(record: &Record, tables: &mut ChoiceTables) -> ChoiceFacts {
+        tables.keep(record)
+    }
+
+    fn move_facts(facts: &ChoiceFacts, from: &ChoiceTables, to: &mut ChoiceTables) -> ChoiceFacts {
+        to.move_from(*facts, from)
+    }
+
+    fn source_of<'t>(facts: &'t ChoiceFacts, tables: &'t ChoiceTables) -> Option<&'t str> {
+        tables.shown_frame(*facts).map(|frame| &*frame.0)
+    }
+
+    fn sent_of(facts: &ChoiceFacts, tables: &ChoiceTables) -> Option<Digest> {
+        tables.images(*facts).map(SentImages::digest)
+    }
+
+    fn choices(&self) -> &[String] {
+        &self.choices
+    }
+
+    fn repeat(&self) -> u32 {
+        self.repeat
+    }
+
+    fn source(&self) -> &str {
+        let frame: &FrameId = self.shown();
+        &frame.0
+    }
+
+    fn shown(&self) -> Option<Digest> {
+        self.sent()
+    }
+}
+
+impl StoredDetail for OpenDetail {
+    type Line = OpenLine;
+
+    type Facts = Box<Record<Self>>;
+
+    type Tables = ();
+
+    const SCHEMA: &'static str = "darkqa.openeqa/2";
+
+    fn asked(&self) -> AskedParts<'_> {
+        AskedParts {
+            frame: &self.episode,
+            family: Cow::Owned(Family::from(&*self.category)),
+            choices: &[],
+            truth: None,
+            repeat: 0,
+        }
+    }
+
+    fn keep(record: &Record<Self>, (): &mut ()) -> Self::Facts {
+        Box::new(record.clone())
+    }
+
+    fn move_facts(record: &Self::Facts, (): &(), (): &mut ()) -> Self::Facts {
+        record.clone()
+    }
+
+    fn source_of<'t>(_: &'t Self::Facts, (): &'t ()) -> Option<&'t str> {
+        None
+    }
+
+    fn sent_of(record: &Self::Facts, (): &()) -> Option<Digest> {
+        record.detail.shown()
+    }
+
+    fn choices(&self) -> &[String] {
+        &[]
+    }
+
+    fn repeat(&self) -> u32 {
+        0
+    }
+
+    fn source(&self) -> &str {
+        &self.episode
+    }
+
+    fn shown(&self) -> Option<Digest> {
+        self.images.as_ref().map(|images| images.digest)
+    }
+}

@@ -1,0 +1,105 @@
+//! Numbers of records in four bytes: [`SmallNumber`], [`Tokens`].
+
+use serde::{Deserialize, Deserializer};
+
+use crate::types::replies::Usage;
+
+/// A number that may be unknown. One above 4,294,967,294 is taken as that.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SmallNumber(u32);
+
+impl SmallNumber {
+    /// The number that is not known.
+    pub const UNKNOWN: Self = Self(u32::MAX);
+
+    /// The number; `None` if it is not known.
+    pub fn get(self) -> Option<u64> {
+        (self != Self::UNKNOWN).then_some(u64::from(self.0))
+    }
+}
+
+impl Default for SmallNumber {
+    fn default() -> Self {
+        Self::UNKNOWN
+    }
+}
+
+impl From<Option<u64>> for SmallNumber {
+    fn from(number: Option<u64>) -> Self {
+        let most = u64::from(u32::MAX) - 1;
+        number.map_or(Self::UNKNOWN, |number| Self(number.min(most) as u32))
+    }
+}
+
+/// Read as the number itself or `null`.
+impl<'de> Deserialize<'de> for SmallNumber {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Option::<u64>::deserialize(deserializer).map(Self::from)
+    }
+}
+
+/// The tokens that a server charged.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Tokens {
+    prompt: SmallNumber,
+    completion: SmallNumber,
+    cached: SmallNumber,
+}
+
+impl From<Option<Usage>> for Tokens {
+    fn from(usage: Option<Usage>) -> Self {
+        let usage = usage.unwrap_or_default();
+        Self {
+            prompt: usage.prompt_tokens.into(),
+            completion: usage.completion_tokens.into(),
+            cached: usage.cached_tokens.into(),
+        }
+    }
+}
+
+impl Tokens {
+    /// The tokens; `None` if the server stated no number.
+    pub fn usage(self) -> Option<Usage> {
+        let usage = Usage {
+            prompt_tokens: self.prompt.get(),
+            completion_tokens: self.completion.get(),
+            cached_tokens: self.cached.get(),
+            total_tokens: None,
+        };
+        (usage != Usage::default()).then_some(usage)
+    }
+}
+
+/// Read as [`Usage`] or `null`.
+impl<'de> Deserialize<'de> for Tokens {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Option::<Usage>::deserialize(deserializer).map(Self::from)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tokens_are_read_back() {
+        let usage = Usage {
+            prompt_tokens: Some(1200),
+            completion_tokens: None,
+            cached_tokens: Some(0),
+            total_tokens: None,
+        };
+        assert_eq!(Tokens::from(Some(usage)).usage(), Some(usage));
+        assert_eq!(Tokens::from(None).usage(), None);
+        let large = Usage {
+            prompt_tokens: Some(u64::MAX),
+            ..usage
+        };
+        let read = Tokens::from(Some(large)).usage().unwrap();
+        assert_eq!(read.prompt_tokens, Some(u64::from(u32::MAX) - 1));
+        let read: Tokens = serde_json::from_str(r#"{"prompt_tokens":3}"#).unwrap();
+        assert_eq!(read.usage().and_then(|usage| usage.prompt_tokens), Some(3));
+        let read: Tokens = serde_json::from_str("null").unwrap();
+        assert_eq!(read.usage(), None);
+    }
+}

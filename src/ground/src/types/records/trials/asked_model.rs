@@ -1,0 +1,34 @@
+//! The model, condition and image of a trial ([`AskedModel`]), and how the trial ended ([`Ending`]).
+
+use crate::types::Condition;
+use crate::types::LostAttempts;
+use crate::types::records::record::{FailureKind, Via, View};
+
+/// A model, and the condition of the images that it was shown.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct AskedModel {
+    pub(super) model: String,
+    pub(super) view: View,
+    /// `None` without images.
+    pub(super) condition: Option<Condition>,
+}
+
+/// How a trial ended, as many trials do.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub(super) struct Ending {
+    /// The model's name in the server's reply.
+    pub(super) served_model: Option<String>,
+    /// The provider that a router passed the request on to.
+    pub(super) provider: Option<String>,
+    pub(super) via: Via,
+    /// The reason why no reply came, with the HTTP status; `None` if a reply came.
+    pub(super) failure: Option<(FailureKind, Option<u16>)>,
+    /// The server's word for the reason why an attempt broke off; `None` for other failures and for replies.
+    pub(super) broken_off: Option<String>,
+    /// Number of requests that were sent.
+    pub(super) attempts: u32,
+    /// The attempts that were charged and gave no reply, or one that was asked again.
+    pub(super) lost: LostAttempts,
+    /// Token limit of the reply if it exceeds that of the run's first call.
+    pub(super) max_tokens: Option<u32>,
+}

@@ -1,0 +1,180 @@
+//! [`ChoiceFacts`]: the facts that reports keep of a trial with choices, and the tables that they refer to ([`ChoiceTables`]).
+
+use std::collections::BTreeMap;
+
+use super::sent_images::SentImages;
+use super::values::Values;
+use crate::types::questions::{UnreadReason, letter};
+use crate::types::{
+    AnswerReading, ChoiceDetail, FrameId, Observed, OptionProbabilities, Record, TrialOutcome,
+};
+
+/// A number that stands for none.
+const NONE: u32 = u32::MAX;
+
+/// Answers parsed from the reply to a question with choices.
+#[derive(Debug, Clone, Copy)]
+pub struct ChoiceFacts {
+    images: u32,
+    more: u32,
+    strict: Option<PackedReading>,
+    lenient: Option<PackedReading>,
+    pub(super) outcome: TrialOutcome,
+    /// Whether the reply is the letter of a choice and nothing else.
+    pub(super) is_letter: bool,
+}
+
+/// An [`AnswerReading`] in two bytes.
+#[derive(Debug, Clone, Copy)]
+enum PackedReading {
+    Chosen(u8),
+    Unread(Option<UnreadReason>),
+}
+
+impl From<AnswerReading> for PackedReading {
+    fn from(reading: AnswerReading) -> Self {
+        match reading.chosen {
+            // A question has at most 26 choices.
+            Some(index) => Self::Chosen(index.min(usize::from(u8::MAX)) as u8),
+            None => Self::Unread(reading.why),
+        }
+    }
+}
+
+impl From<PackedReading> for AnswerReading {
+    fn from(reading: PackedReading) -> Self {
+        match reading {
+            PackedReading::Chosen(index) => Self {
+                chosen: Some(usize::from(index)),
+                why: None,
+            },
+            PackedReading::Unread(why) => Self { chosen: None, why },
+        }
+    }
+}
+
+/// Facts that few trials have: the observer's view, and the model's probability of each choice.
+#[derive(Debug, Clone, Copy)]
+struct More {
+    observed: u32,
+    options: u32,
+}
+
+/// Tables that the facts of trials with choices refer to.
+#[derive(Debug, Clone, Default)]
+pub struct ChoiceTables {
+    images: Values<SentImages>,
+    observed: Values<Observed>,
+    options: Vec<OptionProbabilities>,
+    more: Vec<More>,
+}
+
+impl ChoiceTables {
+    /// Extracts the facts that reports keep of a record.
+    pub fn keep(&mut self, record: &Record<ChoiceDetail>) -> ChoiceFacts {
+        let detail = &record.detail;
+        let images = SentImages::from_detail(detail);
+        let images = images.map_or(NONE, |images| self.images.number(images));
+        let observed = detail.observed.as_ref().map(|observed| Observed {
+            from: observed.from,
+            things: observed.things,
+            seen: observed.seen,
+            detected: observed.detected,
+            explained_ppm: observed.explained_ppm,
+            outlines: BTreeMap::new(),
+        });
+        let observed = observed.map_or(NONE, |observed| self.observed.number(observed));
+        let options = detail.options.clone();
+        let reply = record.reply.as_deref();
+        ChoiceFacts {
+            images,
+            more: self.add_more(observed, options),
+            strict: detail.strict.map(PackedReading::from),
+            lenient: detail.lenient.map(PackedReading::from),
+            outcome: detail.outcome,
+            is_letter: reply.is_some_and(|reply| is_letter(reply, detail.choices.len())),
+        }
+    }
+
+    /// The same facts, which refer to other tables.
+    pub fn move_from(&mut self, facts: ChoiceFacts, other: &Self) -> ChoiceFacts {
+        let images = other.images(facts).cloned();
+        let observed = other.observed(facts).cloned();
+        let observed = observed.map_or(NONE, |observed| self.observed.number(observed));
+        ChoiceFacts {
+            images: images.map_or(NONE, |images| self.images.number(images)),
+            more: self.add_more(observed, other.options(facts).cloned()),
+            ..facts
+        }
+    }
+
+    fn add_more(&mut self, observed: u32, options: Option<OptionProbabilities>) -> u32 {
+        if observed == NONE && options.is_none() {
+            return NONE;
+        }
+        let number = self.options.len() as u32;
+        self.more.push(More {
+            observed,
+            options: options.as_ref().map_or(NONE, |_| number),
+        });
+        self.options.extend(options);
+        self.more.len() as u32 - 1
+    }
+
+    /// The images that were sent.
+    pub fn images(&self, facts: ChoiceFacts) -> Option<&SentImages> {
+        (facts.images != NONE).then(|| self.images.get(facts.images))
+    }
+
+    /// The frame that was shown, if it differs from that of the question.
+    pub fn shown_frame(&self, facts: ChoiceFacts) -> Option<&FrameId> {
+        self.images(facts)?.shown_frame.as_ref()
+    }
+
+    /// The observer's view, without the outlines of single objects.
+    pub(super) fn observed(&self, facts: ChoiceFacts) -> Option<&Observed> {
+        let number = self.more.get(facts.more as usize)?.observed;
+        (number != NONE).then(|| self.observed.get(number))
+    }
+
+    /// How likely the model held each choice.
+    pub(super) fn options(&self, facts: ChoiceFacts) -> Option<&OptionProbabilities> {
+        let number = self.more.get(facts.more as usize)?.options;
+        self.options.get(number as usize)
+    }
+}
+
+impl ChoiceFacts {
+    /// The strict reading of the reply; `None` if no reply came.
+    pub(super) fn strict(self) -> Option<AnswerReading> {
+        self.strict.map(AnswerReading::from)
+    }
+
+    /// The lenient reading of the reply; `None` if no reply came.
+    pub(super) fn lenient(self) -> Option<AnswerReading> {
+        self.lenient.map(AnswerReading::from)
+    }
+
+    /// The same answers, scored against `reference` instead of the truth. Images and the observer's view are dropped.
+    pub(super) fn held_against(self, reference: usize) -> Self {
+        let outcome = match self.strict() {
+            None => TrialOutcome::Failed,
+            Some(reading) if reading.chosen == Some(reference) => TrialOutcome::Right,
+            Some(AnswerReading { chosen: None, .. }) => TrialOutcome::Unparsed,
+            Some(_) => TrialOutcome::Wrong,
+        };
+        Self {
+            images: NONE,
+            more: NONE,
+            outcome,
+            ..self
+        }
+    }
+}
+
+/// Whether a reply is the letter of one of these many choices.
+fn is_letter(reply: &str, choices: usize) -> bool {
+    let mut characters = reply.chars();
+    let first = characters.next();
+    characters.next().is_none() && (0..choices).any(|index| Some(letter(index)) == first)
+}

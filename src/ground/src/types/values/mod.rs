@@ -1,0 +1,11 @@
+//! Values: digests, canonical JSON, and values that are kept once.
+
+#[cfg(feature = "program")]
+mod canonical;
+mod digest;
+mod recent;
+mod shared;
+
+pub use digest::Digest;
+pub use recent::Recent;
+pub use shared::{Distinct, Shared};

@@ -1,0 +1,343 @@
+//! Images that were enhanced elsewhere, from the dark images of `synthesize`: [`EnhancedImages`], the folder of `--enhanced NAME=DIR`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use crate::dataset::inputs::stem;
+use crate::error::{Error, Result};
+use crate::files::reading;
+use crate::images::frames::SourceFrame;
+use crate::images::recipes::ImageRecipe;
+use crate::images::stored::{Sidecar, differing};
+use crate::picture::image_file::format::FileFormat;
+use crate::picture::{ImageFile, ReadingRule};
+use crate::text::words::first_names;
+use crate::types::{Condition, DepthNote, Digest, EnhancerName, FrameId, Rgb};
+use darkqa_enhance::{EnhancedFolder, ImageUse, Implausible, Usage};
+
+/// Number of files that a message names for each fault; chosen.
+const NAMED: usize = 4;
+/// Depth of folders in folders below which files are not looked for; chosen, against circles of links.
+const DEEPEST: usize = 16;
+
+/// The images of one folder. Each has the name of its dark image, and beside it the JSON file that `synthesize` wrote for that.
+#[derive(Debug)]
+pub(crate) struct EnhancedImages {
+    name: EnhancerName,
+    folder: PathBuf,
+    /// Files by their path below the folder, without the JSON files.
+    files: BTreeMap<String, EnhancedFile>,
+    usage: Usage,
+}
+
+/// A file of the folder.
+#[derive(Debug)]
+struct EnhancedFile {
+    digest: Digest,
+    /// Width and height in pixels of an 8-bit PNG; else the faults of the file.
+    size: std::result::Result<(u32, u32), String>,
+}
+
+/// A dark image of a run, as `synthesize` would write it.
+pub(crate) struct DarkImage<'a> {
+    pub(crate) frame: &'a SourceFrame,
+    pub(crate) condition: &'a Condition,
+    pub(crate) recipe: ImageRecipe,
+}
+
+/// A reason why an image cannot be used. Reasons with the same words are reported together.
+struct Fault {
+    words: &'static str,
+    /// Peculiarities of the file; empty without any.
+    detail: String,
+}
+
+impl Fault {
+    fn new(words: &'static str, detail: impl Into<String>) -> Self {
+        Self {
+            words,
+            detail: detail.into(),
+        }
+    }
+}
+
+impl EnhancedImages {
+    /// The images of these folders. Names must differ from each other and from those of `models`.
+    ///
+    /// # Errors
+    /// If a folder cannot be read or has no image, or a name is used twice.
+    pub(crate) fn open_all<'a>(
+        folders: &[EnhancedFolder],
+        models: impl IntoIterator<Item = &'a EnhancerName>,
+    ) -> Result<Vec<Self>> {
+        let mut names: BTreeSet<&EnhancerName> = models.into_iter().collect();
+        if let Some(twice) = folders.iter().find(|folder| !names.insert(&folder.name)) {
+            let problem = format_args!("two enhancers are named {}; take another NAME", twice.name);
+            return Err(Error::usage("--enhanced", problem));
+        }
+        folders.iter().map(Self::open).collect()
+    }
+
+    fn open(args: &EnhancedFolder) -> Result<Self> {
+        let mut paths = Vec::new();
+        add_files(&args.folder, "", 0, &mut paths).map_err(|e| e.usage_at("--enhanced"))?;
+        let files = paths
+            .into_par_iter()
+            .map(|path| {
+                let file = EnhancedFile::open(&args.folder.join(&path))?;
+                Ok((path, file))
+            })
+            .collect::<Result<BTreeMap<_, _>>>()?;
+        if files.is_empty() {
+            let problem = format_args!("{}: no image is in it", args.folder.display());
+            return Err(Error::usage("--enhanced", problem));
+        }
+        Ok(Self {
+            name: args.name.clone(),
+            folder: args.folder.clone(),
+            files,
+            usage: Usage::made_elsewhere(),
+        })
+    }
+
+    pub(crate) fn name(&self) -> &EnhancerName {
+        &self.name
+    }
+
+    /// The note about the images, which grows while they are read.
+    pub(crate) fn usage(&self) -> &Usage {
+        &self.usage
+    }
+
+    /// The folder, as it was named.
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Digest of the names and contents of all images.
+    pub(crate) fn digest(&self) -> Digest {
+        let parts = self
+            .files
+            .iter()
+            .flat_map(|(path, file)| [path.as_bytes(), file.digest.as_bytes()]);
+        Digest::from_parts(std::iter::once(&b"darkqa.enhanced-folder/1"[..]).chain(parts))
+    }
+
+    /// Digest of the image of a frame in a condition.
+    ///
+    /// # Errors
+    /// If it is missing.
+    pub(crate) fn digest_of(&self, frame: &FrameId, condition: &Condition) -> Result<Digest> {
+        let path = path(frame, condition)?;
+        let file = self.files.get(&path);
+        let file = file.ok_or_else(|| Error::data(self.folder.join(&path).display(), "missing"))?;
+        Ok(file.digest)
+    }
+
+    /// The image of a frame in a condition, made elsewhere of a degraded one.
+    ///
+    /// # Errors
+    /// If it was changed since it was checked, cannot be decoded, or has another size.
+    pub(crate) fn image(
+        &self,
+        degraded: &Rgb,
+        (frame, condition): (&FrameId, &Condition),
+        implausible: Implausible,
+    ) -> Result<(Rgb, ImageUse)> {
+        let place = self.folder.join(path(frame, condition)?);
+        let wrong = |problem: &str| Error::data(place.display(), problem);
+        let file = ImageFile::open(&place, ReadingRule::default())?;
+        if Digest::from_bytes(file.bytes()) != self.digest_of(frame, condition)? {
+            return Err(wrong(
+                "the image was changed during the run; restore it, or begin a new run",
+            ));
+        }
+        let image = file.decode()?;
+        if (image.height(), image.width()) != (degraded.height(), degraded.width()) {
+            return Err(wrong("the image has another size than its dark image"));
+        }
+        let used = ImageUse::made_elsewhere([degraded, &image]);
+        used.note_made_elsewhere(&self.usage, &self.folder, [frame, condition], implausible)?;
+        Ok((image, used))
+    }
+
+    /// Checks that each of these dark images has its enhanced one. Images that are missing, have another size or format, or were made
+    /// from other dark images are logged by name, and so are files that belong to none.
+    ///
+    /// # Errors
+    /// If an image cannot be used, or all are the dark images themselves.
+    pub(crate) fn check(&self, dark: &[DarkImage<'_>]) -> Result<()> {
+        let mut faults: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+        let mut wanted = BTreeSet::new();
+        let mut unchanged = 0;
+        for image in dark {
+            let path = path(&image.frame.id, image.condition)?;
+            match self.fault(&path, image) {
+                Ok(is_dark) => unchanged += usize::from(is_dark),
+                Err(Fault { words, detail }) => {
+                    let named = match &*detail {
+                        "" => path.clone(),
+                        detail => format!("{path} ({detail})"),
+                    };
+                    faults.entry(words).or_default().push(named);
+                }
+            }
+            wanted.insert(path);
+        }
+        if !faults.is_empty() {
+            for (words, names) in &faults {
+                tracing::error!(
+                    "{}: {words}: {}",
+                    self.folder.display(),
+                    first_names(names, NAMED)
+                );
+            }
+            let count: usize = faults.values().map(Vec::len).sum();
+            let problem = format_args!(
+                "{count} of the {} images of {} cannot be used; nothing was asked",
+                dark.len(),
+                self.name
+            );
+            return Err(Error::data(self.folder.display(), problem));
+        }
+        if unchanged == dark.len() && !dark.is_empty() {
+            let problem =
+                "all images are the dark images themselves; name the folder of the enhanced ones";
+            return Err(Error::data(self.folder.display(), problem));
+        }
+        let surplus: Vec<String> = self
+            .files
+            .keys()
+            .filter(|path| !wanted.contains(*path))
+            .cloned()
+            .collect();
+        if !surplus.is_empty() {
+            tracing::warn!(
+                "{}: {} of {} images are not used, as they are of other frames or conditions than those asked: {}",
+                self.folder.display(),
+                surplus.len(),
+                self.files.len(),
+                first_names(&surplus, NAMED)
+            );
+        }
+        Ok(())
+    }
+
+    /// Whether an image is its dark image itself, byte for byte.
+    ///
+    /// # Errors
+    /// The fault of the image.
+    fn fault(&self, path: &str, dark: &DarkImage<'_>) -> std::result::Result<bool, Fault> {
+        if dark.condition.pair().is_some() {
+            let words = "`synthesize` writes no photographs in the dark and none that match them (see --llie-on)";
+            return Err(Fault::new(words, ""));
+        }
+        let Some(file) = self.files.get(path) else {
+            let other = self.other_format(path).unwrap_or_default();
+            return Err(Fault::new("missing", other));
+        };
+        let size = file.size.as_ref();
+        let (width, height) = *size
+            .map_err(|problem| Fault::new("not a PNG file of 8 bits a channel", &**problem))?;
+        if (width, height) != dark.frame.size {
+            let (w, h) = dark.frame.size;
+            let words = "another size than the dark image, and nothing is resized";
+            return Err(Fault::new(words, format!("{width}×{height}, not {w}×{h}")));
+        }
+        let json = self.folder.join(path).with_extension("json");
+        if !json.exists() {
+            let words = "without the JSON file that `synthesize` wrote beside the dark image; copy it beside the enhanced one";
+            return Err(Fault::new(words, ""));
+        }
+        let words = "the JSON file beside it is not one of `synthesize`";
+        let sidecar =
+            Sidecar::<ImageRecipe>::read(&json).map_err(|e| Fault::new(words, e.to_string()))?;
+        if sidecar.recipe != dark.recipe {
+            let words = "made from another dark image than this run's; `synthesize` needs the same data and the same flags of light";
+            return Err(Fault::new(
+                words,
+                differences(&sidecar.recipe, &dark.recipe),
+            ));
+        }
+        Ok(sidecar.vouches_for(file.digest))
+    }
+
+    /// The name of a file in another format that has the place of an image.
+    fn other_format(&self, path: &str) -> Option<String> {
+        let bare = path.strip_suffix("png")?;
+        let mut others = self.files.range(bare.to_owned()..);
+        let (other, _) = others.next()?;
+        let ending = other.strip_prefix(bare)?;
+        (!ending.contains(['/', '.'])).then(|| format!("only {other} is there"))
+    }
+}
+
+impl EnhancedFile {
+    fn open(path: &Path) -> Result<Self> {
+        let file = ImageFile::open(path, ReadingRule::default())?;
+        Ok(Self {
+            digest: Digest::from_bytes(file.bytes()),
+            size: size(&file),
+        })
+    }
+}
+
+/// Width and height of a PNG file of 8 bits a channel.
+///
+/// # Errors
+/// A description of the file if it is no 8-bit PNG image.
+fn size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
+    match FileFormat::detect(file.bytes())? {
+        FileFormat::Png => {}
+        other => return Err(other.name().to_owned()),
+    }
+    let size = file.check().map_err(|e| e.to_string())?;
+    let note = file.note();
+    if note.depth == Some(DepthNote::Codes16) {
+        return Err("16 bits".to_owned());
+    }
+    if note.depth.is_some() || note.orientation.is_some() {
+        return Err("linear light or a stated turn".to_owned());
+    }
+    Ok(size)
+}
+
+/// The fields in which two recipes differ. The state of the sensor follows from the others, and is named only if it alone differs.
+fn differences(one: &ImageRecipe, other: &ImageRecipe) -> String {
+    let stated = [one, other].map(|recipe| {
+        let mut fields = json!(recipe);
+        if let Some(sensor) = fields.get_mut("sensor").and_then(Value::as_object_mut) {
+            sensor.remove("state");
+        }
+        fields
+    });
+    match differing(&stated[0], &stated[1]) {
+        fields if fields.is_empty() => "other state of the sensor".to_owned(),
+        fields => format!("other {}", fields.join(", ")),
+    }
+}
+
+/// The path of an image below its folder: the name that `synthesize` gives it.
+fn path(frame: &FrameId, condition: &Condition) -> Result<String> {
+    let raw = Condition::raw(condition.treatment.clone());
+    Ok(format!("{}_{raw}.png", stem(frame)?))
+}
+
+/// Adds the files of a folder and of those in it, by their path below the first, without JSON and hidden files.
+fn add_files(folder: &Path, below: &str, depth: usize, files: &mut Vec<String>) -> Result<()> {
+    for path in reading::entries(folder)? {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with('.') || name.ends_with(".json") {
+            continue;
+        }
+        if path.is_dir() && depth < DEEPEST {
+            add_files(&path, &format!("{below}{name}/"), depth + 1, files)?;
+        } else if path.is_file() {
+            files.push(format!("{below}{name}"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,15 @@
+//! Frames that are shown together, their photographs, and walks.
+
+mod input_tally;
+mod photograph;
+pub(crate) mod photographs;
+mod source;
+mod walk;
+
+pub(crate) use input_tally::InputTally;
+pub(super) use photograph::{SourcePhotograph, matched};
+pub(crate) use source::{
+    Frames, Source, SourceFrame, first_asked, input_summary, inspect_all, warn_of_inputs,
+};
+pub(super) use walk::{CameraOf, DegradedAt};
+pub(crate) use walk::{Walk, WalkFolder};

@@ -1,0 +1,9 @@
+//! Notes about images for the report: thumbnails and what was made of them.
+
+mod image_notes;
+mod montage;
+pub(crate) mod thumbnail;
+
+pub(crate) use image_notes::{ImageNotes, MissingNotes};
+pub(super) use image_notes::{WantedNotes, fidelity, similarity};
+pub(crate) use montage::montage;

@@ -1,0 +1,82 @@
+//! Piecewise linear approximation of a function of a positive number: [`Piecewise`].
+
+/// Pieces per octave, a power of two; chosen.
+const PIECES: usize = 128;
+/// Low bits of a single-precision number that give its position within a piece.
+const WITHIN: u32 = 23 - PIECES.ilog2();
+/// Octaves that a table covers.
+const OCTAVES: usize = 32;
+
+/// Function over 32 octaves of its argument, as 128 straight pieces per octave.
+///
+/// The pieces of an octave have equal width, so that the width shrinks with the argument. A curve like a logarithm or a
+/// power therefore has the same relative accuracy everywhere, also at its steep end. The error of a piece is at most
+/// f″(x) x² / 8 · 2⁻¹⁴: 8·10⁻⁶ for a logarithm.
+#[derive(Debug, Clone)]
+pub(crate) struct Piecewise {
+    /// Upper bits of the lower end of the domain, where the first piece begins.
+    first: u32,
+    /// Value at the beginning of each piece, and its increase per unit in the last place of the argument.
+    pieces: Box<[[f32; 2]; OCTAVES * PIECES]>,
+}
+
+impl Piecewise {
+    /// Tabulates `function` from 2^`exponent` up to 2^(`exponent` + 32).
+    #[must_use]
+    pub(crate) fn new(exponent: i32, function: impl Fn(f64) -> f64) -> Self {
+        let base = libm::ldexp(1.0, exponent);
+        let begin = |piece: usize| {
+            let octave = (1_u64 << (piece / PIECES)) as f64;
+            function(base * octave * (1.0 + (piece % PIECES) as f64 / PIECES as f64))
+        };
+        let mut pieces = vec![[0.0; 2]; OCTAVES * PIECES];
+        let mut value = begin(0);
+        for (index, piece) in pieces.iter_mut().enumerate() {
+            let next = begin(index + 1);
+            *piece = [
+                value as f32,
+                ((next - value) / f64::from(1 << WITHIN)) as f32,
+            ];
+            value = next;
+        }
+        Self {
+            first: ((exponent + 127) as u32) << PIECES.ilog2(),
+            pieces: pieces
+                .try_into()
+                .unwrap_or_else(|_| unreachable!("the length is OCTAVES * PIECES")),
+        }
+    }
+
+    /// The function at `x`, which must be in the domain.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn at(&self, x: f32) -> f32 {
+        let bits = x.to_bits();
+        let piece = (bits >> WITHIN).wrapping_sub(self.first) as usize % (OCTAVES * PIECES);
+        let [value, rise] = self.pieces[piece];
+        value + rise * (bits & ((1 << WITHIN) - 1)).cast_signed() as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_logarithm_is_accurate_over_all_octaves() {
+        let table = Piecewise::new(-20, f64::ln);
+        for step in 0..100_000 {
+            let x = f32::exp2(-20.0 + 31.999 * step as f32 / 100_000.0);
+            let off = f64::from(table.at(x)) - f64::from(x).ln();
+            assert!(off.abs() < 8e-6 + 2e-6, "{x}: {off}");
+        }
+    }
+
+    #[test]
+    fn pieces_meet_the_function_where_they_begin() {
+        let table = Piecewise::new(0, |x| x * x);
+        for x in [1.0, 1.0078125, 1.5, 2.0, 1024.0, 4_278_190_080.0] {
+            assert!((table.at(x) / (x * x) - 1.0).abs() < 1e-7);
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Distributions symmetric about zero, sampled by their quantile functions: [`Quantile`].
+
+use std::sync::LazyLock;
+
+use super::lanes::{LANES, Lanes};
+use super::piecewise::Piecewise;
+
+/// The largest single-precision number below 2^31.
+const LAST: f32 = 2_147_483_520.0;
+
+/// Quantile function with Q(1 − u) = −Q(u), tabulated on the lower half, u = (m + ½) · 2⁻³² for m below 2^31.
+///
+/// The smallest u is 2⁻³³.
+#[derive(Debug, Clone)]
+pub struct Quantile(Piecewise);
+
+/// Quantile function of the standard normal distribution.
+pub(crate) static NORMAL: LazyLock<Quantile> = LazyLock::new(|| Quantile::new(standard_normal));
+
+impl Quantile {
+    /// Tabulates a quantile function, which is called for u in (0, ½].
+    #[must_use]
+    pub fn new(function: impl Fn(f64) -> f64) -> Self {
+        let cell = libm::ldexp(1.0, -32);
+        Self(Piecewise::new(-1, |place| function(place * cell)))
+    }
+
+    /// Quantile function of Tukey's λ distribution, with shape λ.
+    #[must_use]
+    pub fn tukey_lambda(shape: f64) -> Self {
+        Self::new(|u| tukey_lambda(u, shape))
+    }
+
+    /// The quantile of 32 random bits: one for the sign, 31 for u.
+    #[inline(always)]
+    #[must_use]
+    pub fn at(&self, word: u32) -> f32 {
+        let place = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
+        let lower = self.0.at(if place < LAST { place } else { LAST });
+        f32::from_bits(lower.to_bits() ^ (word & 0x8000_0000))
+    }
+
+    /// The quantiles of a batch of words.
+    #[inline(always)]
+    #[must_use]
+    pub fn lanes(&self, words: &Lanes<u32>) -> Lanes<f32> {
+        let mut numbers = [0.0; LANES];
+        for (number, word) in numbers.iter_mut().zip(words) {
+            *number = self.at(*word);
+        }
+        numbers
+    }
+}
+
+/// The quantile function of Tukey's λ distribution, (u^λ − (1 − u)^λ) / λ and ln u − ln(1 − u) at λ = 0, for u in the
+/// open interval (0, 1).
+///
+/// It is computed as a difference of exp(λ ln u) − 1, which stays accurate for every λ near 0.
+#[must_use]
+pub fn tukey_lambda(u: f64, shape: f64) -> f64 {
+    let (below, above) = (libm::log(u), libm::log1p(-u));
+    if shape == 0.0 {
+        below - above
+    } else {
+        (libm::expm1(shape * below) - libm::expm1(shape * above)) / shape
+    }
+}
+
+/// The quantile function of the standard normal distribution on (0, ½], by Newton's method on its distribution function.
+fn standard_normal(u: f64) -> f64 {
+    let density = |z: f64| libm::exp(-0.5 * z * z) / (2.0 * std::f64::consts::PI).sqrt();
+    let distribution = |z: f64| 0.5 * libm::erfc(-z / std::f64::consts::SQRT_2);
+    // ln Φ is concave: from the left of the root, Newton's steps on it never overshoot and soon converge quadratically.
+    let mut z = -(-2.0 * libm::log(u)).sqrt();
+    for _ in 0..60 {
+        let step = libm::log(distribution(z) / u) * distribution(z) / density(z);
+        z -= step;
+        if step.abs() < 1e-13 {
+            break;
+        }
+    }
+    z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quantile_function_is_the_closed_form() {
+        let u = [1e-5, 1e-3, 0.01, 0.25, 0.5, 0.75, 0.99, 0.999, 1.0 - 1e-5];
+        for shape in [
+            -1.0 / 7.0,
+            -0.042857,
+            0.042857,
+            0.114286,
+            1.0 / 7.0,
+            1.0,
+            2.0,
+        ] {
+            for u in u {
+                let expected = (f64::powf(u, shape) - f64::powf(1.0 - u, shape)) / shape;
+                let found = tukey_lambda(u, shape);
+                assert!(
+                    (found - expected).abs() < 1e-12 * expected.abs().max(1.0),
+                    "λ {shape}, u {u}"
+                );
+            }
+        }
+        for u in u {
+            let expected = (u / (1.0 - u)).ln();
+            assert!((tukey_lambda(u, 0.0) - expected).abs() < 1e-12 * expected.abs().max(1.0));
+            assert!((tukey_lambda(u, 1e-12) - expected).abs() < 1e-9 * expected.abs().max(1.0));
+        }
+    }
+
+    #[test]
+    fn normal_quantiles_are_the_published_ones() {
+        for (u, z) in [
+            (0.5, 0.0),
+            (0.25, -0.674_489_750_196_082),
+            (0.025, -1.959_963_984_540_054),
+            (1e-3, -3.090_232_306_167_813_5),
+            (1e-5, -4.264_890_793_922_825),
+            (1e-9, -5.997_807_015_007_687),
+        ] {
+            assert!((standard_normal(u) - z).abs() < 1e-12, "{u}");
+        }
+    }
+
+    /// Comparison of table and function at words over the whole range and at both of its ends.
+    #[test]
+    fn tables_follow_their_functions() {
+        type Function = Box<dyn Fn(f64) -> f64>;
+        let mut functions: Vec<Function> = vec![Box::new(standard_normal)];
+        for shape in [-10.0, -6.0, 0.0, 3.0, 9.0] {
+            functions.push(Box::new(move |u| tukey_lambda(u, shape / 70.0)));
+        }
+        for function in functions {
+            let table = Quantile::new(&function);
+            for octave in 0..31 {
+                for step in 0..1000_u64 {
+                    let place = ((1 << octave) * (1000 + step) / 1000) as u32;
+                    let expected = function((f64::from(place) + 0.5) * f64::exp2(-32.0));
+                    let [lower, upper] =
+                        [place, place | 1 << 31].map(|word| f64::from(table.at(word)));
+                    assert!(
+                        (lower - expected).abs() < 1e-5 + 3e-6 * expected.abs(),
+                        "{place}: {lower}, {expected}"
+                    );
+                    assert!((lower + upper).abs() < f64::EPSILON);
+                }
+            }
+            let [first, last] = [0, 0x7FFF_FFFF].map(|word| f64::from(table.at(word)));
+            assert!((first - function(f64::exp2(-33.0))).abs() < 1e-5 * first.abs());
+            assert!(last.abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! RAW images: made from a frame, with noise, and developed.
+
+mod bayer;
+mod clean_raw;
+pub(super) mod colour;
+mod isp;
+pub mod negative;
+pub mod noise;
+mod unprocess;
+
+pub use bayer::Bayer;
+#[cfg(test)]
+pub(super) use bayer::Plane;
+pub use clean_raw::CleanRaw;
+#[cfg(test)]
+pub(super) use isp::Developer;
+pub use unprocess::{unprocess, unprocess_up_to};

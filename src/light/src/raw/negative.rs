@@ -1,0 +1,384 @@
+//! The noisy RAW image of a frame, [`Negative`], which is developed at any level; or all levels at once, [`ladder`].
+
+use rayon::prelude::*;
+
+use super::bayer::Bayer;
+use super::isp::Developer;
+use super::noise::{Noise, Term};
+use super::unprocess::Unprocess;
+use crate::camera::CameraState;
+use crate::clean::Clean;
+use crate::draws::NoiseKey;
+use crate::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
+use darkqa_ground::types::images::{Isa, Sample};
+use darkqa_ground::types::{Image, Rgb, Severity};
+
+/// Rows of a band, which is processed from RAW to codes within a core's cache; chosen.
+const BAND: usize = 32;
+
+/// Noisy RAW image of a frame. Camera and noise are drawn once and shared by all levels developed from it.
+///
+/// So the levels differ in light alone. Each level has the same distribution as with separate draws.
+#[derive(Debug)]
+pub struct Negative {
+    developer: Developer,
+    balanced: Bayer,
+    /// The only level that may be developed from it; `None` for all levels.
+    only_level: Option<Severity>,
+    /// Height and width of the frame, in pixels.
+    size: [usize; 2],
+}
+
+impl Negative {
+    /// The negative of `clean` for a level, with camera and noise drawn from the key.
+    #[must_use]
+    pub fn new<'a>(
+        clean: impl Into<Clean<'a>>,
+        key: &NoiseKey,
+        synthesis: &Synthesis,
+        severity: Severity,
+    ) -> Self {
+        let clean = clean.into();
+        let capture = Capture::new(key, synthesis, severity, Isa::best());
+        let capture = capture.for_clean(clean, synthesis.headroom_ev(severity.value()));
+        Self {
+            only_level: (!synthesis.shares_negative()).then_some(severity),
+            ..Self::developed_by(clean, capture)
+        }
+    }
+
+    /// The negative of `clean` for a camera in the given state and with the given terms of noise, for all levels.
+    /// `headroom_ev` is that of the light reading ([`Synthesis::headroom_ev`]); it matters for light alone.
+    #[must_use]
+    pub fn with_state<'a>(
+        clean: impl Into<Clean<'a>>,
+        key: &NoiseKey,
+        state: &CameraState,
+        amplify: Amplify,
+        tone: Tone,
+        terms: &[Term],
+        headroom_ev: f64,
+    ) -> Self {
+        let clean = clean.into();
+        let capture = Capture::with(key, state, amplify, tone, terms, Isa::best());
+        Self::developed_by(clean, capture.for_clean(clean, headroom_ev))
+    }
+
+    /// The negative of a noisy, white-balanced RAW image that covers `size`, for all levels.
+    pub(super) fn from_balanced(developer: Developer, balanced: Bayer, size: [usize; 2]) -> Self {
+        Self {
+            developer,
+            balanced,
+            only_level: None,
+            size,
+        }
+    }
+
+    fn developed_by(clean: Clean<'_>, capture: Capture) -> Self {
+        let (height, width) = (clean.height(), clean.width());
+        let mut balanced = Bayer::covering(height, width);
+        balanced
+            .lines_mut()
+            .enumerate()
+            .for_each(|(row, mut line)| capture.capture_row(clean, row, &mut line));
+        Self::from_balanced(capture.developer, balanced, [height, width])
+    }
+
+    /// Whether a level may be developed from this negative.
+    #[must_use]
+    pub fn serves(&self, severity: Severity) -> bool {
+        self.only_level.is_none_or(|only| only == severity)
+    }
+
+    /// The sRGB image at a level.
+    #[must_use]
+    pub fn develop(&self, severity: Severity) -> Rgb {
+        self.develop_by(severity.value())
+    }
+
+    /// The sRGB image after any exposure drop.
+    #[must_use]
+    pub fn develop_by(&self, drop_ev: f64) -> Rgb {
+        let [height, width] = self.size;
+        let mut degraded = Rgb::black(height, width);
+        degraded
+            .samples_mut()
+            .par_chunks_mut(3 * width)
+            .enumerate()
+            .for_each_init(
+                || vec![0.0; 3 * width],
+                |display, (row, codes)| {
+                    self.developer.display(&self.balanced, row, display);
+                    self.developer.encode(display, drop_ev, codes);
+                },
+            );
+        degraded
+    }
+}
+
+/// Develops a frame at several levels: `images[i]`, of the frame's size, receives the image at `levels[i]`.
+///
+/// The images equal those of [`Negative::develop`]; together they take less time and memory.
+///
+/// # Panics
+/// If an image has another size, or there are more levels than images.
+pub fn ladder<'a>(
+    clean: impl Into<Clean<'a>>,
+    key: &NoiseKey,
+    synthesis: &Synthesis,
+    levels: &[Severity],
+    images: &mut [Rgb],
+) {
+    let (clean, isa) = (clean.into(), Isa::best());
+    if synthesis.shares_negative() {
+        if let Some(level) = levels.first() {
+            let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();
+            let capture = Capture::new(key, synthesis, *level, isa);
+            capture.for_clean(clean, 0.0).develop(clean, &drops, images);
+        }
+    } else {
+        for (level, image) in levels.iter().zip(images) {
+            let capture = Capture::new(key, synthesis, *level, isa);
+            let capture = capture.for_clean(clean, synthesis.headroom_ev(level.value()));
+            capture.develop(clean, &[level.value()], std::slice::from_mut(image));
+        }
+    }
+}
+
+/// A frame after an exposure drop, with the noise of this sensor in this state of its frame.
+#[must_use]
+pub(crate) fn develop_by(
+    clean: Clean<'_>,
+    key: &NoiseKey,
+    synthesis: &Synthesis,
+    drop_ev: f64,
+) -> Rgb {
+    let state = synthesis.state_by(key, drop_ev);
+    let Synthesis { amplify, tone, .. } = *synthesis;
+    let headroom = synthesis.headroom_ev(drop_ev);
+    develop_with_state(clean, key, &state, amplify, tone, [drop_ev, headroom])
+}
+
+/// A frame after an exposure drop, with the noise of a camera in the given state; the drop and the headroom of the light reading
+/// ([`Synthesis::headroom_ev`]) are in EV.
+#[must_use]
+pub fn develop_with_state(
+    clean: Clean<'_>,
+    key: &NoiseKey,
+    state: &CameraState,
+    amplify: Amplify,
+    tone: Tone,
+    [drop_ev, headroom_ev]: [f64; 2],
+) -> Rgb {
+    let capture = Capture::with(key, state, amplify, tone, &Term::ALL, Isa::best());
+    let capture = capture.for_clean(clean, headroom_ev);
+    let mut image = Rgb::black(clean.height(), clean.width());
+    capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
+    image
+}
+
+/// A sample of a developed image.
+pub(crate) trait Target: Sample + Send {
+    /// Writes the samples of display values after an exposure drop.
+    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]);
+}
+
+/// 8-bit codes.
+impl Target for u8 {
+    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]) {
+        developer.encode(display, drop_ev, samples);
+    }
+}
+
+/// Linear light.
+impl Target for f32 {
+    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]) {
+        developer.expand(display, drop_ev, samples);
+    }
+}
+
+/// One exposure of the sensor: camera state and noise, ready for any row.
+pub(crate) struct Capture {
+    unprocess: Unprocess,
+    noise: Noise,
+    developer: Developer,
+}
+
+impl Capture {
+    fn new(key: &NoiseKey, synthesis: &Synthesis, severity: Severity, isa: Isa) -> Self {
+        let state = synthesis.state(key, severity);
+        let key = match synthesis.draws {
+            Draws::Shared => *key,
+            Draws::Fresh => key.at(severity),
+        };
+        let Synthesis { amplify, tone, .. } = *synthesis;
+        Self::with(&key, &state, amplify, tone, &Term::ALL, isa)
+    }
+
+    /// The image of a frame after an exposure drop; drop and headroom of the light reading are in EV.
+    pub(crate) fn image<T: Target>(
+        self,
+        clean: Clean<'_>,
+        drop_ev: f64,
+        headroom_ev: f64,
+    ) -> Image<T> {
+        let mut image = Image::black(clean.height(), clean.width());
+        let capture = self.for_clean(clean, headroom_ev);
+        capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
+        image
+    }
+
+    pub(crate) fn with(
+        key: &NoiseKey,
+        state: &CameraState,
+        amplify: Amplify,
+        tone: Tone,
+        terms: &[Term],
+        isa: Isa,
+    ) -> Self {
+        Self {
+            unprocess: Unprocess::new(state, isa),
+            noise: Noise::new(state, key, amplify, terms, isa),
+            developer: Developer::new(state, tone, isa),
+        }
+    }
+
+    /// The same exposure, prepared for a clean frame. Codes end at white, and so does the sensor. For linear light the sensor saturates
+    /// `headroom_ev` EV above white, and the tone curve before the drop is left out: it undoes the inverse tone curve of codes, and linear
+    /// light has none.
+    fn for_clean(self, clean: Clean<'_>, headroom_ev: f64) -> Self {
+        if !matches!(clean, Clean::Scene(_)) {
+            return self;
+        }
+        Self {
+            unprocess: self.unprocess.with_headroom(libm::exp2(headroom_ev) as f32),
+            developer: self.developer.for_linear_light(headroom_ev),
+            ..self
+        }
+    }
+
+    /// Fills a sensor row with the frame's samples, noisy and white-balanced.
+    fn capture_row(&self, clean: Clean<'_>, row: usize, line: &mut super::bayer::RawRow<'_>) {
+        self.unprocess.fill(clean, row, line);
+        self.noise.apply(row, line);
+        self.developer.balance(row, line);
+        line.repeat_edges();
+    }
+
+    /// Develops the frame after each of these exposure drops, band by band.
+    fn develop<T: Target>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [Image<T>]) {
+        let (height, width) = (clean.height(), clean.width());
+        let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
+        bands.resize_with(height.div_ceil(BAND), Vec::new);
+        for image in &mut images[..drops.len()] {
+            assert_eq!((image.height(), image.width()), (height, width));
+            let parts = image.samples_mut().chunks_mut(BAND * 3 * width);
+            for (band, part) in bands.iter_mut().zip(parts) {
+                band.push(part);
+            }
+        }
+        // A band has two more rows on each side, except at the image's edges. Two, so that it begins with a row of red sites.
+        let scratch = || (Bayer::covering(BAND + 4, width), vec![0.0; 3 * width]);
+        bands.into_par_iter().enumerate().for_each_init(
+            scratch,
+            |(raw, display), (band, mut parts)| {
+                let first = band * BAND;
+                let rows = BAND.min(height - first);
+                let lead = if first == 0 { 0 } else { 2 };
+                let end = (first + rows + 2).min(height.next_multiple_of(2));
+                if raw.height() != end + lead - first {
+                    *raw = Bayer::covering(end + lead - first, width);
+                }
+                for at in lead.saturating_sub(1)..raw.height().min(lead + rows + 1) {
+                    self.capture_row(clean, first + at - lead, &mut raw.line_mut(at));
+                }
+                for row in 0..rows {
+                    self.developer.display(raw, lead + row, display);
+                    for (drop_ev, part) in drops.iter().zip(&mut parts) {
+                        let samples = &mut part[row * 3 * width..][..3 * width];
+                        T::write(&self.developer, display, *drop_ev, samples);
+                    }
+                }
+            },
+        );
+    }
+}
+
+impl Synthesis {
+    /// State of the camera of the frame that `key` belongs to, at a level.
+    #[must_use]
+    pub fn state(&self, key: &NoiseKey, severity: Severity) -> CameraState {
+        self.state_by(key, severity.value())
+    }
+
+    /// State of the camera after any exposure drop. With [`Coupling::Photon`], a negative drop has the ratio 1.
+    #[must_use]
+    pub fn state_by(&self, key: &NoiseKey, drop_ev: f64) -> CameraState {
+        let drawn = CameraState::draw(key, &self.camera);
+        match self.coupling {
+            Coupling::Independent => drawn,
+            Coupling::Photon => CameraState {
+                ratio: libm::exp2(drop_ev.max(0.0)),
+                ..drawn
+            },
+        }
+    }
+
+    /// How many EV above white the sensor saturates after an exposure drop ([`Coupling::headroom_ev`]).
+    #[must_use]
+    pub fn headroom_ev(&self, drop_ev: f64) -> f64 {
+        self.coupling.headroom_ev(drop_ev)
+    }
+
+    /// Whether all levels of a frame are developed from one negative.
+    #[must_use]
+    pub fn shares_negative(&self) -> bool {
+        self.draws == Draws::Shared && self.coupling == Coupling::Independent
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darkqa_ground::types::FrameId;
+
+    /// Dark, bright and medium samples, so that every branch of the samplers is reached.
+    fn clean() -> Rgb {
+        let samples = (0..40 * 150 * 3).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8);
+        Rgb::new(40, 150, samples.collect()).unwrap()
+    }
+
+    /// No instruction set changes a byte of the sensor branch, at any gain or ratio.
+    #[test]
+    fn the_instruction_set_does_not_change_the_image() {
+        let sets = Isa::available();
+        let clean = clean();
+        let key = NoiseKey::new(9, &FrameId("isa".to_owned()));
+        let choices = [
+            (Amplify::ShotOnly, Tone::None),
+            (Amplify::All, Tone::BeforeEv),
+            (Amplify::All, Tone::AfterEv),
+        ];
+        for (gain, ratio) in [(0.1, 100.0), (6.0, 300.0), (0.05, 4.0), (0.01, 1.0)] {
+            let drawn = CameraState::draw(&key, &crate::CameraModel::default());
+            let state = CameraState {
+                system_gain: gain,
+                ratio,
+                ..drawn
+            };
+            for (amplify, tone) in choices {
+                let develop = |isa: &Isa| {
+                    let capture = Capture::with(&key, &state, amplify, tone, &Term::ALL, *isa);
+                    let mut images = Severity::LADDER.map(|_| Rgb::black(40, 150));
+                    let drops = Severity::LADDER.map(Severity::value);
+                    capture.develop((&clean).into(), &drops, &mut images);
+                    images
+                };
+                let baseline = develop(&Isa::Baseline);
+                for isa in &sets {
+                    assert_eq!(baseline, develop(isa), "{isa:?}, K {gain}, r {ratio}");
+                }
+            }
+        }
+    }
+}

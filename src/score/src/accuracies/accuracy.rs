@@ -1,0 +1,225 @@
+//! The accuracy of each model in each condition: [`AccuracySummary`].
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::chance::{OfferedChoices, chance, chance_of_questions};
+use super::health::Health;
+use crate::choice::ReadingMode;
+use crate::estimate::{ClusterCount, Estimate};
+use crate::grid::{Grid, GridItem, TrialResult};
+use crate::subject::{CHANCE, Subject};
+use darkqa_ground::types::{Family, KindReading, UnreadReason};
+
+/// Accuracy of one subject on one family in one reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AccuracyCell {
+    #[serde(flatten)]
+    pub subject: Subject,
+    /// Question family; `None` for all families together.
+    pub family: Option<Family>,
+    /// How the replies were read.
+    pub mode: ReadingMode,
+    /// Number of replies that named the true choice.
+    pub right: usize,
+    /// Number of replies in which no choice could be read. They count as wrong, as people do who cannot tell.
+    pub unparsed: usize,
+    /// Number of trials without a reply. They are not scored.
+    pub failed: usize,
+    /// Share of right replies among all replies; `None` if there is no reply.
+    pub accuracy: Option<Estimate>,
+    /// Share of questions answered correctly every time: in every order of the choices (MMBench's circular evaluation,
+    /// Liu et al. 2023, arXiv:2307.06281, section 4.2) and in every repeat. `None` if each question was asked once.
+    pub always: Option<Estimate>,
+}
+
+impl AccuracyCell {
+    /// Number of replies behind the accuracy.
+    #[must_use]
+    pub fn replies(&self) -> usize {
+        self.accuracy.map_or(0, |accuracy| accuracy.n)
+    }
+}
+
+/// All cells of a run, ordered by subject, family and reading.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AccuracySummary {
+    pub cells: Vec<AccuracyCell>,
+    /// Number of replies that the strict reading could not read, by reason.
+    pub unread: BTreeMap<UnreadReason, usize>,
+    /// Chance with each question once, if several orders of its choices are asked and this changes chance.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chance_of_questions: Option<Estimate>,
+}
+
+impl AccuracySummary {
+    /// Cells of a family in one reading. `None` selects the cells of all families together.
+    pub fn family_cells<'s>(
+        &'s self,
+        family: Option<&'s Family>,
+        mode: ReadingMode,
+    ) -> impl Iterator<Item = &'s AccuracyCell> + Clone {
+        self.cells
+            .iter()
+            .filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
+    }
+
+    /// Cell of a subject, family and reading, if there is one.
+    #[must_use]
+    pub fn cell(
+        &self,
+        subject: &Subject,
+        family: Option<&Family>,
+        mode: ReadingMode,
+    ) -> Option<&AccuracyCell> {
+        self.cells.iter().find(|cell| {
+            cell.mode == mode && cell.family.as_ref() == family && cell.subject == *subject
+        })
+    }
+}
+
+/// Accuracies of a run. `health` belongs to its subjects; `questions` are all that it asks, for the chance line.
+#[must_use]
+pub(crate) fn summarize(
+    grid: &Grid<'_>,
+    health: &[Health],
+    questions: impl IntoIterator<Item = OfferedChoices>,
+) -> AccuracySummary {
+    let questions: Vec<OfferedChoices> = questions.into_iter().collect();
+    let families = grid.groups();
+    let mut cells: Vec<AccuracyCell> = (0..grid.subjects.len())
+        .into_par_iter()
+        .flat_map_iter(|subject| {
+            families.iter().flat_map(move |family| {
+                ReadingMode::ALL.map(|mode| cell(grid, subject, *family, mode))
+            })
+        })
+        .collect();
+    // A family that a subject was not asked about has no cell.
+    cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
+    cells.extend(chance_cells(&questions));
+    AccuracySummary {
+        cells,
+        unread: unread(health),
+        chance_of_questions: chance_of_questions(&questions),
+    }
+}
+
+/// Counts of unreadable replies by reason, in the strict reading.
+fn unread(health: &[Health]) -> BTreeMap<UnreadReason, usize> {
+    let mut unread = BTreeMap::new();
+    for (reason, count) in health.iter().flat_map(|health| &health.unread) {
+        *unread.entry(*reason).or_default() += count;
+    }
+    unread
+}
+
+fn cell(
+    grid: &Grid<'_>,
+    subject: usize,
+    family: Option<&Family>,
+    mode: ReadingMode,
+) -> AccuracyCell {
+    let (mut unparsed, mut failed) = (0, 0);
+    for (index, _) in grid
+        .items
+        .iter()
+        .enumerate()
+        .filter(|(_, item)| item.is_of(family))
+    {
+        let result = grid.result(subject, index);
+        failed += usize::from(result == TrialResult::Failed);
+        unparsed +=
+            usize::from(result.reading(mode) == Some(None) && !cannot_tell(grid, subject, index));
+    }
+    let counts = grid.counts(subject, family, mode);
+    AccuracyCell {
+        subject: grid.subjects[subject].clone(),
+        family: family.cloned(),
+        mode,
+        right: counts.iter().map(|count| count.right as usize).sum(),
+        unparsed,
+        failed,
+        accuracy: Estimate::clustered(&counts),
+        always: always(grid, subject, family, mode),
+    }
+}
+
+/// True if a person said that they cannot tell: that is read, and is no choice.
+fn cannot_tell(grid: &Grid<'_>, subject: usize, item: usize) -> bool {
+    let trial = grid.trial(subject, item);
+    trial
+        .and_then(darkqa_ground::types::TrialRef::strict)
+        .and_then(|reading| reading.why)
+        == Some(UnreadReason::CannotTell)
+}
+
+/// Share of questions answered correctly every time; `None` if each question was asked once.
+fn always(
+    grid: &Grid<'_>,
+    subject: usize,
+    family: Option<&Family>,
+    mode: ReadingMode,
+) -> Option<Estimate> {
+    let mut clusters = vec![ClusterCount::default(); grid.clusters];
+    let mut is_once = true;
+    let mut add = |cluster: u32, question: ClusterCount| {
+        is_once &= question.replies <= 1;
+        if question.replies > 0 {
+            let cluster = &mut clusters[cluster as usize];
+            cluster.replies += 1;
+            cluster.right += u32::from(question.right == question.replies);
+        }
+    };
+    // Items of a question stand together.
+    let mut last: Option<&GridItem<'_>> = None;
+    let mut count = ClusterCount::default();
+    for (item, result) in grid.family_items(subject, family) {
+        let Some(chosen) = result.reading(mode) else {
+            continue;
+        };
+        if let Some(last) = last.filter(|last| last.asked.question != item.asked.question) {
+            add(last.cluster, std::mem::take(&mut count));
+        }
+        count.replies += 1;
+        count.right += u32::from(item.is_right(chosen));
+        last = Some(item);
+    }
+    add(last?.cluster, count);
+    if is_once {
+        return None;
+    }
+    Estimate::clustered(&clusters)
+}
+
+/// The chance line: a cell for each family and reading, with the accuracy of a uniform guess.
+fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
+    let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
+    std::iter::once(None)
+        .chain(families.into_iter().map(Some))
+        .flat_map(|family| {
+            let of_family = questions
+                .iter()
+                .filter(|question| family.is_none_or(|family| question.family == *family));
+            let accuracy = chance(of_family);
+            ReadingMode::ALL.map(|mode| AccuracyCell {
+                subject: Subject {
+                    model: CHANCE.to_owned(),
+                    view: None,
+                    level: None,
+                    variant: KindReading::NONE,
+                    enhancer: None,
+                },
+                family: family.cloned(),
+                mode,
+                right: 0,
+                unparsed: 0,
+                failed: 0,
+                accuracy,
+                always: None,
+            })
+        })
+        .collect()
+}

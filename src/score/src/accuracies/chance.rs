@@ -1,0 +1,107 @@
+//! The accuracy of guessing: [`chance`].
+
+use crate::estimate::Estimate;
+use darkqa_ground::types::{AskedItem, Family, Question};
+
+/// Family of a question, the number of its choices, and how many orders of them are asked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OfferedChoices {
+    /// Family of the question.
+    pub family: Family,
+    /// Number of its choices.
+    pub choices: usize,
+    /// Number of orders of the choices; each counts as one question.
+    pub orders: usize,
+}
+
+impl OfferedChoices {
+    /// The choices that an item offers.
+    pub fn from_item(item: &AskedItem) -> Self {
+        Self {
+            family: item.family.as_ref().clone(),
+            choices: item.choices.len(),
+            orders: 1,
+        }
+    }
+}
+
+impl From<&Question> for OfferedChoices {
+    fn from(question: &Question) -> Self {
+        Self {
+            family: question.family.clone(),
+            choices: question.choices.len(),
+            orders: 1,
+        }
+    }
+}
+
+/// The exact accuracy of a uniform guess: the mean of 1 / number of choices over all orders that are asked. `None` without questions.
+///
+/// The sum runs over the numbers of choices, so that the order of the questions cannot change a digit.
+pub(crate) fn chance<'a>(
+    questions: impl IntoIterator<Item = &'a OfferedChoices>,
+) -> Option<Estimate> {
+    mean(questions, |question| question.orders)
+}
+
+/// The same with each question once, as the paper counts (DarkQA, section IV), if that is another number: a question with many choices has
+/// many orders. `None` otherwise.
+pub(crate) fn chance_of_questions<'a>(
+    questions: impl IntoIterator<Item = &'a OfferedChoices> + Clone,
+) -> Option<Estimate> {
+    let once = mean(questions.clone(), |_| 1)?;
+    let all = chance(questions)?;
+    ((once.value - all.value).abs() > 1e-9).then_some(once)
+}
+
+fn mean<'a>(
+    questions: impl IntoIterator<Item = &'a OfferedChoices>,
+    weight: fn(&OfferedChoices) -> usize,
+) -> Option<Estimate> {
+    let mut counts = std::collections::BTreeMap::<usize, usize>::new();
+    for question in questions {
+        *counts.entry(question.choices).or_default() += weight(question);
+    }
+    let n: usize = counts.values().sum();
+    let sum: f64 = counts
+        .iter()
+        .map(|(&choices, &questions)| questions as f64 / choices as f64)
+        .sum();
+    (n > 0).then(|| Estimate::exact(sum / n as f64, n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(choices: usize) -> OfferedChoices {
+        OfferedChoices {
+            family: Family::Closest,
+            choices,
+            orders: 1,
+        }
+    }
+
+    #[test]
+    fn with_all_orders_long_questions_count_more() {
+        let rotated = |choices| OfferedChoices {
+            orders: choices,
+            ..question(choices)
+        };
+        let questions = [rotated(2), rotated(4)];
+        assert_eq!(chance(&questions).unwrap(), Estimate::exact(2.0 / 6.0, 6));
+        assert_eq!(
+            chance_of_questions(&questions).unwrap(),
+            Estimate::exact(0.375, 2)
+        );
+        assert_eq!(chance_of_questions(&[rotated(4), rotated(4)]), None);
+        assert_eq!(chance_of_questions(&[question(2), question(4)]), None);
+    }
+
+    #[test]
+    fn chance_is_the_mean_of_one_over_the_choices() {
+        let questions = [question(2), question(4), question(2)];
+        assert_eq!(chance(&questions).unwrap(), Estimate::exact(1.25 / 3.0, 3));
+        assert_eq!(chance([]), None);
+    }
+}

@@ -1,0 +1,37 @@
+//! The level at which an item is first answered wrongly: [`FirstFailure`].
+
+use super::curve::CurvePoints;
+use crate::choice::ReadingMode;
+use crate::grid::Grid;
+use darkqa_ground::types::AxisLevel;
+
+/// First failing levels of the items, for one model in one variant, raw or with one enhancer.
+#[derive(Debug)]
+pub struct FirstFailure {
+    /// The model, the variant and the enhancer, with the levels that were asked.
+    pub curve: CurvePoints,
+}
+
+/// First failing levels for every curve of a grid.
+#[must_use]
+pub(crate) fn first_failures(grid: &Grid<'_>) -> Vec<FirstFailure> {
+    CurvePoints::all(grid)
+        .into_iter()
+        .map(|curve| FirstFailure { curve })
+        .collect()
+}
+
+impl FirstFailure {
+    /// The first level at which an item of the grid is not answered correctly. `None` if it never fails, or if a level before that has
+    /// no reply.
+    #[must_use]
+    pub fn first(&self, grid: &Grid<'_>, item: usize) -> Option<AxisLevel> {
+        for &(level, subject) in &self.curve.subjects {
+            let chosen = grid.result(subject, item).reading(ReadingMode::Strict)?;
+            if !grid.items[item].is_right(chosen) {
+                return Some(level);
+            }
+        }
+        None
+    }
+}

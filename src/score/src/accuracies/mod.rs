@@ -1,0 +1,23 @@
+//! Accuracies of models: in each condition, over the levels, and beside chance.
+
+mod accuracy;
+mod chance;
+mod common;
+mod coverage;
+mod curve;
+mod flips;
+mod health;
+mod strict_score;
+
+pub(super) use accuracy::summarize;
+pub use accuracy::{AccuracyCell, AccuracySummary};
+pub use chance::OfferedChoices;
+pub(super) use common::CommonItems;
+pub use common::shared_items;
+pub(super) use coverage::{Coverage, Lacking, shared};
+pub(super) use curve::CurvePoints;
+pub use curve::{Curve, curves};
+pub use flips::FirstFailure;
+pub(super) use flips::first_failures;
+pub use health::{Health, healths};
+pub use strict_score::{GroupCell, GroupChance, StrictScore};

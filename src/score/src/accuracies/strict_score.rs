@@ -1,0 +1,308 @@
+//! The strict score of a set whose questions form groups: all questions of a group right ([`StrictScore`]).
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use crate::choice::ReadingMode;
+use crate::estimate::{ClusterCount, Estimate};
+use crate::grid::{Grid, TrialResult};
+use crate::subject::Subject;
+use darkqa_ground::types::{Family, QuestionId, RunQuestion, StrictGroup};
+
+/// Share of groups in which a subject answers all questions right, in one reading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupCell {
+    pub subject: Subject,
+    /// Question family, with the groups that are wholly of it; `None` for all groups.
+    pub family: Option<Family>,
+    /// How the replies were read.
+    pub mode: ReadingMode,
+    /// Number of groups in which every question was answered right every time.
+    pub right: usize,
+    /// Number of groups with a question that was not asked or has no reply. They are not scored.
+    pub incomplete: usize,
+    /// Share of `right` among the complete groups; `None` if there is none.
+    pub share: Option<Estimate>,
+    /// Number of clusters of the complete groups.
+    pub clusters: usize,
+}
+
+/// The chance that a uniform guess is right on all questions of a group.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupChance {
+    /// Question family; `None` for all groups.
+    pub family: Option<Family>,
+    /// Mean over the groups that the run asks completely; `None` without such a group.
+    pub share: Option<Estimate>,
+}
+
+/// The strict score that benchmarks of several questions about one thing have beside accuracy.
+///
+/// A group is one unit, and right if all its questions are right, in every order of choices and every repeat in which they were asked.
+/// It counts if every question that the set holds of it has a reply. Groups that share a cluster are one cluster.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StrictScore {
+    /// Ordered by subject, family and reading.
+    pub cells: Vec<GroupCell>,
+    /// All groups first, then by family.
+    pub chance: Vec<GroupChance>,
+    /// Number of groups with at least one question in the run.
+    pub groups: usize,
+    /// Number of groups of one question: their strict score is accuracy.
+    pub single: usize,
+    /// Number of groups whose questions are about several frames.
+    pub across_frames: usize,
+    /// Number of groups that the run asks only in part, so that they are complete for no subject.
+    pub never_complete: usize,
+}
+
+/// The questions of a group that are asked.
+struct Group<'a> {
+    /// The number of questions that the set holds.
+    size: usize,
+    questions: Vec<&'a RunQuestion>,
+    /// The only family; `None` if there are several.
+    family: Option<&'a Family>,
+    /// Indices of its items in the grid.
+    items: Vec<usize>,
+    /// Index of its cluster among those of groups.
+    cluster: usize,
+}
+
+/// Result of a group for one subject.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum GroupResult {
+    /// None of its questions was asked.
+    Absent,
+    Incomplete,
+    Right,
+    Wrong,
+}
+
+impl StrictScore {
+    /// The strict score of a grid, whose questions name their groups; `None` if none has one.
+    #[must_use]
+    pub fn new(grid: &Grid<'_>, questions: &[RunQuestion]) -> Option<Self> {
+        let groups = groups(grid, questions);
+        if groups.is_empty() {
+            return None;
+        }
+        let families: BTreeSet<&Family> = groups.iter().filter_map(|group| group.family).collect();
+        let families: Vec<Option<&Family>> = std::iter::once(None)
+            .chain(families.into_iter().map(Some))
+            .collect();
+        let of_family = |family: Option<&Family>| -> Vec<&Group<'_>> {
+            groups
+                .iter()
+                .filter(|group| family.is_none() || group.family == family)
+                .collect()
+        };
+        let mut cells = Vec::new();
+        for subject in 0..grid.subjects.len() {
+            for family in &families {
+                let groups = of_family(*family);
+                for mode in ReadingMode::ALL {
+                    cells.extend(cell(grid, subject, *family, &groups, mode));
+                }
+            }
+        }
+        let chance = families.iter().map(|family| GroupChance {
+            family: family.cloned(),
+            share: chance(grid, &of_family(*family)),
+        });
+        let count = |is: fn(&Group<'_>) -> bool| groups.iter().filter(|group| is(group)).count();
+        Some(Self {
+            cells,
+            chance: chance.collect(),
+            groups: groups.len(),
+            single: count(|group| group.size == 1),
+            across_frames: count(|group| {
+                group
+                    .questions
+                    .iter()
+                    .map(|question| &question.frame)
+                    .collect::<BTreeSet<_>>()
+                    .len()
+                    > 1
+            }),
+            never_complete: count(|group| !group.is_asked_whole()),
+        })
+    }
+
+    /// The cell of a subject in the other reading.
+    pub fn lenient(&self, strict: &GroupCell) -> Option<&GroupCell> {
+        self.cells.iter().find(|cell| {
+            cell.mode == ReadingMode::Lenient
+                && cell.family == strict.family
+                && cell.subject == strict.subject
+        })
+    }
+}
+
+/// The groups of the questions by name, with their items and clusters.
+fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
+    let mut by_name = BTreeMap::<&str, Vec<(&StrictGroup, &RunQuestion)>>::new();
+    for question in questions {
+        if let Some(group) = &question.group {
+            by_name
+                .entry(&group.name)
+                .or_default()
+                .push((group, question));
+        }
+    }
+    let mut items = HashMap::<&QuestionId, Vec<usize>>::new();
+    for (index, item) in grid.items.iter().enumerate() {
+        items.entry(&*item.asked.question).or_default().push(index);
+    }
+    let mut groups: Vec<Group<'a>> = by_name
+        .into_values()
+        .map(|members| {
+            let questions: Vec<&RunQuestion> =
+                members.iter().map(|(_, question)| *question).collect();
+            let family = questions.first().map(|question| &question.family);
+            let of_group = questions
+                .iter()
+                .filter_map(|question| items.get(&question.id));
+            Group {
+                size: members
+                    .iter()
+                    .map(|(group, _)| group.size)
+                    .max()
+                    .unwrap_or(0),
+                family: family.filter(|family| {
+                    questions
+                        .iter()
+                        .map(|question| &question.family)
+                        .all(|other| other == *family)
+                }),
+                items: of_group.flatten().copied().collect(),
+                questions,
+                cluster: 0,
+            }
+        })
+        .collect();
+    join_clusters(grid, &mut groups);
+    groups
+}
+
+/// Puts groups that share a cluster of the grid into one cluster, so that groups of different ones are independent.
+fn join_clusters(grid: &Grid<'_>, groups: &mut [Group<'_>]) {
+    let mut roots: Vec<usize> = (0..groups.len()).collect();
+    let root = |roots: &[usize], mut at: usize| {
+        while roots[at] != at {
+            at = roots[at];
+        }
+        at
+    };
+    let mut first = HashMap::<u32, usize>::new();
+    for (at, group) in groups.iter().enumerate() {
+        for item in &group.items {
+            let known = *first.entry(grid.items[*item].cluster).or_insert(at);
+            let (one, other) = (root(&roots, known), root(&roots, at));
+            // The least index is the root, so that no chain grows long.
+            roots[one.max(other)] = one.min(other);
+        }
+    }
+    for (at, group) in groups.iter_mut().enumerate() {
+        group.cluster = root(&roots, at);
+    }
+}
+
+impl Group<'_> {
+    /// Whether the run asks every question that the set holds of the group.
+    fn is_asked_whole(&self) -> bool {
+        self.questions.len() == self.size
+    }
+
+    /// Result of the group for a subject. An order or a repeat that was not asked of the subject does not count, if every question has a
+    /// reply and none failed.
+    fn result(&self, grid: &Grid<'_>, subject: usize, mode: ReadingMode) -> GroupResult {
+        let mut replied = BTreeSet::<&QuestionId>::new();
+        let (mut is_asked, mut has_failed, mut is_right) = (false, false, true);
+        for &item in &self.items {
+            let result = grid.result(subject, item);
+            is_asked |= result.is_asked();
+            has_failed |= result == TrialResult::Failed;
+            if let Some(chosen) = result.reading(mode) {
+                let item = &grid.items[item];
+                replied.insert(&*item.asked.question);
+                is_right &= item.is_right(chosen);
+            }
+        }
+        if !is_asked {
+            GroupResult::Absent
+        } else if has_failed || replied.len() < self.size {
+            GroupResult::Incomplete
+        } else if is_right {
+            GroupResult::Right
+        } else {
+            GroupResult::Wrong
+        }
+    }
+}
+
+/// The cell of a subject on the groups of a family; `None` if it was asked none of their questions.
+fn cell(
+    grid: &Grid<'_>,
+    subject: usize,
+    family: Option<&Family>,
+    groups: &[&Group<'_>],
+    mode: ReadingMode,
+) -> Option<GroupCell> {
+    let mut counts = BTreeMap::<usize, ClusterCount>::new();
+    let (mut incomplete, mut is_asked) = (0, false);
+    for group in groups {
+        let result = group.result(grid, subject, mode);
+        is_asked |= result != GroupResult::Absent;
+        match result {
+            GroupResult::Absent | GroupResult::Incomplete => incomplete += 1,
+            GroupResult::Right | GroupResult::Wrong => {
+                let count = counts.entry(group.cluster).or_default();
+                count.replies += 1;
+                count.right += u32::from(result == GroupResult::Right);
+            }
+        }
+    }
+    let clusters = counts.len();
+    let counts: Vec<ClusterCount> = counts.into_values().collect();
+    is_asked.then(|| GroupCell {
+        subject: grid.subjects[subject].clone(),
+        family: family.cloned(),
+        mode,
+        right: counts.iter().map(|count| count.right as usize).sum(),
+        incomplete,
+        share: Estimate::clustered(&counts),
+        clusters,
+    })
+}
+
+/// The mean over groups of the product of 1 / number of choices, over every time that a question of the group was asked. `None` if the
+/// run asks no group whole. Groups are in the order of their names, so that the order of questions cannot change a digit.
+fn chance(grid: &Grid<'_>, groups: &[&Group<'_>]) -> Option<Estimate> {
+    let groups: Vec<&&Group<'_>> = groups
+        .iter()
+        .filter(|group| group.is_asked_whole())
+        .collect();
+    let sum: f64 = groups
+        .iter()
+        .map(|group| -> f64 {
+            let mut questions: Vec<&RunQuestion> = group.questions.clone();
+            questions.sort_by(|one, other| one.id.cmp(&other.id));
+            questions
+                .iter()
+                .map(|question| {
+                    let times = group
+                        .items
+                        .iter()
+                        .filter(|item| *grid.items[**item].asked.question == question.id);
+                    let times = i32::try_from(times.count().max(1)).unwrap_or(i32::MAX);
+                    (question.choices.len() as f64).recip().powi(times)
+                })
+                .product()
+        })
+        .sum();
+    let n = groups.len();
+    (n > 0).then(|| Estimate::exact(sum / n as f64, n))
+}
+
+#[cfg(test)]
+mod tests;

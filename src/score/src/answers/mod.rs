@@ -1,0 +1,8 @@
+//! Answers: their records, their mistakes, and their dependence on the image.
+
+pub mod checks;
+pub mod confusion;
+mod image_dependence;
+pub mod record;
+
+pub use image_dependence::{FEWEST, ImageDependence, Independence, LitReply};

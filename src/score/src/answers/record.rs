@@ -1,0 +1,135 @@
+//! Reading of a reply into the record of its trial, for both experiments: [`Detail`], [`answered`], [`reread`].
+
+use crate::choice::llm_match::{Protocol, mark};
+use crate::choice::option_probabilities::option_probabilities;
+use crate::choice::{LENIENT_VERSION, readings};
+use darkqa_ground::error::Result;
+use darkqa_ground::types::records::Record;
+use darkqa_ground::types::{
+    Answer, ChoiceDetail, Choices, Finish, OpenDetail, Reply, Step, StoredDetail, TrialOutcome,
+    UnreadReason,
+};
+
+/// A detail that takes the answer from a reply.
+pub trait Detail: StoredDetail {
+    /// Version of the rules by which answers are read, as `lenient/4`; `None` if no choice is read.
+    const REPLY_READING: Option<&'static str>;
+
+    /// Reads the answer from a reply into the detail; a stored reply can be read again.
+    ///
+    /// # Errors
+    /// If the choices of the detail are not valid.
+    fn read(&mut self, reply: &Reply) -> Result<()>;
+
+    /// Index of the choice in the lenient reading; `None` if none was read.
+    fn chosen(&self) -> Option<usize>;
+
+    /// Parses the line of a record. Each kind has its own function, so that this crate compiles it, for speed, and not the caller.
+    ///
+    /// # Errors
+    /// If the line is not such a record.
+    fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>>;
+}
+
+impl Detail for ChoiceDetail {
+    const REPLY_READING: Option<&'static str> = Some(LENIENT_VERSION);
+
+    /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
+    fn read(&mut self, reply: &Reply) -> Result<()> {
+        let why = self.strict.and_then(|strict| strict.why);
+        if why == Some(UnreadReason::CannotTell) && reply.text.is_empty() {
+            // A person said so by a button; there is no text to read again.
+            return Ok(());
+        }
+        let choices = Choices::known_by(self.choices.clone().into(), self.truth)?;
+        let (strict, lenient) = readings(reply, &choices);
+        self.outcome = match strict {
+            Answer::Unparsed(_) => TrialOutcome::Unparsed,
+            Answer::Chosen(index) => match choices.truth() {
+                None => TrialOutcome::Answered,
+                Some(truth) if truth == index => TrialOutcome::Right,
+                Some(_) => TrialOutcome::Wrong,
+            },
+        };
+        self.strict = Some(strict.into());
+        self.lenient = Some(lenient.into());
+        // A stored reply that is parsed again lacks the observer's view and the probabilities of the choices.
+        if let Some(chances) = &reply.chances {
+            self.options = option_probabilities(chances, &self.choices);
+        }
+        if reply.observed.is_some() {
+            self.observed.clone_from(&reply.observed);
+        }
+        Ok(())
+    }
+
+    fn chosen(&self) -> Option<usize> {
+        self.lenient?.chosen
+    }
+
+    fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>> {
+        serde_json::from_slice(line)
+    }
+}
+
+impl Detail for OpenDetail {
+    const REPLY_READING: Option<&'static str> = None;
+
+    /// Stores the marks that the two protocols read in a judge's reply.
+    fn read(&mut self, reply: &Reply) -> Result<()> {
+        if self.step == Step::Mark {
+            self.upstream = mark(&reply.text, Protocol::Upstream);
+            self.tolerant = mark(&reply.text, Protocol::Tolerant);
+        }
+        Ok(())
+    }
+
+    fn chosen(&self) -> Option<usize> {
+        None
+    }
+
+    fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>> {
+        serde_json::from_slice(line)
+    }
+}
+
+/// The record with a reply and the answer that is read from it.
+///
+/// # Errors
+/// If the choices of the record are not valid.
+pub fn answered<D: Detail>(mut record: Record<D>, reply: Reply) -> Result<Record<D>> {
+    read(&mut record, &reply)?;
+    record.reply = Some(reply.text);
+    record.refusal = reply.refusal;
+    record.finish = Some(reply.finish);
+    record.usage = reply.usage;
+    record.served_model = reply.served_model;
+    record.provider = reply.provider;
+    record.endpoint = reply.endpoint;
+    record.latency_ms = Some(reply.latency_ms);
+    record.attempts = reply.attempts;
+    record.lost = reply.lost;
+    Ok(record)
+}
+
+/// The record with its stored reply read again, by the rules of this version of the program.
+///
+/// # Errors
+/// As for [`answered`].
+pub fn reread<D: Detail>(mut record: Record<D>) -> Result<Record<D>> {
+    if let Some(text) = record.reply.clone() {
+        let reply = Reply {
+            refusal: record.refusal.clone(),
+            finish: record.finish.clone().unwrap_or(Finish::Unknown),
+            ..Reply::local(text)
+        };
+        read(&mut record, &reply)?;
+    }
+    Ok(record)
+}
+
+fn read<D: Detail>(record: &mut Record<D>, reply: &Reply) -> Result<()> {
+    let question = &record.question.0;
+    let read = record.detail.read(reply);
+    read.map_err(|e| e.at(format!("the record of question {question:?}")))
+}

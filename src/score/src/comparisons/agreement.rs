@@ -1,0 +1,193 @@
+//! How far two models agree: [`Agreement`].
+
+use super::comparison::{ComparisonKind, pairs};
+use crate::choice::ReadingMode;
+use crate::estimate::{ClusterCount, Estimate};
+use crate::grid::Grid;
+use crate::subject::Subject;
+use darkqa_statistics::quantiles::{degrees_of_freedom, student};
+
+/// Agreement of two models in one condition, in the strict reading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Agreement {
+    pub first: Subject,
+    pub second: Subject,
+    /// Share of items to which both models gave the same answer.
+    pub same: Estimate,
+    /// Cohen's κ of being right: 0 if the two err independently, 1 if they err on the same items ("error consistency",
+    /// Geirhos et al. 2020, arXiv:2006.16736). `None` if one of them is right, or wrong, in too few clusters.
+    pub kappa: Option<Estimate>,
+}
+
+/// Counts over the items of a cluster.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AgreementCounts {
+    /// Number of items to which both models replied.
+    pub all: f64,
+    /// Number of them that both got right.
+    pub both: f64,
+    /// Number of them that the first model got right.
+    pub first: f64,
+    /// Number of them that the second model got right.
+    pub second: f64,
+}
+
+/// Agreement of each model with itself in two lights that show the same: photographed in the dark against synthetic, and with an
+/// enhancer against without, of photographs in the dark and of untouched frames.
+#[must_use]
+pub(crate) fn light_agreements(grid: &Grid<'_>) -> Vec<Agreement> {
+    let of = |kind| pairs(grid, kind).into_iter();
+    let untouched = of(ComparisonKind::Enhancer)
+        .filter(|(first, _)| grid.subjects[*first].variant.is_untouched());
+    of(ComparisonKind::RealSynthetic)
+        .chain(of(ComparisonKind::RealEnhanced))
+        .chain(untouched)
+        .filter_map(|(first, second)| agreement(grid, first, second))
+        .collect()
+}
+
+/// Agreement of every pair of models in every condition.
+#[must_use]
+pub(crate) fn agreements(grid: &Grid<'_>) -> Vec<Agreement> {
+    pairs(grid, ComparisonKind::Model)
+        .into_iter()
+        .filter_map(|(first, second)| agreement(grid, first, second))
+        .collect()
+}
+
+fn agreement(grid: &Grid<'_>, first: usize, second: usize) -> Option<Agreement> {
+    let mut same = vec![ClusterCount::default(); grid.clusters];
+    let mut counts = vec![AgreementCounts::default(); grid.clusters];
+    for (index, item) in grid.items.iter().enumerate() {
+        let reading = |subject| grid.result(subject, index).reading(ReadingMode::Strict);
+        let (Some(a), Some(b)) = (reading(first), reading(second)) else {
+            continue;
+        };
+        let cluster = item.cluster as usize;
+        same[cluster].replies += 1;
+        same[cluster].right += u32::from(a.is_some() && a == b);
+        let (a, b) = (item.is_right(a), item.is_right(b));
+        let one_if = |right: bool| f64::from(u8::from(right));
+        let cluster = &mut counts[cluster];
+        cluster.all += 1.0;
+        cluster.both += one_if(a && b);
+        cluster.first += one_if(a);
+        cluster.second += one_if(b);
+    }
+    Some(Agreement {
+        first: grid.subjects[first].clone(),
+        second: grid.subjects[second].clone(),
+        kappa: clustered_kappa(&counts),
+        same: Estimate::clustered(&same)?,
+    })
+}
+
+/// Minimum number of clusters in which each model errs, and in which each is right (chosen). With fewer, no interval of κ holds
+/// the truth in simulation.
+const MIN_CLUSTERS: usize = 8;
+
+/// κ of two models with its interval, from the counts of each cluster; `None` if one of them is right, or wrong, in fewer than
+/// [`MIN_CLUSTERS`] clusters.
+///
+/// The variance is that of κ's linear form in the clusters' counts, with Student's quantile for the degrees of freedom that the
+/// clusters' residuals allow.
+#[must_use]
+pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
+    let in_clusters = |holds: fn(&AgreementCounts) -> bool| {
+        counts.iter().filter(|counts| holds(counts)).count() >= MIN_CLUSTERS
+    };
+    let vary = in_clusters(|r| r.first > 0.0)
+        && in_clusters(|r| r.second > 0.0)
+        && in_clusters(|r| r.first < r.all)
+        && in_clusters(|r| r.second < r.all);
+    if !vary {
+        return None;
+    }
+    let total = |of: fn(&AgreementCounts) -> f64| counts.iter().map(of).sum::<f64>();
+    let all = total(|r| r.all);
+    let both = total(|r| r.both) / all;
+    let (a, b) = (total(|r| r.first) / all, total(|r| r.second) / all);
+    let value = kappa(both, a, b)?;
+    // κ = 2 (both − ab) / (a + b − 2ab).
+    let denominator = a + b - 2.0 * a * b;
+    let influences: Vec<f64> = counts
+        .iter()
+        .filter(|counts| counts.all > 0.0)
+        .map(|r| {
+            let (both, first, second) = (
+                r.both - both * r.all,
+                r.first - a * r.all,
+                r.second - b * r.all,
+            );
+            let crossed = 2.0 * (b * first + a * second);
+            (2.0 * both - crossed - value * (first + second - crossed)) / denominator / all
+        })
+        .collect();
+    let c = influences.len() as f64;
+    let variance = c / (c - 1.0) * influences.iter().map(|x| x * x).sum::<f64>();
+    let half = student(degrees_of_freedom(&influences)) * variance.sqrt();
+    Some(Estimate {
+        value,
+        low: (value - half).max(-1.0),
+        high: (value + half).min(1.0),
+        n: all as usize,
+    })
+}
+
+/// Cohen's κ of two binary ratings (Cohen 1960, Educ. Psychol. Meas. 20:37), from the shares that both, the first and the second
+/// got right; `None` if one of them does not vary.
+pub(crate) fn kappa(both: f64, first: f64, second: f64) -> Option<f64> {
+    let observed = 1.0 - first - second + 2.0 * both;
+    let expected = first * second + (1.0 - first) * (1.0 - second);
+    let varies = |share: f64| share > 0.0 && share < 1.0;
+    (varies(first) && varies(second)).then(|| (observed - expected) / (1.0 - expected))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kappa_is_cohens() {
+        // Both right on 20 of 50, both wrong on 15: κ 0.4 (the example of the English Wikipedia's article on Cohen's κ).
+        assert!((kappa(0.4, 0.5, 0.6).unwrap() - 0.4).abs() < 1e-12);
+        assert_eq!(kappa(1.0, 1.0, 1.0), None);
+        assert!((kappa(0.25, 0.5, 0.5).unwrap()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_interval_is_that_of_independent_pairs() {
+        // One item a cluster: 20, 5, 10 and 15 of 50 are right by both, the first, the second and neither.
+        let cell = |both: u8, first: u8, second: u8| AgreementCounts {
+            all: 1.0,
+            both: f64::from(both),
+            first: f64::from(first),
+            second: f64::from(second),
+        };
+        let counts = [
+            vec![cell(1, 1, 1); 20],
+            vec![cell(0, 1, 0); 5],
+            vec![cell(0, 0, 1); 10],
+            vec![cell(0, 0, 0); 15],
+        ]
+        .concat();
+        let estimate = clustered_kappa(&counts).unwrap();
+        // The asymptotic standard error of Fleiss, Cohen and Everitt 1969 (Psychol. Bull. 72:323), equation 13, times √(50 / 49).
+        let error = 0.126_996_062_931_100_3 * f64::sqrt(50.0 / 49.0);
+        let half = estimate.high - estimate.value;
+        assert!((estimate.value - 0.4).abs() < 1e-12 && estimate.n == 50);
+        let degrees = half / error;
+        assert!(
+            degrees > student(49.0) - 1e-9 && degrees < student(30.0),
+            "{degrees}"
+        );
+        // Errors in seven clusters only are too few for an interval of the first model.
+        let few = [
+            vec![cell(1, 1, 1); 40],
+            vec![cell(0, 0, 1); 7],
+            vec![cell(0, 1, 0); 9],
+        ]
+        .concat();
+        assert_eq!(clustered_kappa(&few), None);
+    }
+}

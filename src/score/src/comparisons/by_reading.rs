@@ -1,0 +1,506 @@
+//! Findings about noise, tested under each light reading: [`FindingByReading`].
+//!
+//! The paper's noise model can be interpreted in several ways; each interpretation is a light reading. A conclusion that holds under
+//! only one reading is a conclusion about that reading. Each finding is therefore computed under every reading, on the same items and by
+//! the same formula, and the results are reported side by side. Only the paper's levels, L1–L5, are tested. Holm's correction covers all
+//! claims of all models under all readings (Holm 1979, Scand. J. Stat. 6:65): if there is no effect at all, the report names none with
+//! 95 % probability.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::paired::{ClusterNet, PairedTest};
+use crate::choice::ReadingMode;
+use crate::estimate::Estimate;
+use crate::grid::Grid;
+use crate::significance::{ALPHA, holm};
+use crate::subject::Subject;
+use darkqa_ground::types::degradations::Kind;
+use darkqa_ground::types::{
+    AxisLevel, EnhancerName, Family, KindReading, LightGroup, ReadingName, View,
+};
+
+/// A claim about noise that may hold under one light reading and not under another.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NoiseHypothesis {
+    /// Accuracy is lower with noise than with the exposure drop alone, at one level; `None` for L1–L5 together.
+    NoiseCompounds(Option<AxisLevel>),
+    /// Accuracy is lower at L5 with noise than at L0.
+    DarknessCosts,
+    /// An enhancer lowers accuracy where some light is left, at L1–L3.
+    EnhancerHarms(EnhancerName),
+    /// An enhancer raises accuracy in the dark, at L4–L5.
+    EnhancerHelps(EnhancerName),
+    /// Accuracy on a family is lower with noisy images of a level than without images.
+    BelowBlind(Family, AxisLevel),
+}
+
+impl NoiseHypothesis {
+    /// Name of the claim in files.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::NoiseCompounds(_) => "noise_compounds",
+            Self::DarknessCosts => "darkness_costs",
+            Self::EnhancerHarms(_) => "enhancer_harms",
+            Self::EnhancerHelps(_) => "enhancer_helps",
+            Self::BelowBlind(..) => "below_blind",
+        }
+    }
+
+    /// True if the claim is that the first side is better than the second, false if it is that it is worse.
+    fn expects_gain(&self) -> bool {
+        matches!(self, Self::NoiseCompounds(_) | Self::EnhancerHelps(_))
+    }
+
+    /// The family that the claim is about; `None` for all families.
+    #[must_use]
+    pub fn family(&self) -> Option<&Family> {
+        match self {
+            Self::BelowBlind(family, _) => Some(family),
+            _ => None,
+        }
+    }
+
+    /// The enhancer that the claim is about, if any.
+    #[must_use]
+    pub fn enhancer(&self) -> Option<&EnhancerName> {
+        match self {
+            Self::EnhancerHarms(name) | Self::EnhancerHelps(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// The levels that the claim covers, whether they were asked or not.
+    fn levels(&self) -> Vec<AxisLevel> {
+        let levels = paper_levels();
+        match self {
+            Self::NoiseCompounds(None) => levels,
+            Self::NoiseCompounds(Some(level)) | Self::BelowBlind(_, level) => vec![*level],
+            Self::DarknessCosts => levels[4..].to_vec(),
+            Self::EnhancerHarms(_) => levels[..3].to_vec(),
+            Self::EnhancerHelps(_) => levels[3..].to_vec(),
+        }
+    }
+}
+
+/// The paper's levels, L1 to L5.
+fn paper_levels() -> Vec<AxisLevel> {
+    Kind::Sensor
+        .ladder()
+        .iter()
+        .map(|severity| AxisLevel::new(Kind::Sensor, *severity))
+        .collect()
+}
+
+/// Test result of a claim, after Holm's correction over all claims and readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Support {
+    /// An effect in the direction of the claim is detected.
+    Holds,
+    /// An effect in the opposite direction is detected.
+    Opposite,
+    /// No effect is detected.
+    Open,
+}
+
+impl Support {
+    /// The word in tables and files.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::Opposite => "opposite",
+            Self::Open => "open",
+        }
+    }
+}
+
+/// Summary of the test results of a claim under all readings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Robustness {
+    /// The claim holds under every reading of the report.
+    All,
+    /// The claim holds under some readings, and the opposite is detected under none.
+    Some,
+    /// The claim holds under at least one reading, and the opposite is detected under another.
+    Reversed,
+    /// The claim holds under no reading, and the opposite is detected under at least one.
+    None,
+    /// Neither the claim nor its opposite is detected under any reading.
+    Open,
+}
+
+impl Robustness {
+    /// The words in tables and files.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::All => "under all",
+            Self::Some => "under some",
+            Self::Reversed => "reversed",
+            Self::None => "under none",
+            Self::Open => "open",
+        }
+    }
+}
+
+/// The effect of a claim under one reading.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectInReading {
+    /// The light reading.
+    pub reading: ReadingName,
+    /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items. `None` if a side was
+    /// not asked.
+    pub effect: Option<TestedEffect>,
+}
+
+/// An effect and its significance test.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TestedEffect {
+    /// The difference in accuracy with its clustered 95 % interval.
+    pub difference: Estimate,
+    /// Test result of the claim.
+    pub standing: Support,
+    /// The p-value of the null hypothesis of no difference.
+    pub p: f64,
+    /// The p-value after Holm's correction over all claims and readings.
+    pub holm: f64,
+}
+
+/// Test results of a claim about one model under every light reading, on the same items.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FindingByReading {
+    /// The model.
+    pub model: String,
+    /// The runs that showed these images, if the runs of the report showed different ones.
+    pub group: Option<LightGroup>,
+    /// The claim that was tested.
+    pub claim: NoiseHypothesis,
+    /// The levels asked under every reading; a reading under which none was asked does not count.
+    pub levels: Vec<AxisLevel>,
+    /// The model asked without images that [`NoiseHypothesis::BelowBlind`] compares with, if it is not `model` itself.
+    pub blind: Option<String>,
+    /// The effect under each reading of the report, `paper` first.
+    pub effects: Vec<EffectInReading>,
+    /// Summary over all readings.
+    pub robustness: Robustness,
+    /// Number of items left out because they were asked, but not answered on every side, level and reading.
+    pub dropped: usize,
+}
+
+/// Tests all claims of each model under every light reading; empty if the grid has fewer than two readings.
+#[must_use]
+pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
+    let readings: BTreeSet<&ReadingName> = noisy_subjects(grid)
+        .filter_map(|subject| subject.variant.reading.as_ref())
+        .collect();
+    if readings.len() < 2 {
+        return Vec::new();
+    }
+    let readings: Vec<&ReadingName> = readings.into_iter().collect();
+    let models: BTreeSet<(&str, Option<&LightGroup>)> = noisy_subjects(grid)
+        .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
+        .collect();
+    let mut models: Vec<(&str, Option<&LightGroup>)> = models.into_iter().collect();
+    models.sort_by_cached_key(|(model, _)| grid.listing.place(model));
+    let jobs: Vec<(&str, Option<&LightGroup>, NoiseHypothesis)> = models
+        .into_iter()
+        .flat_map(|(model, group)| {
+            claims(grid, model)
+                .into_iter()
+                .map(move |claim| (model, group, claim))
+        })
+        .collect();
+    let findings: Vec<FindingByReading> = jobs
+        .into_par_iter()
+        .filter_map(|(model, group, claim)| {
+            let lookup = SideLookup { grid, model, group };
+            finding(&lookup, claim, &readings)
+        })
+        .collect();
+    with_holm_correction(findings)
+}
+
+/// The subjects that see noisy images.
+fn noisy_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g Subject> {
+    grid.subjects.iter().filter(|subject| {
+        subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_readings)
+    })
+}
+
+/// The claims to test for a model, in the order of the table.
+fn claims(grid: &Grid<'_>, model: &str) -> Vec<NoiseHypothesis> {
+    let enhancers: BTreeSet<&EnhancerName> = noisy_subjects(grid)
+        .filter(|subject| subject.model == model)
+        .filter_map(|subject| subject.enhancer.as_ref())
+        .collect();
+    let levels = paper_levels();
+    let mut claims = vec![NoiseHypothesis::NoiseCompounds(None)];
+    claims.extend(
+        levels
+            .iter()
+            .map(|level| NoiseHypothesis::NoiseCompounds(Some(*level))),
+    );
+    claims.push(NoiseHypothesis::DarknessCosts);
+    for name in enhancers {
+        claims.push(NoiseHypothesis::EnhancerHarms(name.clone()));
+        claims.push(NoiseHypothesis::EnhancerHelps(name.clone()));
+    }
+    for family in grid.families() {
+        claims.extend(
+            levels[3..]
+                .iter()
+                .rev()
+                .map(|level| NoiseHypothesis::BelowBlind(family.clone(), *level)),
+        );
+    }
+    claims
+}
+
+/// Lookup of the two subjects that a claim about one model compares, its sides.
+struct SideLookup<'g, 'a> {
+    grid: &'g Grid<'a>,
+    model: &'g str,
+    group: Option<&'g LightGroup>,
+}
+
+impl SideLookup<'_, '_> {
+    /// Indices of the first and second subject of a claim at a level under a reading; `None` if the grid lacks one of them.
+    fn find(
+        &self,
+        claim: &NoiseHypothesis,
+        level: AxisLevel,
+        reading: &ReadingName,
+    ) -> Option<(usize, usize)> {
+        let variant = |kind: Option<Kind>, reading: Option<&ReadingName>| KindReading {
+            kind,
+            reading: reading.cloned(),
+            pair: None,
+            group: self.group.cloned(),
+        };
+        let noisy = variant(Some(Kind::Sensor), Some(reading));
+        let subject_index = |level, variant: &KindReading, enhancer| {
+            let subject = Subject::seeing(self.model, level, variant, enhancer);
+            self.grid.stand_in(&subject)
+        };
+        let unenhanced = subject_index(level, &noisy, None);
+        Some(match claim {
+            NoiseHypothesis::NoiseCompounds(_) => (
+                subject_index(level, &variant(Kind::Sensor.base(), None), None)?,
+                unenhanced?,
+            ),
+            NoiseHypothesis::DarknessCosts => {
+                (unenhanced?, subject_index(AxisLevel::L0, &noisy, None)?)
+            }
+            NoiseHypothesis::EnhancerHarms(name) | NoiseHypothesis::EnhancerHelps(name) => {
+                (subject_index(level, &noisy, Some(name))?, unenhanced?)
+            }
+            NoiseHypothesis::BelowBlind(..) => (unenhanced?, self.blind()?),
+        })
+    }
+
+    /// Index of the same model asked without images, or else of the only model asked without images.
+    fn blind(&self) -> Option<usize> {
+        let blind: Vec<(usize, &Subject)> = self
+            .grid
+            .subjects
+            .iter()
+            .enumerate()
+            .filter(|(_, subject)| subject.view == Some(View::Blind))
+            .collect();
+        let own = blind.iter().find(|(_, other)| other.model == self.model);
+        match (own, &blind[..]) {
+            (Some((index, _)), _) | (None, [(index, _)]) => Some(*index),
+            _ => None,
+        }
+    }
+}
+
+/// Tests a claim under every reading; `None` if no reading has replies to compare.
+fn finding(
+    lookup: &SideLookup<'_, '_>,
+    claim: NoiseHypothesis,
+    readings: &[&ReadingName],
+) -> Option<FindingByReading> {
+    let levels: Vec<AxisLevel> = readings
+        .iter()
+        .map(|reading| asked_levels(lookup, &claim, reading))
+        .filter(|levels| !levels.is_empty())
+        .reduce(|shared, levels| &shared & &levels)?
+        .into_iter()
+        .collect();
+    let pairs: Vec<Vec<(usize, usize)>> = readings
+        .iter()
+        .map(|reading| {
+            levels
+                .iter()
+                .map(|level| lookup.find(&claim, *level, reading))
+                .collect::<Option<_>>()
+                .unwrap_or_default()
+        })
+        .collect();
+    let (kept, dropped) = shared_items(lookup.grid, &pairs, claim.family());
+    let effects: Vec<Option<TestedEffect>> = pairs
+        .iter()
+        .map(|pairs| effect(lookup.grid, pairs, &kept))
+        .collect();
+    if effects.iter().all(Option::is_none) {
+        return None;
+    }
+    let blind = matches!(claim, NoiseHypothesis::BelowBlind(..))
+        .then(|| lookup.blind())
+        .flatten()
+        .map(|index| lookup.grid.subjects[index].model.clone());
+    Some(FindingByReading {
+        model: lookup.model.to_owned(),
+        group: lookup.group.cloned(),
+        robustness: Robustness::Open,
+        claim,
+        levels,
+        blind: blind.filter(|name| name != lookup.model),
+        effects: readings
+            .iter()
+            .zip(effects)
+            .map(|(reading, effect)| EffectInReading {
+                reading: (*reading).clone(),
+                effect,
+            })
+            .collect(),
+        dropped,
+    })
+}
+
+/// The levels of a claim at which both sides were asked under a reading.
+fn asked_levels(
+    lookup: &SideLookup<'_, '_>,
+    claim: &NoiseHypothesis,
+    reading: &ReadingName,
+) -> BTreeSet<AxisLevel> {
+    claim
+        .levels()
+        .into_iter()
+        .filter(|level| lookup.find(claim, *level, reading).is_some())
+        .collect()
+}
+
+/// Indices of a family's items with a reply on both sides of all pairs, and the number of its other items that were asked on any side.
+fn shared_items(
+    grid: &Grid<'_>,
+    pairs: &[Vec<(usize, usize)>],
+    family: Option<&Family>,
+) -> (Vec<usize>, usize) {
+    let subjects: BTreeSet<usize> = pairs
+        .iter()
+        .flatten()
+        .flat_map(|(first, second)| [*first, *second])
+        .collect();
+    let (kept, dropped): (Vec<usize>, Vec<usize>) = grid
+        .items
+        .iter()
+        .enumerate()
+        .filter(|(_, item)| item.is_of(family))
+        .map(|(index, _)| index)
+        .filter(|item| {
+            subjects
+                .iter()
+                .any(|subject| grid.result(*subject, *item).is_asked())
+        })
+        .partition(|item| {
+            subjects
+                .iter()
+                .all(|subject| grid.result(*subject, *item).is_reply())
+        });
+    (kept, dropped.len())
+}
+
+/// Tests the accuracy of the first sides minus that of the second sides, averaged over the pairs, on the items of `kept`. `None` without
+/// pairs or items.
+fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<TestedEffect> {
+    if pairs.is_empty() || kept.is_empty() {
+        return None;
+    }
+    let mut clusters = vec![ClusterNet { net: 0, items: 0 }; grid.clusters];
+    let mut sum_of_squares = 0;
+    for &index in kept {
+        let item = &grid.items[index];
+        let is_right = |subject: usize| {
+            let reading = grid.result(subject, index).reading(ReadingMode::Strict);
+            i64::from(reading.is_some_and(|chosen| item.is_right(chosen)))
+        };
+        let net: i64 = pairs
+            .iter()
+            .map(|(first, second)| is_right(*first) - is_right(*second))
+            .sum();
+        let cluster = &mut clusters[item.cluster as usize];
+        cluster.net += net;
+        cluster.items += 1;
+        sum_of_squares += net * net;
+    }
+    clusters.retain(|cluster| cluster.items > 0);
+    let tested = PairedTest::new(&clusters, pairs.len() as f64, sum_of_squares as f64);
+    Some(TestedEffect {
+        standing: Support::Open,
+        difference: tested.difference,
+        p: tested.p,
+        holm: tested.p,
+    })
+}
+
+/// Fills in the corrected p-values, test results and summaries, with Holm's correction over all findings and readings.
+fn with_holm_correction(mut findings: Vec<FindingByReading>) -> Vec<FindingByReading> {
+    let p_values: Vec<f64> = findings
+        .iter()
+        .flat_map(|finding| &finding.effects)
+        .filter_map(|in_reading| in_reading.effect)
+        .map(|effect| effect.p)
+        .collect();
+    let mut corrected = holm(&p_values).into_iter();
+    for finding in &mut findings {
+        let expects_gain = finding.claim.expects_gain();
+        for (effect, holm) in finding
+            .effects
+            .iter_mut()
+            .filter_map(|in_reading| in_reading.effect.as_mut())
+            .zip(&mut corrected)
+        {
+            effect.holm = holm;
+            effect.standing = support(effect, expects_gain);
+        }
+        finding.robustness = robustness(&finding.effects);
+    }
+    findings
+}
+
+/// Test result of a claim with this effect, by its corrected p-value and the sign of the difference.
+fn support(effect: &TestedEffect, expects_gain: bool) -> Support {
+    if effect.holm >= ALPHA {
+        Support::Open
+    } else if (effect.difference.value > 0.0) == expects_gain {
+        Support::Holds
+    } else {
+        Support::Opposite
+    }
+}
+
+/// Summarizes a claim over the readings. A reading that was not asked has no effect, so the claim then cannot hold under all.
+fn robustness(effects: &[EffectInReading]) -> Robustness {
+    let count = |standing: Support| {
+        effects
+            .iter()
+            .filter_map(|effect| effect.effect)
+            .filter(|effect| effect.standing == standing)
+            .count()
+    };
+    match (count(Support::Holds), count(Support::Opposite)) {
+        (0, 0) => Robustness::Open,
+        (0, _) => Robustness::None,
+        (holding, 0) if holding == effects.len() => Robustness::All,
+        (_, 0) => Robustness::Some,
+        _ => Robustness::Reversed,
+    }
+}
+
+#[cfg(test)]
+mod tests;

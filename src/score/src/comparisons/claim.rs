@@ -1,0 +1,107 @@
+//! [`Claim`]: the statement that a finding supports.
+
+use crate::significance::{ALPHA, Significance};
+
+/// Statement that a report's sentences may make about a finding tested in both parsings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Claim {
+    /// Detected after the correction over all sentences, in both parsings and in the same direction.
+    Detected(Significance),
+    /// Detected after that correction in the strict parsing alone, with this direction.
+    StrictOnly(Significance),
+    /// Detected within its own set of tests alone.
+    InOwnSet,
+    /// Not detected.
+    Open,
+    /// No verdict is possible with so few clusters or items.
+    Impossible,
+}
+
+/// A finding in one parsing of the replies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ParsedFinding {
+    /// How much better the first side is.
+    pub(super) gain: f64,
+    /// The verdict within its own set of tests.
+    pub(super) verdict: Significance,
+    /// p-value after the correction over all sentences; `None` if no sentence is about the finding.
+    pub(super) p_report: Option<f64>,
+}
+
+impl ParsedFinding {
+    fn is_detected(&self) -> bool {
+        self.p_report.is_some_and(|value| value < ALPHA)
+    }
+
+    fn direction(&self) -> Significance {
+        if self.gain > 0.0 {
+            Significance::Better
+        } else {
+            Significance::Worse
+        }
+    }
+}
+
+impl Claim {
+    /// The claim from both parsings of a finding.
+    pub(super) fn new(strict: ParsedFinding, lenient: ParsedFinding) -> Self {
+        let is_same_way = strict.gain * lenient.gain > 0.0;
+        if !strict.verdict.is_possible() {
+            Self::Impossible
+        } else if strict.is_detected() && lenient.is_detected() && is_same_way {
+            Self::Detected(strict.direction())
+        } else if strict.is_detected() {
+            Self::StrictOnly(strict.direction())
+        } else if strict.verdict.is_shown() {
+            Self::InOwnSet
+        } else {
+            Self::Open
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_both_parsings_show_in_one_direction_is_detected() {
+        let finding = |gain: f64, p: f64| ParsedFinding {
+            gain,
+            verdict: Significance::Worse,
+            p_report: Some(p),
+        };
+        for (strict, lenient, expected) in [
+            (
+                (-0.2, 0.01),
+                (-0.1, 0.01),
+                Claim::Detected(Significance::Worse),
+            ),
+            (
+                (-0.2, 0.01),
+                (-0.1, 0.2),
+                Claim::StrictOnly(Significance::Worse),
+            ),
+            (
+                (0.2, 0.01),
+                (-0.1, 0.01),
+                Claim::StrictOnly(Significance::Better),
+            ),
+            ((-0.2, 0.05), (-0.1, 0.01), Claim::InOwnSet),
+        ] {
+            let claim = Claim::new(finding(strict.0, strict.1), finding(lenient.0, lenient.1));
+            assert_eq!(claim, expected);
+        }
+        let unshown = ParsedFinding {
+            verdict: Significance::NotShown,
+            p_report: None,
+            ..finding(-0.2, 0.5)
+        };
+        assert_eq!(Claim::new(unshown, unshown), Claim::Open);
+        let few = ParsedFinding {
+            verdict: Significance::TooFewClusters,
+            ..finding(-0.2, 0.001)
+        };
+        assert_eq!(Claim::new(few, few), Claim::Impossible);
+    }
+}

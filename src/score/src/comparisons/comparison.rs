@@ -1,0 +1,370 @@
+//! Paired differences between subjects, with their tests: [`Comparison`].
+
+mod real_synthetic;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::claim::{Claim, ParsedFinding};
+use super::paired::PairedComparison;
+use crate::choice::ReadingMode;
+use crate::grid::Grid;
+use crate::significance::{Significance, holm, least_p};
+use crate::subject::{Subject, judged};
+use darkqa_ground::types::{AxisLevel, Family, KindReading, PairDark, View};
+use rayon::prelude::*;
+
+/// The two sides of a comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ComparisonKind {
+    /// A degraded level against L0, without an enhancer.
+    Level,
+    /// Sensor noise against exposure drop alone, at the same level.
+    Variant,
+    /// Enhanced against raw, at the same level and variant.
+    Enhancer,
+    /// One model against another in the same condition.
+    Model,
+    /// A model with images against a model without.
+    Blind,
+    /// A model in one light against the same model in another: other images of the same frames at the same level.
+    Light,
+    /// A photograph in the dark against synthetic images that are as dark, raw or with the same enhancer.
+    RealSynthetic,
+    /// A photograph in the dark, enhanced against raw.
+    RealEnhanced,
+}
+
+impl ComparisonKind {
+    /// All kinds in the order of the tables.
+    pub const ALL: [Self; 8] = [
+        Self::Level,
+        Self::Variant,
+        Self::Enhancer,
+        Self::Model,
+        Self::Blind,
+        Self::Light,
+        Self::RealSynthetic,
+        Self::RealEnhanced,
+    ];
+
+    /// The name of the kind in CSV files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Level => "level",
+            Self::Variant => "variant",
+            Self::Enhancer => "enhancer",
+            Self::Model => "model",
+            Self::Blind => "blind",
+            Self::Light => "light",
+            Self::RealSynthetic => "real-synthetic",
+            Self::RealEnhanced => "real-enhanced",
+        }
+    }
+}
+
+/// Minimum number of items that two models, or a model in two lights, must share for a verdict; chosen. The two sides of the other
+/// kinds were asked the same items by one run.
+pub const MIN_PAIRS: usize = 30;
+
+/// One subject against another on the items to which both replied, in both parsings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    pub kind: ComparisonKind,
+    /// The first side: the degraded, the noisy, the enhanced, or the one with images.
+    pub first: Subject,
+    /// The second side, to which the first is compared.
+    pub second: Subject,
+    /// Question family; `None` for all families together.
+    pub family: Option<Family>,
+    /// The comparison in the strict parsing, which is the headline.
+    pub strict: TestedComparison,
+    /// The comparison in the lenient parsing.
+    pub lenient: TestedComparison,
+    /// The smallest p-value after correction that the clusters of this comparison allow, however large the difference is.
+    pub least_holm: f64,
+}
+
+/// A comparison in one parsing of the replies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TestedComparison {
+    pub paired: PairedComparison,
+    /// p-value after Holm's correction over all comparisons of this kind and these models. Another model in the report
+    /// therefore changes no result. Comparisons by family are corrected separately.
+    pub holm: f64,
+    pub significance: Significance,
+    /// p-value after the correction over all tests that sentences rest on; `None` if no sentence is about the comparison.
+    pub p_report: Option<f64>,
+}
+
+impl TestedComparison {
+    fn new(paired: PairedComparison) -> Self {
+        Self {
+            paired,
+            holm: 1.0,
+            significance: Significance::NotShown,
+            p_report: None,
+        }
+    }
+}
+
+impl Comparison {
+    /// Whether the sides share too few items for a verdict.
+    #[must_use]
+    pub fn is_too_small(&self) -> bool {
+        let is_across = matches!(self.kind, ComparisonKind::Model | ComparisonKind::Light);
+        is_across && self.strict.paired.difference.n < MIN_PAIRS
+    }
+
+    /// The statement that sentences may make.
+    #[must_use]
+    pub fn claim(&self) -> Claim {
+        let parsed = |tested: &TestedComparison| ParsedFinding {
+            gain: tested.paired.difference.value,
+            verdict: tested.significance,
+            p_report: tested.p_report,
+        };
+        Claim::new(parsed(&self.strict), parsed(&self.lenient))
+    }
+
+    /// The comparison in a parsing.
+    #[must_use]
+    pub fn parsed(&self, mode: ReadingMode) -> &TestedComparison {
+        match mode {
+            ReadingMode::Strict => &self.strict,
+            ReadingMode::Lenient => &self.lenient,
+        }
+    }
+}
+
+/// The maximum number of comparisons between models; chosen: they take at most a gigabyte.
+const MOST_BETWEEN_MODELS: usize = 500_000;
+
+/// Whether models are compared with each other: their pairs grow with the square of their number.
+#[must_use]
+pub fn compares_models(grid: &Grid<'_>) -> bool {
+    let models: BTreeSet<&str> = grid.subjects.iter().map(|s| &*s.model).collect();
+    let pairs = grid.subjects.len() * models.len().saturating_sub(1) / 2;
+    pairs.saturating_mul(grid.groups().len()) <= MOST_BETWEEN_MODELS
+}
+
+/// All comparisons of a grid, ordered by kind, family and subjects.
+#[must_use]
+pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
+    let families = grid.groups();
+    let mut jobs = Vec::new();
+    for kind in ComparisonKind::ALL {
+        let pairs = pairs(grid, kind);
+        for family in &families {
+            jobs.extend(pairs.iter().map(|(a, b)| (kind, *family, *a, *b)));
+        }
+    }
+    corrected(paired(grid, jobs))
+}
+
+/// A kind, a family, and the indices of the two sides.
+type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
+
+/// The comparisons that have items, not yet corrected.
+fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
+    jobs.into_par_iter()
+        .filter_map(|(kind, family, first, second)| {
+            let paired = |mode| PairedComparison::new(grid, first, second, family, mode);
+            let strict = paired(ReadingMode::Strict)?;
+            let differs = grid.parsings_differ(first) || grid.parsings_differ(second);
+            let lenient = if differs {
+                paired(ReadingMode::Lenient)?
+            } else {
+                strict.clone()
+            };
+            Some(Comparison {
+                kind,
+                first: grid.subjects[first].clone(),
+                second: grid.subjects[second].clone(),
+                family: family.cloned(),
+                strict: TestedComparison::new(strict),
+                lenient: TestedComparison::new(lenient),
+                least_holm: 1.0,
+            })
+        })
+        .collect()
+}
+
+/// Comparisons of the kind [`Light`](ComparisonKind::Light) between different names of one model, which was asked in the same way under
+/// each of them.
+#[must_use]
+pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Comparison> {
+    let named: Vec<(usize, &Subject)> = grid
+        .subjects
+        .iter()
+        .enumerate()
+        .filter(|(_, subject)| names.contains(&subject.model))
+        .collect();
+    let mut pairs = Vec::new();
+    for (place, (index, subject)) in named.iter().enumerate() {
+        let others = named[place + 1..]
+            .iter()
+            .filter(|(_, other)| other.model != subject.model && is_other_light(subject, other));
+        pairs.extend(others.map(|(other, _)| (*index, *other)));
+    }
+    let families = grid.groups();
+    let jobs = families.iter().flat_map(|family| {
+        pairs
+            .iter()
+            .map(|(first, second)| (ComparisonKind::Light, *family, *first, *second))
+    });
+    corrected(paired(grid, jobs.collect()))
+}
+
+/// The comparisons with their significance, after Holm's correction within each set.
+fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
+    let mut sets = BTreeMap::<_, Vec<usize>>::new();
+    for (index, comparison) in all.iter().enumerate() {
+        let models = (
+            comparison.first.model.clone(),
+            comparison.second.model.clone(),
+        );
+        let set = (comparison.kind, comparison.family.is_some(), models);
+        sets.entry(set).or_default().push(index);
+    }
+    for set in sets.into_values() {
+        let values = |of: fn(&Comparison) -> f64| -> Vec<f64> {
+            let values = set.iter().map(|index| of(&all[*index]));
+            holm(&values.collect::<Vec<_>>())
+        };
+        let strict = values(|found| found.strict.paired.p);
+        let lenient = values(|found| found.lenient.paired.p);
+        let least = values(|found| least_p(found.strict.paired.clusters));
+        for (place, index) in set.into_iter().enumerate() {
+            let comparison = &mut all[index];
+            let is_too_small = comparison.is_too_small();
+            comparison.least_holm = least[place];
+            for (tested, holm) in [
+                (&mut comparison.strict, strict[place]),
+                (&mut comparison.lenient, lenient[place]),
+            ] {
+                let difference = tested.paired.difference.value;
+                tested.holm = holm;
+                tested.significance = if is_too_small {
+                    Significance::TooFew
+                } else {
+                    Significance::new(difference, holm, least[place])
+                };
+            }
+        }
+    }
+    all
+}
+
+/// The indices of the subjects that a kind compares.
+pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    let compared = compares_models(grid);
+    let judged = judged(grid.subjects.iter().map(|subject| &*subject.model));
+    for (index, subject) in grid.subjects.iter().enumerate() {
+        let against: Vec<usize> = match kind {
+            // Only raw images show what darkness costs. The curves show how much of it an enhancer recovers.
+            ComparisonKind::Level
+                if subject.variant.is_degraded() && subject.enhancer.is_none() =>
+            {
+                let clean = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
+                grid.stand_in(&clean).into_iter().collect()
+            }
+            ComparisonKind::Variant => match subject
+                .variant
+                .kind
+                .and_then(darkqa_ground::types::degradations::Kind::base)
+            {
+                None => Vec::new(),
+                // The same level of the base kind, which has no light readings.
+                base => changed(grid, subject, |other| {
+                    other.variant = KindReading {
+                        kind: base,
+                        reading: None,
+                        pair: None,
+                        group: subject.variant.group.clone(),
+                    };
+                }),
+            },
+            ComparisonKind::Enhancer | ComparisonKind::RealEnhanced
+                if subject.enhancer.is_some()
+                    && subject.variant.photograph().is_some()
+                        == (kind == ComparisonKind::RealEnhanced) =>
+            {
+                changed(grid, subject, |other| other.enhancer = None)
+            }
+            ComparisonKind::RealSynthetic if subject.variant.photograph().is_some() => {
+                real_synthetic::as_dark(grid, index)
+            }
+            ComparisonKind::Model if compared => later_models(grid, index, &judged),
+            ComparisonKind::Light => later_lights(grid, index),
+            ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
+            _ => Vec::new(),
+        };
+        pairs.extend(against.into_iter().map(|other| (index, other)));
+    }
+    pairs
+}
+
+/// The subject that differs from `subject` by a change only, if the grid has it.
+fn changed(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)) -> Vec<usize> {
+    let mut other = subject.clone();
+    change(&mut other);
+    grid.stand_in(&other).into_iter().collect()
+}
+
+/// Later models of the grid in the same condition, so that each pair occurs once. Only those of `judged` are compared.
+fn later_models(grid: &Grid<'_>, index: usize, judged: &BTreeSet<&str>) -> Vec<usize> {
+    let subject = &grid.subjects[index];
+    if !judged.contains(&*subject.model) {
+        return Vec::new();
+    }
+    let later = grid.subjects.iter().enumerate().skip(index + 1);
+    let condition = |of: &Subject| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
+    later
+        .filter(|(_, other)| other.model != subject.model && condition(other) == condition(subject))
+        .filter(|(_, other)| judged.contains(&*other.model))
+        .map(|(other, _)| other)
+        .collect()
+}
+
+/// Later subjects of the grid with the same model at the same level, raw or with the same enhancer, in another light reading or
+/// with the images of other runs.
+fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
+    let subject = &grid.subjects[index];
+    grid.subjects
+        .iter()
+        .enumerate()
+        .skip(index + 1)
+        .filter(|(_, other)| other.model == subject.model && is_other_light(subject, other))
+        .map(|(other, _)| other)
+        .collect()
+}
+
+/// Whether two subjects show the same level, raw or with the same enhancer, in another light reading or with the images of other runs.
+fn is_other_light(one: &Subject, other: &Subject) -> bool {
+    (one.view, one.level) == (other.view, other.level)
+        && (one.variant.kind, &one.enhancer) == (other.variant.kind, &other.enhancer)
+        && one.variant.pair.as_ref().map(PairDark::sort)
+            == other.variant.pair.as_ref().map(PairDark::sort)
+        && one.variant != other.variant
+}
+
+/// The same model without images; if it was never asked so, all models without images.
+fn blind(grid: &Grid<'_>, subject: &Subject) -> Vec<usize> {
+    let all = || {
+        grid.subjects
+            .iter()
+            .enumerate()
+            .filter(|(_, other)| other.view == Some(View::Blind))
+    };
+    let same_model: Vec<usize> = all()
+        .filter(|(_, other)| other.model == subject.model)
+        .map(|(index, _)| index)
+        .collect();
+    if same_model.is_empty() {
+        all().map(|(index, _)| index).collect()
+    } else {
+        same_model
+    }
+}

@@ -1,0 +1,73 @@
+//! The synthetic images with which photographs in the dark are compared: [`as_dark`].
+
+use std::collections::BTreeMap;
+
+use crate::grid::Grid;
+use crate::photographs::pair_darkness::{PairDarkness, pair_facts};
+use crate::subject::Subject;
+use darkqa_ground::types::degradations::Axis;
+use darkqa_ground::types::{KindReading, View};
+
+/// Distance in EV between a photograph and a level within which the two are compared; chosen: half the largest step of the paper's
+/// levels.
+const NEAR: f64 = 1.0;
+
+/// The subjects of the same model, raw or with the same enhancer, whose synthetic images are as dark as the photographs of a subject:
+/// those that are as dark frame by frame; without any, of each variant the level that is nearest to the median drop of the photographs,
+/// if one is near.
+pub(super) fn as_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
+    let subject = &grid.subjects[photographed];
+    let facts = pair_facts(grid, photographed);
+    let others: Vec<(usize, &Subject)> = grid
+        .subjects
+        .iter()
+        .enumerate()
+        .filter(|(_, other)| {
+            other.view == Some(View::Image)
+                && other.model == subject.model
+                && other.enhancer == subject.enhancer
+                && other.variant.group == subject.variant.group
+        })
+        .collect();
+    let is_match = |(index, other): &&(usize, &Subject)| {
+        other.variant.pair.is_some() && other.variant.synthetic_kind().is_some() && {
+            // Images that are as dark as another photograph of the frames are not as dark as these.
+            let of = pair_facts(grid, *index);
+            let mut shared = of
+                .iter()
+                .filter_map(|(frame, of)| Some((of, facts.get(frame)?)))
+                .peekable();
+            shared.peek().is_some() && shared.all(|(one, other)| one == other)
+        }
+    };
+    let matches: Vec<usize> = others
+        .iter()
+        .filter(is_match)
+        .map(|(index, _)| *index)
+        .collect();
+    if !matches.is_empty() {
+        return matches;
+    }
+    let facts: Vec<_> = facts.into_values().collect();
+    let Some(darkness) = subject
+        .variant
+        .photograph()
+        .and_then(|name| PairDarkness::new(name, &facts))
+    else {
+        return Vec::new();
+    };
+    let distance = |of: &Subject| {
+        let level = of.level.filter(|level| level.axis() == Some(Axis::LIGHT))?;
+        Some((level.value() - darkness.synthesis).abs())
+    };
+    let mut nearest = BTreeMap::<&KindReading, (f64, usize)>::new();
+    for (index, other) in others {
+        if let Some(distance) = distance(other).filter(|distance| *distance <= NEAR) {
+            let best = nearest.entry(&other.variant).or_insert((distance, index));
+            if distance < best.0 {
+                *best = (distance, index);
+            }
+        }
+    }
+    nearest.into_values().map(|(_, index)| index).collect()
+}

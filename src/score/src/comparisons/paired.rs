@@ -1,0 +1,421 @@
+//! Comparison of two subjects on the same items: [`PairedComparison`].
+
+use crate::choice::ReadingMode;
+use crate::estimate::Estimate;
+use crate::grid::{Grid, GridItem};
+use crate::significance::{ALPHA, SwapMethod, mcnemar, swap_test};
+use darkqa_ground::types::Family;
+use darkqa_statistics::quantiles::{beyond, degrees_of_freedom, quantile};
+use darkqa_statistics::residuals::{residuals, unknown_design_effect};
+
+/// Accuracy of one subject against another on the items to which both replied.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairedComparison {
+    /// Accuracy of the first subject.
+    pub first: f64,
+    /// Accuracy of the second subject.
+    pub second: f64,
+    /// Accuracy of the first minus that of the second. Its `n` is the number of pairs.
+    pub difference: Estimate,
+    /// Number of items that only the first subject got right.
+    pub gained: usize,
+    /// Number of items that only the second subject got right.
+    pub lost: usize,
+    /// Number of clusters that have a pair.
+    pub clusters: usize,
+    /// McNemar's exact p-value, which treats items as independent.
+    pub mcnemar: f64,
+    /// p-value of no difference ([`PairedTest`]).
+    pub p: f64,
+    /// Standard error of the difference, and its degrees of freedom.
+    pub spread: Spread,
+}
+
+/// Counts of the pairs of a cluster.
+#[derive(Debug, Clone, Copy, Default)]
+struct ClusterPairs {
+    all: u32,
+    gained: u32,
+    lost: u32,
+}
+
+impl PairedComparison {
+    /// Comparison of two subjects, by their indices in the grid; `None` if no item has a reply of both.
+    #[must_use]
+    pub fn new(
+        grid: &Grid<'_>,
+        first: usize,
+        second: usize,
+        family: Option<&Family>,
+        mode: ReadingMode,
+    ) -> Option<Self> {
+        Self::on_items(grid, first, second, mode, |_, item| item.is_of(family))
+    }
+
+    /// The same on the items for which `has` is true; it takes the index of an item and the item.
+    pub fn on_items(
+        grid: &Grid<'_>,
+        first: usize,
+        second: usize,
+        mode: ReadingMode,
+        has: impl Fn(usize, &GridItem<'_>) -> bool,
+    ) -> Option<Self> {
+        let is_right = |item: &GridItem<'_>, chosen| item.is_right(chosen);
+        Self::counting(grid, [first, second], mode, has, is_right)
+    }
+
+    /// The same for replies that `counts` counts in place of right ones; it takes an item and a reading of a reply to it.
+    pub(crate) fn counting(
+        grid: &Grid<'_>,
+        [first, second]: [usize; 2],
+        mode: ReadingMode,
+        has: impl Fn(usize, &GridItem<'_>) -> bool,
+        counts: impl Fn(&GridItem<'_>, Option<u8>) -> bool,
+    ) -> Option<Self> {
+        let mut clusters = vec![ClusterPairs::default(); grid.clusters];
+        let mut counted = [0_usize; 2];
+        for (index, item) in grid.items.iter().enumerate() {
+            if !has(index, item) {
+                continue;
+            }
+            let reading = |subject| grid.result(subject, index).reading(mode);
+            let (Some(a), Some(b)) = (reading(first), reading(second)) else {
+                continue;
+            };
+            let (a, b) = (counts(item, a), counts(item, b));
+            let cluster = &mut clusters[item.cluster as usize];
+            cluster.all += 1;
+            cluster.gained += u32::from(a && !b);
+            cluster.lost += u32::from(b && !a);
+            counted[0] += usize::from(a);
+            counted[1] += usize::from(b);
+        }
+        clusters.retain(|cluster| cluster.all > 0);
+        let sum = |of: fn(&ClusterPairs) -> u32| -> usize {
+            clusters.iter().map(|cluster| of(cluster) as usize).sum()
+        };
+        let n = sum(|cluster| cluster.all);
+        if n == 0 {
+            return None;
+        }
+        let (gained, lost) = (sum(|pairs| pairs.gained), sum(|pairs| pairs.lost));
+        let nets = clusters.iter().map(|cluster| ClusterNet {
+            net: i64::from(cluster.gained) - i64::from(cluster.lost),
+            items: cluster.all,
+        });
+        let tested = PairedTest::new(&nets.collect::<Vec<_>>(), 1.0, (gained + lost) as f64);
+        Some(Self {
+            first: counted[0] as f64 / n as f64,
+            second: counted[1] as f64 / n as f64,
+            difference: tested.difference,
+            gained,
+            lost,
+            clusters: clusters.len(),
+            mcnemar: mcnemar(gained, lost),
+            p: tested.p,
+            spread: tested.spread,
+        })
+    }
+}
+
+/// The difference of the items of a cluster.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ClusterNet {
+    /// Sum of the items' differences, each a whole number.
+    pub(crate) net: i64,
+    /// Number of items.
+    pub(crate) items: u32,
+}
+
+/// A paired difference with its interval and its test, which agree: p is below 0.05 if and only if the interval leaves out 0.
+///
+/// p is the larger of two p-values of no difference: that of Student's t, by which the interval of [`difference`] is made, and the
+/// exact one of swapping the two sides in whole clusters ([`swap_test`]). So it is never below the exact size, however few clusters
+/// there are. The interval holds all differences that the test does not reject: where the swaps alone do not reject 0, it is
+/// extended to 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PairedTest {
+    pub(super) difference: Estimate,
+    pub(crate) p: f64,
+    /// How the swaps were counted.
+    pub(super) by: SwapMethod,
+    pub(super) spread: Spread,
+}
+
+impl PairedTest {
+    /// The test of clusters that have items. `scale` is the number of pairs that an item's difference adds up; `squares` is the sum of
+    /// the squared differences of all items.
+    pub(crate) fn new(clusters: &[ClusterNet], scale: f64, squares: f64) -> Self {
+        let n = clusters.iter().map(|cluster| cluster.items as usize).sum();
+        let sums = clusters
+            .iter()
+            .map(|cluster| (cluster.net as f64 / scale, f64::from(cluster.items)));
+        let (estimate, spread) = interval(&sums.collect::<Vec<_>>(), squares / scale / scale, n);
+        let nets = clusters.iter().map(|cluster| cluster.net);
+        let swapped = swap_test(&nets.collect::<Vec<_>>());
+        let p = spread
+            .p(estimate.value * n as f64 / (n as f64 + ADDED))
+            .max(swapped.p);
+        Self {
+            difference: if p < ALPHA {
+                estimate
+            } else {
+                with_zero(estimate)
+            },
+            p,
+            by: swapped.by,
+            spread,
+        }
+    }
+}
+
+/// The estimate with its interval extended to 0.
+fn with_zero(estimate: Estimate) -> Estimate {
+    Estimate {
+        low: estimate.low.min(0.0),
+        high: estimate.high.max(0.0),
+        ..estimate
+    }
+}
+
+/// Number of pairs that Bonett and Price add.
+const ADDED: f64 = 2.0;
+
+/// Standard error of a difference, and the degrees of freedom of Student's t.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spread {
+    /// Standard error; infinite with one cluster.
+    pub error: f64,
+    /// Degrees of freedom, which need not be whole.
+    pub degrees: f64,
+}
+
+impl Spread {
+    /// Two-sided p-value of a centre of the interval.
+    pub(super) fn p(&self, center: f64) -> f64 {
+        if self.error.is_finite() {
+            beyond(center.abs() / self.error, self.degrees)
+        } else {
+            1.0
+        }
+    }
+
+    /// The smallest difference that a two-sided test at `level` detects in 80 % of samples of this spread: the error times the sum of
+    /// the two quantiles (Bloom 1995, Eval. Rev. 19:547).
+    #[must_use]
+    pub fn detectable(&self, level: f64) -> f64 {
+        let [test, power] = [1.0 - level / 2.0, POWER].map(|share| quantile(share, self.degrees));
+        self.error * (test + power)
+    }
+}
+
+/// Share of samples in which a detectable difference is detected (chosen, as usual).
+pub const POWER: f64 = 0.8;
+
+/// The difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
+///
+/// It adds one pair in each direction, so that few or no discordant pairs do not look like certainty. Here the variance
+/// between clusters, which is the sum of their squared [`residuals`], replaces that of independent pairs, and Student's quantile the
+/// normal one. Where clusters vary more than independent pairs would, it has the degrees of freedom that their residuals allow
+/// ([`degrees_of_freedom`]), else one less than clusters. If all pairs have the same difference, which is mostly none, the variance of
+/// the two added pairs is multiplied by [`unknown_design_effect`]: differences that come in few clusters may all have been missed.
+///
+/// `clusters` holds, for each cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number;
+/// `squares` is the sum of the squared differences of all pairs, and `n` the number of all pairs.
+#[must_use]
+pub fn difference(clusters: &[(f64, f64)], squares: f64, n: usize) -> Estimate {
+    interval(clusters, squares, n).0
+}
+
+/// The same with its p-value of no difference by Student's t: below 0.05 if and only if the interval leaves out 0.
+#[must_use]
+pub(crate) fn tested_difference(
+    clusters: &[(f64, f64)],
+    squares: f64,
+    n: usize,
+) -> (Estimate, f64) {
+    let (estimate, spread) = interval(clusters, squares, n);
+    let p = spread.p(estimate.value * n as f64 / (n as f64 + ADDED));
+    (estimate, p)
+}
+
+fn interval(clusters: &[(f64, f64)], squares: f64, n: usize) -> (Estimate, Spread) {
+    let (all, c) = (n as f64, clusters.len() as f64);
+    let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
+    let value = sum / all;
+    let residuals = residuals(clusters, value);
+    // One cluster shows no spread between clusters: its residual is infinite and the interval is the whole range.
+    let variance: f64 = residuals.iter().map(|residual| residual * residual).sum();
+    let independent = squares - all * value * value;
+    let added = if independent > all * ROUNDING {
+        ADDED
+    } else {
+        ADDED * unknown_design_effect(clusters)
+    };
+    let degrees = if variance * (c - 1.0) / c > independent * (1.0 + ROUNDING) {
+        degrees_of_freedom(&residuals)
+    } else {
+        c - 1.0
+    };
+    let spread = Spread {
+        error: (variance + added).sqrt() / (all + ADDED),
+        degrees,
+    };
+    let half = quantile(1.0 - ALPHA / 2.0, degrees) * spread.error;
+    let center = sum / (all + ADDED);
+    let estimate = Estimate {
+        value,
+        low: (center - half).clamp(-1.0, value),
+        high: (center + half).clamp(value, 1.0),
+        n,
+    };
+    (estimate, spread)
+}
+
+/// Relative error of sums that are equal but for rounding (chosen).
+const ROUNDING: f64 = 1e-9;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use darkqa_statistics::quantiles::student;
+
+    /// A small generator of whole numbers, for designs of many shapes.
+    fn designs() -> impl Iterator<Item = Vec<ClusterNet>> {
+        let mut state = 1_u64;
+        let mut draw = move |below: u64| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            (state >> 33) % below
+        };
+        (0..4000).map(move |_| {
+            let (clusters, items, shift) = (2 + draw(30), 1 + draw(8), draw(3));
+            (0..clusters)
+                .map(|_| ClusterNet {
+                    net: (draw(2 * items + 1) + shift).min(2 * items) as i64 - items as i64,
+                    items: items as u32,
+                })
+                .collect()
+        })
+    }
+
+    #[test]
+    fn interval_and_test_agree() {
+        let (mut detected, mut extended) = (0, 0);
+        for clusters in designs() {
+            let squares = clusters
+                .iter()
+                .map(|cluster| cluster.net.abs())
+                .sum::<i64>() as f64;
+            let tested = PairedTest::new(&clusters, 1.0, squares);
+            let Estimate {
+                value,
+                low,
+                high,
+                n,
+            } = tested.difference;
+            assert_eq!(tested.p < 0.05, low > 0.0 || high < 0.0, "{clusters:?}");
+            assert!(low <= value && value <= high && n > 0);
+            let nets: Vec<i64> = clusters.iter().map(|cluster| cluster.net).collect();
+            assert!(tested.p >= swap_test(&nets).p, "{clusters:?}");
+            detected += usize::from(tested.p < 0.05);
+            let sums: Vec<(f64, f64)> = clusters
+                .iter()
+                .map(|cluster| (cluster.net as f64, f64::from(cluster.items)))
+                .collect();
+            let plain = difference(&sums, squares, n);
+            extended += usize::from(plain != tested.difference);
+        }
+        assert!(detected > 500 && extended > 10, "{detected} {extended}");
+    }
+
+    #[test]
+    fn a_detectable_difference_is_the_usual_sum_of_quantiles() {
+        // 1.962339 + 0.841998 standard errors (scipy 1.17.1, t.ppf).
+        let spread = Spread {
+            error: 0.01,
+            degrees: 1000.0,
+        };
+        assert!((spread.detectable(0.05) - 0.028_043_4).abs() < 1e-6);
+        assert!(spread.detectable(0.05 / 20.0) > 0.038);
+    }
+
+    fn estimate(clusters: &[(i64, i64, i64)]) -> Estimate {
+        let squares: i64 = clusters.iter().map(|(_, gained, lost)| gained + lost).sum();
+        let clusters: Vec<(f64, f64)> = clusters
+            .iter()
+            .map(|&(all, gained, lost)| ((gained - lost) as f64, all as f64))
+            .collect();
+        let n = clusters.iter().map(|(_, pairs)| pairs).sum::<f64>() as usize;
+        difference(&clusters, squares as f64, n)
+    }
+
+    #[test]
+    fn independent_pairs_give_bonett_and_prices_interval() {
+        // 100 pairs, 12 gained and 4 lost: (8 ± z √(Σd² − …)) / 102 with the unadjusted variance of d.
+        let pairs = [vec![(1, 1, 0); 12], vec![(1, 0, 1); 4], vec![(1, 0, 0); 84]].concat();
+        let interval = estimate(&pairs);
+        let variance = 100.0 / 99.0 * (16.0 - 100.0 * 0.08 * 0.08) + 2.0;
+        let half = student(99.0) * f64::sqrt(variance) / 102.0;
+        assert!((interval.value - 0.08).abs() < 1e-12);
+        assert!((interval.low - (8.0 / 102.0 - half)).abs() < 1e-12);
+        assert!((interval.high - (8.0 / 102.0 + half)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn few_clusters_with_all_differences_know_their_variance_poorly() {
+        // 24 differences in the same direction: spread over 12 clusters of 20, or in two of them.
+        let spread = estimate(&[(20, 2, 0); 12]);
+        let clumped = estimate(&[vec![(20, 12, 0); 2], vec![(20, 0, 0); 10]].concat());
+        let width = |estimate: Estimate| estimate.high - estimate.low;
+        assert!((spread.value - clumped.value).abs() < 1e-12);
+        // √(12 / 11 · Σr² + 2) / 242 with Σr² = 2 · 10² + 10 · 2²; κ = 12 · (2 · 10⁴ + 10 · 2⁴) / 240² = 4.2.
+        let half = student(12.0 / 3.2) * f64::sqrt(12.0 / 11.0 * 240.0 + 2.0) / 242.0;
+        assert!((width(clumped) - 2.0 * half).abs() < 1e-9, "{clumped:?}");
+        let half = student(11.0) * f64::sqrt(2.0) / 242.0;
+        assert!((width(spread) - 2.0 * half).abs() < 1e-9, "{spread:?}");
+    }
+
+    #[test]
+    fn an_interval_by_clusters_of_unequal_size_is_that_of_another_program() {
+        // numpy 2 and scipy 1.17.1, written apart from this program. The first cluster has more than a third of all pairs.
+        let interval = estimate(&[
+            (30, 6, 1),
+            (4, 1, 0),
+            (5, 0, 0),
+            (6, 2, 0),
+            (3, 0, 1),
+            (8, 0, 0),
+            (5, 1, 1),
+            (7, 0, 0),
+            (6, 0, 0),
+            (4, 0, 0),
+        ]);
+        assert!(
+            (interval.low + 0.061_251_861_397_6).abs() < 1e-9,
+            "{interval:?}"
+        );
+        assert!(
+            (interval.high - 0.236_251_861_397_6).abs() < 1e-9,
+            "{interval:?}"
+        );
+    }
+
+    #[test]
+    fn no_difference_is_not_certainty() {
+        // Neither none at all nor the same one everywhere. The two added pairs count as pairs of clusters of 4: 1 + 0.2 · 3.
+        let half = student(19.0) * f64::sqrt(2.0 * 1.6) / 82.0;
+        let none = estimate(&[(4, 0, 0); 20]);
+        assert!((none.low + half).abs() < 1e-12, "{none:?}");
+        assert!((none.high - half).abs() < 1e-12, "{none:?}");
+        let all = estimate(&[(4, 4, 0); 20]);
+        assert!((all.low - (80.0 / 82.0 - half)).abs() < 1e-12, "{all:?}");
+        // One pair a cluster: Bonett and Price's own.
+        let single = estimate(&[(1, 0, 0); 80]);
+        let half = student(79.0) * f64::sqrt(2.0) / 82.0;
+        assert!((single.high - half).abs() < 1e-12, "{single:?}");
+        let single = estimate(&[(4, 1, 0)]);
+        assert_eq!((single.low, single.high), (-1.0, 1.0));
+    }
+}

@@ -1,0 +1,497 @@
+//! Differences of all models together: [`PooledFinding`].
+//!
+//! The models are fixed: a finding is about these models, not about models in general. Items, grouped in clusters, are the sample.
+
+mod finding;
+mod left_out;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use super::paired::{ClusterNet, PairedTest};
+use super::pooled_kind::PooledKind;
+use crate::accuracies::{Coverage, Lacking, shared};
+use crate::grid::{Grid, TrialResult};
+use crate::significance::{Significance, holm, least_p};
+use crate::subject::{Subject, pooled_models};
+use darkqa_ground::types::degradations::Kind;
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading, View};
+
+use finding::is_severe;
+
+pub use finding::{PooledDifference, PooledFinding};
+pub use left_out::ModelsLeftOut;
+pub(crate) use left_out::models_left_out;
+
+/// The models that findings are about, sorted: those with images, without people, and without reference models if there are others; else
+/// one reference alone.
+#[must_use]
+pub fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
+    models(grid, View::Image)
+}
+
+/// The [`pooled_models`] with images or without.
+fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
+    let asked = grid
+        .subjects
+        .iter()
+        .filter(|subject| subject.view == Some(view));
+    let models = grid
+        .listing
+        .without_people(asked.map(|subject| &*subject.model));
+    pooled_models(models).into_iter().collect()
+}
+
+/// A kind, variant and enhancer: one set of Holm's correction for each family.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct PooledSet {
+    kind: PooledKind,
+    variant: KindReading,
+    enhancer: Option<EnhancerName>,
+}
+
+impl PooledSet {
+    /// All sets for which the grid may have both sides.
+    fn all(grid: &Grid<'_>) -> BTreeSet<Self> {
+        let seeing = grid.subjects.iter();
+        // Findings are about levels, and the darkness of pairs is none: it has comparisons of its own.
+        seeing
+            .filter(|subject| subject.view == Some(View::Image) && subject.variant.pair.is_none())
+            .flat_map(|subject| {
+                let raw = PooledKind::for_raw(subject.variant.kind);
+                let kinds = match subject.enhancer {
+                    None => raw,
+                    Some(_) => vec![PooledKind::Enhancer],
+                };
+                kinds.into_iter().map(|kind| Self {
+                    kind,
+                    variant: subject.variant.clone(),
+                    enhancer: subject.enhancer.clone(),
+                })
+            })
+            .collect()
+    }
+
+    /// The two subjects of a model at a level, by their indices; `other` is the model of the second side.
+    fn sides(
+        &self,
+        grid: &Grid<'_>,
+        model: &str,
+        other: &str,
+        level: AxisLevel,
+    ) -> Option<(usize, usize)> {
+        let seeing = |level, variant, enhancer| Subject::seeing(model, level, variant, enhancer);
+        let first = seeing(level, &self.variant, self.enhancer.as_ref());
+        let second = match self.kind {
+            PooledKind::Darkness | PooledKind::Hallucination(_) => {
+                seeing(AxisLevel::L0, &self.variant, None)
+            }
+            PooledKind::Noise => {
+                let base = KindReading {
+                    kind: self.variant.kind.and_then(Kind::base),
+                    reading: None,
+                    pair: None,
+                    group: self.variant.group.clone(),
+                };
+                seeing(level, &base, None)
+            }
+            PooledKind::Enhancer => seeing(level, &self.variant, None),
+            PooledKind::Blind => Subject::new(other, None),
+        };
+        Some((grid.find(&first)?, grid.stand_in(&second)?))
+    }
+
+    /// The levels of the first side, sorted.
+    fn levels(&self, grid: &Grid<'_>) -> BTreeSet<AxisLevel> {
+        grid.subjects
+            .iter()
+            .filter(|subject| {
+                subject.view == Some(View::Image)
+                    && subject.variant == self.variant
+                    && subject.enhancer == self.enhancer
+            })
+            .filter_map(|subject| subject.level)
+            .collect()
+    }
+
+    /// The models of each pair, first and second side, among those of the pool that have both sides at some level. Those that answered
+    /// less than others stand apart.
+    fn models<'g>(&self, grid: &'g Grid<'_>, levels: &BTreeSet<AxisLevel>) -> SetModels<'g> {
+        let all = self.asked_models(grid, levels);
+        let coverages: Vec<Coverage> = all
+            .iter()
+            .map(|[model, other]| {
+                let sides = levels.iter().filter_map(|level| {
+                    let (first, second) = self.sides(grid, model, other, *level)?;
+                    Some((*level, vec![first, second]))
+                });
+                Coverage::new(grid, sides, |item| self.kind.is_about(&grid.items[item]))
+            })
+            .collect();
+        let mut models = SetModels::default();
+        let Some(most) = shared(&coverages) else {
+            return models;
+        };
+        for (pair, coverage) in all.into_iter().zip(&coverages) {
+            let lacking = coverage.lacking(most);
+            if lacking.is_empty() {
+                let levels = coverage.levels();
+                let more: Vec<AxisLevel> = levels
+                    .filter(|level| !most.levels().any(|known| known == *level))
+                    .collect();
+                if !more.is_empty() {
+                    models.more.push((pair[0], more));
+                }
+                models.pooled.push(pair);
+            } else {
+                models.apart.push((pair[0], lacking));
+            }
+        }
+        models
+    }
+
+    /// The models of each pair that were asked on both sides at some level.
+    ///
+    /// Without images, models are compared with their own replies; only if none of them was asked so, each is compared with
+    /// every model without images.
+    fn asked_models<'g>(
+        &self,
+        grid: &'g Grid<'_>,
+        levels: &BTreeSet<AxisLevel>,
+    ) -> Vec<[&'g str; 2]> {
+        let pool = pool(grid);
+        let own = pool.iter().map(|model| [*model, *model]);
+        let asked = |pair: &[&str; 2]| {
+            levels
+                .iter()
+                .any(|level| self.sides(grid, pair[0], pair[1], *level).is_some())
+        };
+        let own: Vec<[&str; 2]> = own.filter(asked).collect();
+        if self.kind != PooledKind::Blind || !own.is_empty() {
+            return own;
+        }
+        let blind = models(grid, View::Blind);
+        pool.iter()
+            .flat_map(|model| blind.iter().map(|other| [*model, *other]))
+            .filter(asked)
+            .collect()
+    }
+}
+
+/// The models of a set.
+#[derive(Debug, Default)]
+struct SetModels<'g> {
+    /// The models of each pair, first and second side.
+    pooled: Vec<[&'g str; 2]>,
+    /// The models that answered too little, with the levels and the numbers of items of [`Coverage::lacking`].
+    apart: Vec<(&'g str, Lacking)>,
+    /// The pooled models that were asked at more levels than the others, with these levels.
+    more: Vec<(&'g str, Vec<AxisLevel>)>,
+}
+
+/// Replies of all models to one item on both sides.
+#[derive(Debug, Clone, Copy)]
+struct PooledItem {
+    /// Index of the item in the grid.
+    index: usize,
+    /// Replies of each side; `None` if a model has no reply.
+    sides: Option<[SideCounts; 2]>,
+}
+
+/// Numbers of replies of all models to one item on one side.
+#[derive(Debug, Clone, Copy, Default)]
+struct SideCounts {
+    /// Replies that are counted in the strict parsing: right ones, or false answers.
+    strict: u32,
+    /// The same in the lenient parsing.
+    lenient: u32,
+    /// Replies that the strict parsing reads.
+    read: u32,
+}
+
+impl SideCounts {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            strict: self.strict + other.strict,
+            lenient: self.lenient + other.lenient,
+            read: self.read + other.read,
+        }
+    }
+}
+
+/// All pooled findings, ordered by kind, variant, enhancer, family and level; those over several levels stand behind.
+#[must_use]
+pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
+    let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
+    let findings: Vec<PooledFinding> = sets
+        .into_par_iter()
+        .flat_map_iter(|set| set_findings(grid, &set))
+        .collect();
+    findings
+        .into_iter()
+        .partition(|finding| finding.mean_over.is_empty())
+}
+
+/// The findings of a set over its darker levels together, and over its lighter ones, if it has several of them. What grows with the
+/// level has no mean over the lighter ones.
+fn averaged(
+    grid: &Grid<'_>,
+    set: &PooledSet,
+    models: &[[&str; 2]],
+    levels: &[(AxisLevel, Vec<PooledItem>)],
+) -> Vec<PooledFinding> {
+    if !set.kind.is_averaged() {
+        return Vec::new();
+    }
+    let halves = [true, false].map(|severe| {
+        let own: Vec<&(AxisLevel, Vec<PooledItem>)> = levels
+            .iter()
+            .filter(|(level, _)| is_severe(*level, set.variant.kind) == severe)
+            .collect();
+        let is_tested = severe || !set.kind.grows_with_the_level();
+        if own.len() < 2 || !is_tested {
+            return None;
+        }
+        let mean_over: Vec<AxisLevel> = own.iter().map(|(level, _)| *level).collect();
+        let mut sums = BTreeMap::<usize, Option<[SideCounts; 2]>>::new();
+        for item in own.iter().flat_map(|(_, items)| items) {
+            let sum = sums
+                .entry(item.index)
+                .or_insert_with(|| Some([SideCounts::default(); 2]));
+            *sum = sum.zip(item.sides).map(|(sum, sides)| {
+                let [first, second] = sum;
+                [first.plus(sides[0]), second.plus(sides[1])]
+            });
+        }
+        // An item counts if it was answered at every level.
+        let mut asked = BTreeMap::<usize, usize>::new();
+        for item in own.iter().flat_map(|(_, items)| items) {
+            *asked.entry(item.index).or_default() += 1;
+        }
+        let items: Vec<PooledItem> = sums
+            .into_iter()
+            .map(|(index, sides)| PooledItem {
+                index,
+                sides: sides.filter(|_| asked[&index] == own.len()),
+            })
+            .collect();
+        let level = *mean_over.last()?;
+        let pool = PoolOfLevels {
+            models,
+            levels: own.len(),
+        };
+        let found = finding(grid, set, pool, level, &items, None)?;
+        Some(PooledFinding { mean_over, ..found })
+    });
+    halves
+        .into_iter()
+        .flatten()
+        .flat_map(|one| corrected(vec![one]))
+        .collect()
+}
+
+/// The models of a finding, and the number of levels over which it is a mean.
+#[derive(Debug, Clone, Copy)]
+struct PoolOfLevels<'m> {
+    models: &'m [[&'m str; 2]],
+    levels: usize,
+}
+
+/// The findings of a set, with all families together and with each family.
+fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
+    let levels = set.levels(grid);
+    let models = set.models(grid, &levels).pooled;
+    if models.is_empty() {
+        return Vec::new();
+    }
+    let levels: Vec<(AxisLevel, Vec<PooledItem>)> = levels
+        .iter()
+        .filter_map(|level| Some((*level, items(grid, set, &models, *level)?)))
+        .collect();
+    let groups = match set.kind.only_family() {
+        None => grid.groups(),
+        only => vec![only],
+    };
+    let pool = PoolOfLevels {
+        models: &models,
+        levels: 1,
+    };
+    let mut findings: Vec<PooledFinding> = groups
+        .into_iter()
+        .flat_map(|family| {
+            let of_family = levels
+                .iter()
+                .filter_map(|(level, items)| finding(grid, set, pool, *level, items, family));
+            corrected(of_family.collect())
+        })
+        .collect();
+    findings.extend(averaged(grid, set, &models, &levels));
+    findings
+}
+
+/// The items that some model was asked on both sides; `None` if a model lacks a side.
+fn items(
+    grid: &Grid<'_>,
+    set: &PooledSet,
+    models: &[[&str; 2]],
+    level: AxisLevel,
+) -> Option<Vec<PooledItem>> {
+    let pairs: Vec<(usize, usize)> = models
+        .iter()
+        .map(|[model, other]| set.sides(grid, model, other, level))
+        .collect::<Option<_>>()?;
+    let items = grid
+        .items
+        .iter()
+        .enumerate()
+        .filter(|(_, item)| set.kind.is_about(item))
+        .filter_map(|(index, item)| {
+            let (mut sides, mut is_asked, mut is_answered) =
+                ([SideCounts::default(); 2], false, true);
+            for &(first, second) in &pairs {
+                let [a, b] = [first, second].map(|subject| grid.result(subject, index));
+                is_asked |= a.is_asked() && b.is_asked();
+                for (side, result) in sides.iter_mut().zip([a, b]) {
+                    let TrialResult::Read { strict, lenient } = result else {
+                        is_answered = false;
+                        continue;
+                    };
+                    side.strict += u32::from(set.kind.counts(item, strict));
+                    side.lenient += u32::from(set.kind.counts(item, lenient));
+                    side.read += u32::from(strict.is_some());
+                }
+            }
+            let sides = is_answered.then_some(sides);
+            is_asked.then_some(PooledItem { index, sides })
+        });
+    Some(items.collect())
+}
+
+/// The finding of a level and a family, before correction; `None` if no item was answered by all models.
+fn finding(
+    grid: &Grid<'_>,
+    set: &PooledSet,
+    pool: PoolOfLevels<'_>,
+    level: AxisLevel,
+    items: &[PooledItem],
+    family: Option<&Family>,
+) -> Option<PooledFinding> {
+    let models = pool.models;
+    let each = models.len() * pool.levels;
+    let (mut answered, mut dropped) = (Vec::new(), 0);
+    for (item, sides) in items
+        .iter()
+        .map(|item| (&grid.items[item.index], item.sides))
+        .filter(|(item, _)| item.is_of(family))
+    {
+        match sides {
+            Some(sides) => answered.push((item.cluster, sides)),
+            None => dropped += 1,
+        }
+    }
+    if answered.is_empty() {
+        return None;
+    }
+    let replies = (each * answered.len()) as f64;
+    let strict = parsed(grid, &answered, each, |side| side.strict);
+    let differ =
+        |(_, sides): &(u32, [SideCounts; 2])| sides.iter().any(|side| side.strict != side.lenient);
+    let lenient = if answered.iter().any(differ) {
+        parsed(grid, &answered, each, |side| side.lenient)
+    } else {
+        strict
+    };
+    let read = |side: usize| {
+        answered
+            .iter()
+            .map(|(_, sides)| f64::from(sides[side].read))
+            .sum::<f64>()
+            / replies
+    };
+    let clusters: BTreeSet<u32> = answered.iter().map(|(cluster, _)| *cluster).collect();
+    let names = |side: usize| {
+        let names: BTreeSet<&str> = models.iter().map(|pair| pair[side]).collect();
+        names.into_iter().map(str::to_owned).collect()
+    };
+    Some(PooledFinding {
+        kind: set.kind,
+        family: family.cloned(),
+        variant: set.variant.clone(),
+        enhancer: set.enhancer.clone(),
+        level,
+        mean_over: Vec::new(),
+        models: names(0),
+        blind_models: if set.kind == PooledKind::Blind {
+            names(1)
+        } else {
+            Vec::new()
+        },
+        strict,
+        lenient,
+        format: [read(0), read(1)],
+        levels: 1,
+        items: answered.len(),
+        dropped,
+        clusters: clusters.len(),
+        least_p: least_p(clusters.len()),
+        least_holm: 1.0,
+    })
+}
+
+/// The difference of the replies that `counted` counts, before correction; `each` is the number of replies to an item on each side.
+fn parsed(
+    grid: &Grid<'_>,
+    answered: &[(u32, [SideCounts; 2])],
+    each: usize,
+    counted: impl Fn(&SideCounts) -> u32,
+) -> PooledDifference {
+    let mut clusters = vec![ClusterNet { net: 0, items: 0 }; grid.clusters];
+    let (mut sums, mut squares) = ([0_u64; 2], 0);
+    for (cluster, sides) in answered {
+        let [first, second] = [&sides[0], &sides[1]].map(&counted);
+        let net = i64::from(first) - i64::from(second);
+        let of_cluster = &mut clusters[*cluster as usize];
+        of_cluster.net += net;
+        of_cluster.items += 1;
+        squares += net * net;
+        sums[0] += u64::from(first);
+        sums[1] += u64::from(second);
+    }
+    clusters.retain(|cluster| cluster.items > 0);
+    let tested = PairedTest::new(&clusters, each as f64, squares as f64);
+    let mean = |count: u64| count as f64 / each as f64 / answered.len() as f64;
+    PooledDifference {
+        first: mean(sums[0]),
+        second: mean(sums[1]),
+        difference: tested.difference,
+        p: tested.p,
+        p_by: tested.by,
+        holm: 1.0,
+        verdict: Significance::NotShown,
+        p_report: None,
+    }
+}
+
+/// The findings of one set with their verdicts, after Holm's correction.
+fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
+    let adjusted = |of: fn(&PooledFinding) -> f64| holm(&set.iter().map(of).collect::<Vec<_>>());
+    let least = adjusted(|finding| finding.least_p);
+    let strict = adjusted(|finding| finding.strict.p);
+    let lenient = adjusted(|finding| finding.lenient.p);
+    let levels = set.len();
+    for (index, finding) in set.iter_mut().enumerate() {
+        finding.levels = levels;
+        finding.least_holm = least[index];
+        let kind = finding.kind;
+        for (parsed, holm) in [
+            (&mut finding.strict, strict[index]),
+            (&mut finding.lenient, lenient[index]),
+        ] {
+            parsed.holm = holm;
+            let gain = kind.gain(parsed.difference.value);
+            parsed.verdict = Significance::new(gain, holm, least[index]);
+        }
+    }
+    set
+}

@@ -1,0 +1,118 @@
+//! One pooled difference and its tests: [`PooledFinding`].
+
+use crate::choice::ReadingMode;
+use crate::comparisons::claim::{Claim, ParsedFinding};
+use crate::comparisons::pooled_kind::PooledKind;
+use crate::estimate::{Estimate, largest};
+use crate::significance::{Significance, SwapMethod};
+use darkqa_ground::types::degradations::Kind;
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading};
+
+/// Difference of two conditions at one level, for all models of the pool together, in the strict parsing and the lenient one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PooledFinding {
+    /// The two sides, and the replies that count.
+    pub kind: PooledKind,
+    /// Question family; `None` for all families together. Findings about false answers have [`Family::Presence`] alone.
+    pub family: Option<Family>,
+    /// Kind of degradation of the first side, with its light reading; [`KindReading::NONE`] for L0 against no image.
+    pub variant: KindReading,
+    /// Enhancer of the first side; `None` for raw images.
+    pub enhancer: Option<EnhancerName>,
+    /// Level of the first side; of a mean over several, the darkest one.
+    pub level: AxisLevel,
+    /// All levels of a mean over several, sorted; empty for one level.
+    pub mean_over: Vec<AxisLevel>,
+    /// The models, sorted. All findings of one set (kind, variant and enhancer) have the same ones.
+    pub models: Vec<String>,
+    /// The models without images on the second side, sorted; empty if the finding is not about them. They are the same models
+    /// as `models` if these were asked without images too.
+    pub blind_models: Vec<String>,
+    /// The difference in the strict parsing, which is the headline.
+    pub strict: PooledDifference,
+    /// The difference in the lenient parsing.
+    pub lenient: PooledDifference,
+    /// Share of the replies of each side that keep to the answer format: those that the strict parsing reads.
+    pub format: [f64; 2],
+    /// Number of findings in its set.
+    pub levels: usize,
+    /// Number of items that every model answered on both sides.
+    pub items: usize,
+    /// Number of items that some model was asked on both sides, but that are left out because a model has no reply.
+    pub dropped: usize,
+    /// Number of clusters of the items.
+    pub clusters: usize,
+    /// Smallest p-value that this number of clusters, c, allows: 2 / 2ᶜ.
+    pub least_p: f64,
+    /// The smallest p-value after correction that the clusters allow; no verdict is possible if it is 0.05 or more.
+    pub least_holm: f64,
+}
+
+/// A pooled difference in one parsing of the replies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PooledDifference {
+    /// Share of the first side that is counted, accuracy or rate of false answers: mean over the items of the mean over the models.
+    pub first: f64,
+    /// The same share of the second side.
+    pub second: f64,
+    /// The first share minus the second. Its `n` is the number of items.
+    pub difference: Estimate,
+    /// p-value of no difference, of all models at once: the larger one of Student's t and of swapping the two sides in whole clusters.
+    pub p: f64,
+    /// How the swaps were counted.
+    pub p_by: SwapMethod,
+    /// p-value after Holm's correction over the levels of its set: the same kind, variant, enhancer and family.
+    pub holm: f64,
+    /// Result of the test after Holm's correction. A rate of false answers that is shown to grow is worse.
+    pub verdict: Significance,
+    /// p-value after the correction over all tests that sentences rest on; `None` if no sentence is about the finding.
+    pub p_report: Option<f64>,
+}
+
+impl PooledFinding {
+    /// The finding with the largest difference in either direction; of several, the first. `None` of none.
+    #[must_use]
+    pub fn largest<'f>(levels: &[&'f Self]) -> Option<&'f Self> {
+        largest(levels, |finding| finding.strict.difference)
+    }
+
+    /// The statement that sentences may make.
+    #[must_use]
+    pub fn claim(&self) -> Claim {
+        let parsed = |parsed: &PooledDifference| ParsedFinding {
+            gain: self.kind.gain(parsed.difference.value),
+            verdict: parsed.verdict,
+            p_report: parsed.p_report,
+        };
+        Claim::new(parsed(&self.strict), parsed(&self.lenient))
+    }
+
+    /// True if its level, or all levels of a mean, are in the darker part of the ladder: L4 (7.5 EV) and darker, of another kind of
+    /// degradation its fourth step and beyond. The paper's claims about enhancers divide L1–L3 and L4–L5 in the same way.
+    #[must_use]
+    pub fn is_severe(&self) -> bool {
+        is_severe(self.level, self.variant.kind)
+    }
+
+    pub(crate) fn set_p_report(&mut self, mode: ReadingMode, p: Option<f64>) {
+        match mode {
+            ReadingMode::Strict => self.strict.p_report = p,
+            ReadingMode::Lenient => self.lenient.p_report = p,
+        }
+    }
+
+    /// The difference in a parsing.
+    #[must_use]
+    pub fn parsed(&self, mode: ReadingMode) -> &PooledDifference {
+        match mode {
+            ReadingMode::Strict => &self.strict,
+            ReadingMode::Lenient => &self.lenient,
+        }
+    }
+}
+
+/// True for the darker part of the ladder of a kind.
+pub(super) fn is_severe(level: AxisLevel, kind: Option<Kind>) -> bool {
+    let fourth = kind.and_then(|kind| Some(AxisLevel::new(kind, *kind.ladder().get(3)?)));
+    fourth.is_some_and(|fourth| level.value() >= fourth.value())
+}

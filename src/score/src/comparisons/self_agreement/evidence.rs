@@ -1,0 +1,191 @@
+//! How much of what a model takes from the image is left in a condition: [`evidence`], and the exposure drop at which half of it is
+//! lost: [`EvidenceCurve`].
+
+use crate::accuracies::CurvePoints;
+use crate::bootstrap::Resamples;
+use crate::choice::ReadingMode;
+use crate::estimate::ClusterCount;
+use crate::estimate::Estimate;
+use crate::grid::Grid;
+use crate::subject::Subject;
+use crate::threshold::{LevelCounts, NoThreshold, Threshold};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading};
+
+/// Smallest distance between the floor and the ceiling for which a share of it is given; chosen.
+pub const MIN_DISTANCE: f64 = 0.1;
+
+/// Why no share of evidence is given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoEvidence {
+    /// No question was asked again at L0, so that the ceiling is not known.
+    NotAgain,
+    /// The model was not asked without images, so that the floor is not known.
+    NotBlind,
+    /// The ceiling is less than [`MIN_DISTANCE`] above the floor: this distance.
+    Close(f64),
+    /// The 95 % interval of this distance begins at or below 0: here. A share of a distance that may be 0 has no bounded interval (Fieller
+    /// 1954, J. R. Stat. Soc. B 16:175).
+    Unsure(f64),
+}
+
+/// Agreement with the answers in the light of the same model: without an image, and asked again in the light.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Bounds {
+    /// The floor, by cluster.
+    blind: Vec<ClusterCount>,
+    /// The ceiling, by cluster.
+    again: Vec<ClusterCount>,
+    /// Floor and ceiling in each draw of the bootstrap; not a number in a draw without a reply.
+    drawn: Vec<[f64; 2]>,
+}
+
+impl Bounds {
+    /// The bounds of a subject on the items of a family.
+    ///
+    /// # Errors
+    /// If one of them was not asked, or they are too close, or may be.
+    pub(super) fn new(
+        grid: &Grid<'_>,
+        subject: &Subject,
+        family: Option<&Family>,
+        mode: ReadingMode,
+        draws: &Resamples,
+    ) -> Result<Self, NoEvidence> {
+        let light = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
+        let again = grid.stand_in(&light).ok_or(NoEvidence::NotAgain)?;
+        let blind = Subject::new(&subject.model, None);
+        let blind = grid.stand_in(&blind).ok_or(NoEvidence::NotBlind)?;
+        let [blind, again] = [blind, again].map(|subject| grid.counts(subject, family, mode));
+        let ceiling = share(&again).ok_or(NoEvidence::NotAgain)?;
+        let floor = share(&blind).ok_or(NoEvidence::NotBlind)?;
+        if ceiling - floor < MIN_DISTANCE {
+            return Err(NoEvidence::Close(ceiling - floor));
+        }
+        let drawn: Vec<[f64; 2]> = drawn_shares(&blind, draws)
+            .into_iter()
+            .zip(drawn_shares(&again, draws))
+            .map(|(floor, ceiling)| [floor, ceiling])
+            .collect();
+        let distances = drawn.iter().map(|[floor, ceiling]| ceiling - floor);
+        let [low, _] = draws.interval(distances.filter(|distance| !distance.is_nan()).collect());
+        if low <= 0.0 {
+            return Err(NoEvidence::Unsure(low));
+        }
+        Ok(Self {
+            blind,
+            again,
+            drawn,
+        })
+    }
+}
+
+/// Share of the items that agree; `None` without a reply.
+fn share(counts: &[ClusterCount]) -> Option<f64> {
+    let right: u32 = counts.iter().map(|count| count.right).sum();
+    let replies: u32 = counts.iter().map(|count| count.replies).sum();
+    (replies > 0).then(|| f64::from(right) / f64::from(replies))
+}
+
+/// The share of the items that agree in each draw; not a number in one without a reply.
+fn drawn_shares(counts: &[ClusterCount], draws: &Resamples) -> Vec<f64> {
+    let sums = |number: fn(&ClusterCount) -> u32| {
+        let numbers: Vec<f32> = counts.iter().map(|count| number(count) as f32).collect();
+        draws.sums(&numbers)
+    };
+    let (right, replies) = (sums(|count| count.right), sums(|count| count.replies));
+    right
+        .iter()
+        .zip(&replies)
+        .map(|(right, n)| right / n)
+        .collect()
+}
+
+/// Share of the way from the floor B to the ceiling C that the agreement G of a condition has: (G − B) / (C − B), with the interval of the
+/// cluster bootstrap. It may lie outside 0 to 1. `None` without a reply in the condition.
+pub(super) fn evidence(
+    counts: &[ClusterCount],
+    bounds: &Bounds,
+    draws: &Resamples,
+) -> Option<Estimate> {
+    let of = |here: f64, floor: f64, ceiling: f64| (here - floor) / (ceiling - floor);
+    let value = of(share(counts)?, share(&bounds.blind)?, share(&bounds.again)?);
+    let drawn = drawn_shares(counts, draws)
+        .into_iter()
+        .zip(&bounds.drawn)
+        .map(|(here, [floor, ceiling])| of(here, *floor, *ceiling));
+    // Draws without a reply are dropped. Floor and ceiling coincide in fewer draws than lie outside the interval, so no end of the interval
+    // is infinite.
+    let drawn: Vec<f64> = drawn.filter(|value| !value.is_nan()).collect();
+    let replies = counts.iter().map(|count| count.replies as usize).sum();
+    Some(Estimate::around(value, draws.interval(drawn), replies))
+}
+
+/// Why the exposure drop at which half is lost is not known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoHalf {
+    /// There is no share of evidence.
+    NoEvidence(NoEvidence),
+    /// The levels do not carry a threshold.
+    Curve(NoThreshold),
+}
+
+/// The exposure drop at which a model keeps half of its evidence, in one variant, raw or with one enhancer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EvidenceCurve {
+    pub model: String,
+    pub variant: KindReading,
+    /// Enhancer; `None` for raw images.
+    pub enhancer: Option<EnhancerName>,
+    /// The darkest level of the curve.
+    pub darkest: AxisLevel,
+    pub threshold: Result<Threshold, NoHalf>,
+}
+
+/// The curves of a model, over all families, in the strict reading. The agreement falls from the ceiling at L0, and half of the evidence
+/// is lost half-way between ceiling and floor: the crossing of other reports, with the floor in the place of chance.
+pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
+    let mode = ReadingMode::Strict;
+    CurvePoints::all(grid)
+        .into_iter()
+        .filter_map(|points| {
+            let (_, light) = points.subjects.first()?;
+            let (darkest, _) = points.subjects.last()?;
+            let bounds = Bounds::new(grid, &grid.subjects[*light], None, mode, draws);
+            let threshold = match bounds {
+                Err(reason) => Err(NoHalf::NoEvidence(reason)),
+                Ok(bounds) => {
+                    let subjects = points.subjects.iter();
+                    let counts = LevelCounts {
+                        levels: subjects.clone().map(|(level, _)| *level).collect(),
+                        counts: subjects
+                            .map(|(_, subject)| grid.counts(*subject, None, mode))
+                            .collect(),
+                        guesses: floor(&bounds),
+                    };
+                    let summary = counts.summary(draws)?;
+                    summary.threshold.map_err(NoHalf::Curve)
+                }
+            };
+            Some(EvidenceCurve {
+                darkest: *darkest,
+                threshold,
+                model: points.model,
+                variant: points.variant,
+                enhancer: points.enhancer,
+            })
+        })
+        .collect()
+}
+
+/// The number of agreeing items without an image by cluster, scaled to the number of replies in the light.
+fn floor(bounds: &Bounds) -> Vec<f32> {
+    let replies = |counts: &[ClusterCount]| -> f64 {
+        counts.iter().map(|count| f64::from(count.replies)).sum()
+    };
+    let scale = replies(&bounds.again) / replies(&bounds.blind);
+    bounds
+        .blind
+        .iter()
+        .map(|count| (f64::from(count.right) * scale) as f32)
+        .collect()
+}

@@ -1,0 +1,9 @@
+//! Photographs in the dark and the fidelity of images.
+
+mod fidelity;
+pub mod pair_darkness;
+mod photographed_set;
+pub mod realism;
+
+pub use fidelity::{ConditionFidelity, FidelityFindings, Prediction};
+pub use photographed_set::PhotographedSet;

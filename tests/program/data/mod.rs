@@ -1,0 +1,12 @@
+//! Data: imports, ready-made sets, photographs, rooms and questions.
+
+mod hm3d;
+mod import;
+mod inputs;
+mod photographs;
+mod questions;
+mod ready_made;
+mod recordings;
+mod rooms;
+mod scenes;
+mod unlabelled;

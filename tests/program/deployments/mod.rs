@@ -1,0 +1,7 @@
+//! Deployments: containers, clusters, Slurm and shared machines.
+
+mod cluster;
+mod container;
+#[cfg(unix)]
+mod shared_machines;
+mod slurm;

@@ -1,0 +1,12 @@
+//! Endpoints: requests, replies, faults, replicas and costs.
+
+mod ask;
+mod faults;
+mod money;
+mod money_simulation;
+mod own_requests;
+mod pauses;
+mod replicas;
+mod serve;
+mod several_images;
+mod truncated;

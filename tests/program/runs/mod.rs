@@ -1,0 +1,12 @@
+//! Runs: evaluations and OpenEQA, their identity, plans and parts.
+
+mod evaluate;
+mod golden;
+mod identity;
+mod openeqa;
+mod parts_of_commands;
+mod pins;
+mod plan;
+mod shards;
+mod walks;
+mod walks_in_parts;

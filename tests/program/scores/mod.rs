@@ -1,0 +1,7 @@
+//! Scores: statistics, intervals and calibration, held to simulations.
+
+mod confidence;
+mod coverage;
+mod fair;
+mod fidelity;
+mod statistics;
