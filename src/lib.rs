@@ -203,7 +203,7 @@ pub use types::{
 /// Degraded versions of a clean frame, as a camera would take it in less light.
 pub mod synthesis {
     pub use darkqa_light::{
-        Amplify, CameraModel, CameraState, LightReading, NoiseKey, Sampling, Synthesis, degrade,
+        Amplify, CameraModel, CameraState, NoiseKey, NoiseProfile, Sampling, Synthesis, degrade,
         develop_with_state,
     };
 }

@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use crate::text::words::light;
 use crate::types::degradations::Axis;
-use crate::types::{AxisLevel, EnhancerName, KindReading};
+use crate::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::estimate::Estimate;
 
 /// Colour of axes and text, and of lines that belong to no model.
@@ -119,7 +119,7 @@ impl LineItems {
     /// The items of all families that the only one of these models was asked; `None` of several models.
     pub(crate) fn for_model(
         models: &[&str],
-        variant: &KindReading,
+        variant: &Variant,
         enhancer: Option<&EnhancerName>,
     ) -> Option<Self> {
         let [model] = models else {

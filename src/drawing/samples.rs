@@ -8,9 +8,7 @@ use serde::Serialize;
 use crate::text::words::light;
 use crate::types::degradations::Axis;
 use crate::types::text::shown;
-use crate::types::{
-    AxisLevel, Condition, EnhancerName, FrameId, KindReading, LightGroup, Thumbnail,
-};
+use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, RunGroup, Thumbnail, Variant};
 
 /// The samples of one axis.
 #[derive(Serialize)]
@@ -75,7 +73,7 @@ fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
                         && condition.enhancer.as_ref() == *enhancer
                         || at == AxisLevel::L0
                             && condition.enhancer.as_ref() == *enhancer
-                            && LightGroup::meet(condition.group.as_ref(), variant.group.as_ref()))
+                            && RunGroup::meet(condition.group.as_ref(), variant.group.as_ref()))
             };
             let images = levels.iter().map(|at| {
                 let thumbnail = thumbnails
@@ -109,7 +107,7 @@ fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
 
 /// The rows of a frame: each variant, raw and with each enhancer. The clean frames stand in the rows of the degraded ones; they have a
 /// row of their own if there is no other, raw or with the same enhancer.
-fn lines<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(KindReading, Option<&'a EnhancerName>)> {
+fn lines<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(Variant, Option<&'a EnhancerName>)> {
     let all = thumbnails
         .iter()
         .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()));
@@ -117,7 +115,7 @@ fn lines<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(KindReading, Option<&'a 
         all.partition(|(variant, _)| variant.is_degraded());
     for (_, enhancer) in clean {
         if lines.iter().all(|(_, other)| *other != enhancer) {
-            lines.insert((KindReading::NONE, enhancer));
+            lines.insert((Variant::NONE, enhancer));
         }
     }
     lines

@@ -202,7 +202,7 @@ impl<I: Item> ReplySink<'_, I> {
                 self.breaker.over_budget();
             }
             if !more_groups && lanes.is_empty() && in_flight.is_empty() && lanes.has_aside() {
-                lanes.ask_aside();
+                lanes.requeue_deferred();
                 self.suspects.asks_last();
                 continue;
             }

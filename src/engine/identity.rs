@@ -38,7 +38,7 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
         .map(|(field, value)| (field.to_owned(), value))
 }
 
-/// Definitions of the models, enhancers, light readings and further variants of a run.
+/// Definitions of the models, enhancers, noise profiles and further variants of a run.
 pub(crate) fn columns<'a>(
     models: impl IntoIterator<Item = &'a ModelUnderTest>,
     recipe: &Recipe,
@@ -117,7 +117,7 @@ pub(crate) fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
     content
 }
 
-/// Settings of a light reading, by flag.
+/// Settings of a noise profile, by flag.
 fn reading(synthesis: &Synthesis) -> Value {
     json!({
         "--amplify": synthesis.amplify,

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Weak};
 
 use crate::engine::models::ModelUnderTest;
-use crate::engine::open_files::ConnectionRoom;
+use crate::engine::open_files::RequestLimit;
 use crate::images::trials::{Stimulus, Trial};
 use crate::images::workers::ThreadArgs;
 use crate::text::words::counted;
@@ -83,7 +83,7 @@ impl<'a, I> Lanes<'a, I> {
     /// Limits the requests in flight to the connections that this process may open in addition to the files of these threads. Prints a
     /// warning if that is fewer than the settings allow.
     pub(crate) fn keep_within_open_files(&mut self, threads: ThreadArgs) {
-        let Some(ConnectionRoom { limit, requests }) = ConnectionRoom::now(threads.number()) else {
+        let Some(RequestLimit { limit, requests }) = RequestLimit::now(threads.number()) else {
             return;
         };
         let addresses: usize = self.by_endpoint.iter().map(|lane| lane.addresses).sum();
@@ -134,7 +134,7 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// Takes the next trial from a lane that has room and is not held by the budget. Trials for which `is_dropped` is true are dropped;
-    /// those for which `is_aside` is true are set aside until [`Self::ask_aside`].
+    /// those for which `is_aside` is true are set aside until [`Self::requeue_deferred`].
     pub(crate) fn next(
         &mut self,
         is_dropped: impl Fn(&Trial<I>) -> bool,
@@ -169,7 +169,7 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// Appends the trials that were set aside to the waiting ones.
-    pub(crate) fn ask_aside(&mut self) {
+    pub(crate) fn requeue_deferred(&mut self) {
         for lane in &mut self.by_endpoint {
             lane.waiting.append(&mut lane.deferred);
         }

@@ -1,4 +1,4 @@
-//! The limit of open files of this process, and the number of requests in flight that it allows: [`ConnectionRoom`].
+//! The limit of open files of this process, and the number of requests in flight that it allows: [`RequestLimit`].
 //!
 //! Each connection counts as an open file. At the limit, new requests fail, and so does opening a file for a reply.
 
@@ -17,14 +17,14 @@ const FALLBACK_LIMIT: libc::rlim_t = 10_240;
 
 /// How many requests can be in flight within the limit of open files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ConnectionRoom {
+pub(crate) struct RequestLimit {
     /// Maximum number of open files of this process.
     pub(crate) limit: usize,
     /// Number of requests in flight that fit within the limit; at least one.
     pub(crate) requests: usize,
 }
 
-impl ConnectionRoom {
+impl RequestLimit {
     /// Raises the limit, and subtracts the files that are open now and those reserved for `threads` image threads. `None` if the limit
     /// is unknown or infinite.
     pub(crate) fn now(threads: usize) -> Option<Self> {
@@ -98,7 +98,7 @@ mod tests {
             (256, usize::MAX, 81),
             (1 << 20, 2, 524_271),
         ] {
-            let room = ConnectionRoom::within(limit, 14, threads);
+            let room = RequestLimit::within(limit, 14, threads);
             assert_eq!(room.requests, requests, "{limit}, {threads} threads");
         }
     }

@@ -37,14 +37,14 @@ pub(crate) struct CostLine {
     /// Tokens of one image, as the replies so far were charged; `None` if there are too few of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charged_image_tokens: Option<f64>,
-    /// The same requests by the light reading of what is shown.
+    /// The same requests by the noise profile of what is shown.
     pub readings: Vec<ReadingCost>,
 }
 
-/// Requests of one light reading.
+/// Requests of one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct ReadingCost {
-    /// The light reading; `None` for what all readings share: L0, images without noise, and no image at all.
+    /// The noise profile; `None` for what all readings share: L0, images without noise, and no image at all.
     pub reading: Option<ReadingName>,
     /// Number of requests left.
     pub requests: usize,
@@ -290,7 +290,7 @@ fn by_endpoint(lines: &[CostLine]) -> String {
         .collect()
 }
 
-/// The requests of all models by light reading; empty with fewer than two readings.
+/// The requests of all models by noise profile; empty with fewer than two readings.
 fn by_reading(lines: &[CostLine]) -> String {
     let mut sums = BTreeMap::<Option<&ReadingName>, (usize, Option<f64>)>::new();
     for cost in lines.iter().flat_map(|line| &line.readings) {

@@ -12,7 +12,7 @@ use crate::sentences::Sentence;
 use crate::tables::{BASELINE, strict_groups, summary_rows};
 use crate::text::alert::Alert;
 use crate::text::csv::fields;
-use crate::text::light_readings::LightReadings;
+use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::table::{Table, TableRow};
 use crate::types::UnreadReason;
 use crate::types::manifests::RunManifest;
@@ -96,8 +96,8 @@ pub(super) fn document(
 struct Head<'a> {
     #[serde(flatten)]
     runs: RunsHead<'a>,
-    /// The light readings of the noisy images.
-    readings: LightReadings,
+    /// The noise profiles of the noisy images.
+    readings: NoiseProfiles,
     unread: &'a BTreeMap<UnreadReason, usize>,
     alerts: &'a [Alert],
     findings: &'a [Sentence],
@@ -169,7 +169,7 @@ pub(crate) fn summary(
     let groups = strict_groups(report.findings);
     let head = Head {
         runs: runs.head("darkqa.summary/1"),
-        readings: LightReadings::new(&report.findings.grid.subjects),
+        readings: NoiseProfiles::new(&report.findings.grid.subjects),
         unread: &report.findings.summary.unread,
         alerts: &report.alerts,
         findings: &report.sentences,

@@ -17,7 +17,7 @@ use crate::report::report_length::ReportLength;
 use crate::sentences::how_to_read;
 use crate::text::frame_count::frames;
 use crate::text::ladder::{Ladder, SeriesByLevel};
-use crate::text::light_readings::LightReadings;
+use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::terminal::render;
 use crate::text::words::{counted, percent, reach_of};
 use crate::text::wrapped::{WIDTH, wrapped};
@@ -67,9 +67,9 @@ pub(crate) fn text(
     text
 }
 
-/// The open question of a single light reading; empty without noise or with several readings.
+/// The open question of a single noise profile; empty without noise or with several readings.
 fn open_question(report: &ChoiceReport<'_>) -> String {
-    let readings = LightReadings::new(&report.findings.grid.subjects);
+    let readings = NoiseProfiles::new(&report.findings.grid.subjects);
     let open = readings.open_question();
     open.map_or_else(String::new, |open| wrapped(" ", &open, " "))
 }

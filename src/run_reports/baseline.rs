@@ -19,7 +19,7 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{BaselineRow, baseline_rows};
 use darkqa_score::grid::Grid;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::{Subject, is_control, is_observer};
+use darkqa_score::subject::{ModelInCondition, is_control, is_observer};
 
 /// The flag that makes a worse model a failure.
 pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";
@@ -35,14 +35,14 @@ pub(super) struct Baseline {
     /// Differences between the new runs and the old one.
     alerts: Vec<Alert>,
     /// Models under test in conditions of the old run that are not compared, with their names there.
-    missing: Vec<Subject>,
+    missing: Vec<ModelInCondition>,
     /// Models under test of the new runs that the old one does not have.
     added: BTreeSet<String>,
 }
 
 /// The cost of each model in each condition, in US dollars. A subject of which no trial states its cost has none.
 #[derive(Default)]
-struct SubjectCosts(BTreeMap<Subject, f64>);
+struct SubjectCosts(BTreeMap<ModelInCondition, f64>);
 
 impl SubjectCosts {
     /// The costs of joined runs, each trial at the prices of the first run that has it.
@@ -70,7 +70,10 @@ impl SubjectCosts {
             .into_iter()
             .flat_map(|charged| [charged.reply, charged.lost]);
         for dollars in parts.flatten() {
-            *self.0.entry(Subject::from_trial(trial)).or_default() += dollars;
+            *self
+                .0
+                .entry(ModelInCondition::from_trial(trial))
+                .or_default() += dollars;
         }
     }
 }
@@ -108,7 +111,7 @@ impl Baseline {
             // A control shows whether the observer can be trusted, not whether a model got worse.
             .filter(|(_, subject)| !is_control(&subject.model))
             .filter_map(|(index, subject)| {
-                let old = Subject {
+                let old = ModelInCondition {
                     model: mark(combined.models.asked(&subject.model)),
                     ..subject.in_any_light()
                 };
@@ -131,7 +134,8 @@ impl Baseline {
             .map(|(_, old)| *old)
             .collect();
         let suffix = mark("");
-        let is_tested = |subject: &Subject| !subject.is_reference() && !is_control(&subject.model);
+        let is_tested =
+            |subject: &ModelInCondition| !subject.is_reference() && !is_control(&subject.model);
         let missing = grid
             .subjects
             .iter()
@@ -139,7 +143,7 @@ impl Baseline {
             .filter(|(index, _)| !compared.contains(index))
             .filter_map(|(_, subject)| {
                 let model = subject.model.strip_suffix(&suffix)?.to_owned();
-                Some(Subject {
+                Some(ModelInCondition {
                     model,
                     ..subject.clone()
                 })
@@ -173,7 +177,7 @@ impl Baseline {
         };
         let named = first_names(&missing, MAX_NAMED);
         let conditions = format!("{named} of {old} {are} not compared");
-        let is_renamed = |subject: &Subject| {
+        let is_renamed = |subject: &ModelInCondition| {
             !self
                 .rows
                 .iter()

@@ -6,14 +6,14 @@ use super::settings::{self, some};
 use crate::runs::stored::StoredRun;
 use crate::types::degradations::Kind;
 use crate::types::manifests::RunManifest;
-use crate::types::{Condition, Digest, EnhancerName, KindReading, LightGroup, TrialRef};
+use crate::types::{Condition, Digest, EnhancerName, RunGroup, TrialRef, Variant};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::subject::is_control;
 
-/// The conditions of one curve: a kind of degradation in a light reading, raw or with an enhancer, at all levels.
+/// The conditions of one curve: a kind of degradation in a noise profile, raw or with an enhancer, at all levels.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct LightCurve {
-    pub(super) variant: KindReading,
+    pub(super) variant: Variant,
     pub(super) enhancer: Option<EnhancerName>,
 }
 
@@ -32,11 +32,11 @@ impl LightCurve {
             enhancer: None,
         };
         let base = self.variant.kind.and_then(Kind::base);
-        let base = base.map(|kind| KindReading {
+        let base = base.map(|kind| Variant {
             kind: Some(kind),
-            ..KindReading::NONE
+            ..Variant::NONE
         });
-        let variants = [Some(KindReading::NONE), base, Some(self.variant.clone())];
+        let variants = [Some(Variant::NONE), base, Some(self.variant.clone())];
         variants
             .into_iter()
             .flatten()
@@ -85,7 +85,7 @@ pub(super) struct SplitCurve {
 #[derive(Debug, Default)]
 pub(super) struct Lights {
     /// The group of each run, for the curves whose images differ.
-    groups: HashMap<(LightCurve, usize), LightGroup>,
+    groups: HashMap<(LightCurve, usize), RunGroup>,
     /// The curves whose images differ.
     pub(super) split: Vec<SplitCurve>,
     /// The runs with images whose records hold no digest of them.
@@ -120,7 +120,7 @@ impl Lights {
                 for part in parted_by(group, &bases) {
                     let name = &names[part[0]];
                     parted.insert(name.clone());
-                    let group = LightGroup::new(name, &part);
+                    let group = RunGroup::new(name, &part);
                     let own = part
                         .iter()
                         .map(|run| (((*curve).clone(), *run), group.clone()));

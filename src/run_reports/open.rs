@@ -39,7 +39,7 @@ use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::open::{
     AnswerOutcome, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
 };
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// Scored answers of a run.
 pub(crate) struct Scores {
@@ -358,14 +358,14 @@ fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<Open
 }
 
 /// Kind and message of the error of each failed answer, by question and subject.
-fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, Subject), String> {
+fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, ModelInCondition), String> {
     records
         .iter()
         .filter(|record| record.detail.step == Step::Answer)
         .filter_map(|record| {
             let failure = record.failure.as_ref()?;
             let kind = outcome_words::failed(failure.kind, failure.status);
-            let subject = Subject::new(&record.model, record.condition.as_ref());
+            let subject = ModelInCondition::new(&record.model, record.condition.as_ref());
             let text = format!("{kind}: {}", failure.message);
             Some(((&record.question, subject), text))
         })

@@ -150,7 +150,7 @@ pub(super) fn pixels(run: &RunManifest) -> Settings {
     some(run, &PIXELS)
 }
 
-/// The noise model, if the light readings of the runs differ: the flags as the user wrote them, and the content of the readings
+/// The noise model, if the noise profiles of the runs differ: the flags as the user wrote them, and the content of the readings
 /// that all runs have.
 pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     let readings = |run: &RunManifest| run.columns.get("reading").cloned();
@@ -169,7 +169,7 @@ pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     settings
 }
 
-/// The content of the light readings, and of the kinds that the paper does not have.
+/// The content of the noise profiles, and of the kinds that the paper does not have.
 pub(super) fn readings_and_variants(run: &RunManifest) -> Settings {
     let mut settings = column_settings(run, "reading");
     settings.extend(column_settings(run, VARIANT));

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::ask::prompts::openeqa::blind_answer;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 use darkqa_score::choice::llm_match::{Protocol, shortened};
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// The state of one answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub(crate) enum AnswerState {
 /// One answer to one question.
 #[derive(Debug, Clone)]
 pub(crate) struct Prediction {
-    pub(crate) subject: Subject,
+    pub(crate) subject: ModelInCondition,
     /// Index of the question among those of the run.
     pub(crate) question: usize,
     /// Answer before the protocol shortens it; `None` if there is none.
@@ -42,13 +42,13 @@ pub(crate) fn predictions(
     protocol: Protocol,
 ) -> Vec<Prediction> {
     let places: HashMap<&QuestionId, usize> = questions.iter().copied().zip(0..).collect();
-    let mut answers = BTreeMap::<(usize, Subject), Vec<&Record<OpenDetail>>>::new();
+    let mut answers = BTreeMap::<(usize, ModelInCondition), Vec<&Record<OpenDetail>>>::new();
     let mut asked_subjects = BTreeSet::new();
     for record in records
         .iter()
         .filter(|record| record.detail.step == Step::Answer)
     {
-        let subject = Subject::new(&record.model, record.condition.as_ref());
+        let subject = ModelInCondition::new(&record.model, record.condition.as_ref());
         if record.via != Via::File {
             asked_subjects.insert(subject.clone());
         }

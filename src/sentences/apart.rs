@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
-use crate::types::{AxisLevel, KindReading, UnreadReason, View};
+use crate::types::{AxisLevel, UnreadReason, Variant, View};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::pool;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
-use darkqa_score::subject::{Subject, is_reference};
+use darkqa_score::subject::{ModelInCondition, is_reference};
 
 /// The accuracy of each of them at L0 and at its darkest level, and of the other models on the same questions.
 pub(super) fn apart(findings: &Findings<'_>) -> Vec<Sentence> {
@@ -78,10 +78,11 @@ impl OnSameQuestions {
         findings: &Findings<'_>,
         name: &str,
         others: &[&str],
-        (level, variant): (AxisLevel, &KindReading),
+        (level, variant): (AxisLevel, &Variant),
     ) -> Option<Self> {
         let grid = &findings.grid;
-        let find = |model: &str| grid.stand_in(&Subject::seeing(model, level, variant, None));
+        let find =
+            |model: &str| grid.stand_in(&ModelInCondition::seeing(model, level, variant, None));
         let own = find(name)?;
         let cell = findings
             .summary
@@ -129,7 +130,7 @@ fn sentence(
     findings: &Findings<'_>,
     name: &str,
     others: &[&str],
-    variant: &KindReading,
+    variant: &Variant,
 ) -> Option<Sentence> {
     let grid = &findings.grid;
     let levels = grid.subjects.iter().filter(|subject| {

@@ -1,12 +1,12 @@
 //! The sentence about what models know of their own sight: whether their confidence falls with their accuracy.
 
 use super::sentence::{Numbers, Sentence, Tone};
-use crate::types::{AxisLevel, KindReading};
+use crate::types::{AxisLevel, Variant};
 use darkqa_score::calibration::Calibration;
 use darkqa_score::calibration::LEAST_CONFIDENT_REPLIES;
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// The confidence of a model in the images of a light: at the darkest level, and at L0 if that was asked.
 #[derive(Debug, Clone, Copy)]
@@ -20,7 +20,7 @@ pub(super) struct Confidence<'f> {
 impl<'f> Confidence<'f> {
     /// The confidence in raw images of the darkest level of a variant, of the models over which findings are pooled. Without those of
     /// few replies or clusters, whose intervals reveal little.
-    pub(super) fn all(findings: &'f Findings<'_>, variant: &KindReading) -> Vec<Self> {
+    pub(super) fn all(findings: &'f Findings<'_>, variant: &Variant) -> Vec<Self> {
         if findings.grid.clusters < MIN_SCENES {
             return Vec::new();
         }
@@ -43,7 +43,7 @@ impl<'f> Confidence<'f> {
         dark.filter(|row| row.subject.level == Some(level))
             .map(|dark| {
                 let model = &*dark.subject.model;
-                let clean = Subject::seeing(model, AxisLevel::L0, variant, None);
+                let clean = ModelInCondition::seeing(model, AxisLevel::L0, variant, None);
                 Self {
                     model,
                     level,

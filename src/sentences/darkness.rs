@@ -7,7 +7,7 @@ use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{KindReading, LightGroup};
+use crate::types::{RunGroup, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
@@ -26,21 +26,20 @@ pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
 /// does not show it. If the two differ, both are named.
 fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> {
     let Topic { lights, others, .. } = topic;
-    let levels = |variant: &KindReading| findings_of_kind(findings, PooledKind::Darkness, variant);
-    let mean = |variant: &KindReading| {
+    let levels = |variant: &Variant| findings_of_kind(findings, PooledKind::Darkness, variant);
+    let mean = |variant: &Variant| {
         let means = means_of_set(findings, PooledKind::Darkness, variant);
         means.into_iter().next()
     };
-    let verdict_with = |variant: &KindReading| {
+    let verdict_with = |variant: &Variant| {
         let (levels, mean) = (levels(variant), mean(variant));
         verdict(&levels).map(|found| match mean.and_then(mean_verdict) {
             Some(of_mean) if !found.is_shown() => of_mean,
             _ => found,
         })
     };
-    let is_of_runs = |one: &KindReading, other: &KindReading| {
-        LightGroup::meet(one.group.as_ref(), other.group.as_ref())
-    };
+    let is_of_runs =
+        |one: &Variant, other: &Variant| RunGroup::meet(one.group.as_ref(), other.group.as_ref());
     let mut sentences = Vec::new();
     for variant in lights {
         let mut beside = others.iter().filter(|other| is_of_runs(other, variant));
@@ -90,7 +89,7 @@ fn mean_verdict(mean: &PooledFinding) -> Option<Significance> {
 }
 
 /// A variant at the beginning of a sentence.
-fn name(variant: &KindReading) -> String {
+fn name(variant: &Variant) -> String {
     match variant.kind {
         Some(Kind::Exposure) => format!("By the exposure drop alone{}", variant.group_suffix()),
         _ => capitalised(&light(variant, None)),

@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use super::pooled::{detail, runs, with_verdict};
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::text::words::family as family_name;
-use crate::types::{AxisLevel, Family, KindReading};
+use crate::types::{AxisLevel, Family, Variant};
 use darkqa_score::answers::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// How often a false answer is given at the darkest level at which its rate is shown to grow.
 pub(super) fn false_answers(
@@ -49,10 +49,10 @@ pub(super) struct TopAnswer<'f> {
 
 impl<'f> TopAnswer<'f> {
     /// The top answers to raw images of the darkest level of a variant, of the models over which findings are pooled.
-    pub(super) fn all(findings: &'f Findings<'_>, variant: &KindReading) -> Vec<Self> {
+    pub(super) fn all(findings: &'f Findings<'_>, variant: &Variant) -> Vec<Self> {
         let grid = &findings.grid;
         let models = findings.models_of(variant);
-        let of_variant = |subject: &Subject| {
+        let of_variant = |subject: &ModelInCondition| {
             subject.variant == *variant
                 && subject.enhancer.is_none()
                 && models.contains(&&*subject.model)

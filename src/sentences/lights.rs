@@ -3,7 +3,7 @@
 use super::sample::is_impossible;
 use super::sentence::Sentence;
 use crate::text::words::light;
-use crate::types::KindReading;
+use crate::types::Variant;
 use crate::types::degradations::Kind;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
@@ -12,9 +12,9 @@ use darkqa_score::findings::Findings;
 #[derive(Debug)]
 pub(super) struct Topic<'f> {
     /// The variants of the last kind, one for each light.
-    pub(super) lights: Vec<&'f KindReading>,
+    pub(super) lights: Vec<&'f Variant>,
     /// The variants of the other kinds.
-    pub(super) others: Vec<&'f KindReading>,
+    pub(super) others: Vec<&'f Variant>,
     /// Whether another topic has the same levels, so that the level does not tell what a sentence is about.
     shares_levels: bool,
 }
@@ -23,9 +23,9 @@ impl<'f> Topic<'f> {
     /// The topics of all variants that were asked, in the order of tables. The first one is the main one.
     pub(super) fn all(findings: &'f Findings<'_>) -> Vec<Self> {
         let mut topics: Vec<Self> = Vec::new();
-        let variants: Vec<&KindReading> = findings.grid.variants().into_iter().collect();
-        let root = |variant: &KindReading| variant.kind.map(Kind::root);
-        let axis = |variant: &KindReading| variant.kind.map(Kind::axis);
+        let variants: Vec<&Variant> = findings.grid.variants().into_iter().collect();
+        let root = |variant: &Variant| variant.kind.map(Kind::root);
+        let axis = |variant: &Variant| variant.kind.map(Kind::axis);
         for group in variants.chunk_by(|a, b| root(a) == root(b)) {
             let last = group.last().map(|variant| variant.kind);
             let (lights, others) = group
@@ -46,7 +46,7 @@ impl<'f> Topic<'f> {
     }
 
     /// A sentence about a variant, which is named if there are several lights, or if the levels do not tell it.
-    pub(super) fn named(&self, variant: &KindReading, mut sentence: Sentence) -> Sentence {
+    pub(super) fn named(&self, variant: &Variant, mut sentence: Sentence) -> Sentence {
         if self.lights.len() > 1 || self.shares_levels {
             let light = light(variant, None);
             sentence.text = format!("{light}: {}", sentence.text);
@@ -59,7 +59,7 @@ impl<'f> Topic<'f> {
 /// Sentences about the last kind of each topic. If it was asked in several lights, each sentence names its own.
 pub(super) fn in_each_light(
     findings: &Findings<'_>,
-    about: fn(&Findings<'_>, &KindReading) -> Vec<Sentence>,
+    about: fn(&Findings<'_>, &Variant) -> Vec<Sentence>,
 ) -> Vec<Sentence> {
     let mut sentences = Vec::new();
     for topic in Topic::all(findings) {
@@ -75,7 +75,7 @@ pub(super) fn in_each_light(
 pub(super) fn means_of_set<'f>(
     findings: &'f Findings<'_>,
     kind: PooledKind,
-    variant: &KindReading,
+    variant: &Variant,
 ) -> Vec<&'f PooledFinding> {
     findings
         .averaged
@@ -89,7 +89,7 @@ pub(super) fn means_of_set<'f>(
 pub(super) fn findings_of_kind<'f>(
     findings: &'f Findings<'_>,
     kind: PooledKind,
-    variant: &KindReading,
+    variant: &Variant,
 ) -> Vec<&'f PooledFinding> {
     let of_set: Vec<&PooledFinding> = findings
         .pooled

@@ -39,7 +39,7 @@ use std::collections::BTreeSet;
 use self::confidence::Confidence;
 use self::hallucination::TopAnswer;
 use self::lights::{findings_of_kind, in_each_light, means_of_set};
-use crate::types::{Family, KindReading};
+use crate::types::{Family, Variant};
 use darkqa_score::answers::confusion::FalseAnswer;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::findings::Findings;
@@ -84,7 +84,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
 }
 
 /// Sentences about noise, enhancers and no images.
-fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> {
+fn about_light(findings: &Findings<'_>, variant: &Variant) -> Vec<Sentence> {
     let unit = findings.unit;
     let of = |kind| findings_of_kind(findings, kind, variant);
     let mut sentences = Vec::new();
@@ -108,7 +108,7 @@ fn about_light(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> 
 
 /// Sentences about enhancers on the clean frames.
 fn about_clean(findings: &Findings<'_>) -> Vec<Sentence> {
-    let clean: BTreeSet<&KindReading> = findings
+    let clean: BTreeSet<&Variant> = findings
         .pooled
         .iter()
         .filter(|finding| finding.kind == PooledKind::Enhancer && finding.variant.kind.is_none())
@@ -124,7 +124,7 @@ fn about_clean(findings: &Findings<'_>) -> Vec<Sentence> {
 }
 
 /// Sentences about false answers, one answer to everything, confidence, and the families.
-fn about_answers(findings: &Findings<'_>, variant: &KindReading) -> Vec<Sentence> {
+fn about_answers(findings: &Findings<'_>, variant: &Variant) -> Vec<Sentence> {
     let unit = findings.unit;
     let mut sentences = Vec::new();
     for answer in [FalseAnswer::No, FalseAnswer::Yes] {

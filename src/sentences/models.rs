@@ -3,7 +3,7 @@
 use super::lights::Topic;
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family;
-use crate::types::KindReading;
+use crate::types::Variant;
 use crate::types::degradations::{Axis, Kind};
 use darkqa_score::comparisons::{BestInTheDark, Claim, Crossing, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
@@ -105,7 +105,7 @@ pub(crate) fn dark_levels(best: &BestInTheDark) -> String {
 
 /// The families that lose most and least at the darkest level, one against the other, if a loss over all families is detected there and
 /// their intervals do not meet. This is a description without a sign: the two families were chosen by the data.
-pub(super) fn families(findings: &Findings<'_>, variant: &KindReading) -> Option<Sentence> {
+pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sentence> {
     let pooled = findings.pooled.iter();
     let of_families = pooled.filter(|finding| {
         finding.kind == PooledKind::Darkness

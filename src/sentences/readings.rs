@@ -1,4 +1,4 @@
-//! The sentence about light readings: how many findings hold under all of them.
+//! The sentence about noise profiles: how many findings hold under all of them.
 
 use super::sentence::{Numbers, Sentence, Tone};
 use darkqa_score::cluster::ClusterUnit;

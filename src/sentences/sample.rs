@@ -2,7 +2,7 @@
 
 use super::sentence::{Numbers, Sentence, Tone, level_runs};
 use crate::text::words::light;
-use crate::types::{EnhancerName, KindReading};
+use crate::types::{EnhancerName, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{ModelsLeftOut, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
@@ -14,7 +14,7 @@ pub(super) const WIDE: f64 = 0.05;
 const MAX_NAMED: usize = 3;
 
 /// The subject of findings of a kind.
-fn topic(kind: PooledKind, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
+fn topic(kind: PooledKind, variant: &Variant, enhancer: Option<&EnhancerName>) -> String {
     match (kind, enhancer) {
         (PooledKind::Enhancer, Some(name)) => name.to_string(),
         (PooledKind::Blind, _) => "dark images against no images".to_owned(),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::light;
-use crate::types::{AxisLevel, EnhancerName, KindReading, SetLight};
+use crate::types::{AxisLevel, EnhancerName, SetLight, Variant};
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::comparisons::self_agreement::light::LightReplies;
@@ -33,7 +33,7 @@ pub(crate) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
             }
         }
         for enhancer in enhancers(found, model) {
-            sentences.extend(enhanced(found, model, &KindReading::NONE, &enhancer));
+            sentences.extend(enhanced(found, model, &Variant::NONE, &enhancer));
         }
         sentences.extend(way_out(found, model));
     }
@@ -115,7 +115,7 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
 }
 
 /// The degraded variants of a model, sorted.
-fn variants(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<KindReading> {
+fn variants(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<Variant> {
     found
         .whole()
         .filter(|cell| cell.subject.model == model)
@@ -146,7 +146,7 @@ fn compared<'f>(
 }
 
 /// The agreement of a model's answers at the darkest level of a variant.
-fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &KindReading) -> Option<Sentence> {
+fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option<Sentence> {
     let mut cells = found.whole().filter(|cell| cell.subject.model == model);
     let raw =
         |cell: &&AgreementCell| cell.subject.variant == *variant && cell.subject.enhancer.is_none();
@@ -252,7 +252,7 @@ fn darkness_detail(
 fn enhanced(
     found: &SelfAgreement<'_>,
     model: &str,
-    variant: &KindReading,
+    variant: &Variant,
     enhancer: &EnhancerName,
 ) -> Option<Sentence> {
     let all = compared(found, ComparisonKind::Enhancer, model);
@@ -276,7 +276,7 @@ fn enhanced(
         size(one).total_cmp(&size(other))
     })?;
     let levels = (at(Significance::Better), at(Significance::Worse));
-    let (tone, text) = if found.set.light == SetLight::Dark && *variant == KindReading::NONE {
+    let (tone, text) = if found.set.light == SetLight::Dark && *variant == Variant::NONE {
         photograph_effects(enhancer, model, strongest.claim())
     } else {
         level_effects(enhancer, model, &light(variant, None), levels)

@@ -6,7 +6,7 @@ use super::format::format_alone;
 use super::pooled::{detail, runs, with_verdict};
 use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
 use crate::text::words::family as family_name;
-use crate::types::{Axis, AxisLevel, KindReading};
+use crate::types::{Axis, AxisLevel, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
@@ -101,10 +101,7 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
 }
 
 /// Comparisons by family between raw images of a variant and no images, for the models whose findings are pooled.
-pub(super) fn by_family<'f>(
-    findings: &'f Findings<'_>,
-    variant: &KindReading,
-) -> Vec<&'f Comparison> {
+pub(super) fn by_family<'f>(findings: &'f Findings<'_>, variant: &Variant) -> Vec<&'f Comparison> {
     let models = findings.models_of(variant);
     findings
         .comparisons

@@ -1,4 +1,4 @@
-//! Table of the findings about noise under each light reading.
+//! Table of the findings about noise under each noise profile.
 
 use std::collections::BTreeSet;
 

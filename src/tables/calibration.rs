@@ -8,7 +8,7 @@ use darkqa_score::auc::Auc;
 use darkqa_score::calibration::{Calibration, PositionShare, ReliabilityBin};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// Id of the section of the page.
 pub(super) const CONFIDENCE: &str = "confidence";
@@ -100,7 +100,7 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
 }
 
 /// A condition in the words of tables.
-fn condition(subject: &Subject) -> String {
+fn condition(subject: &ModelInCondition) -> String {
     match subject.level {
         None => "without images".to_owned(),
         Some(level) => format!(
@@ -120,7 +120,7 @@ fn reliability(all: &[Calibration]) -> Table {
     });
     TableBuilder::new("reliability", rows)
         .subject(
-            |row: &(&Subject, usize, ReliabilityBin)| row.0,
+            |row: &(&ModelInCondition, usize, ReliabilityBin)| row.0,
             ToString::to_string,
         )
         .column(Count, "csv bin", |row| row.1)
@@ -137,7 +137,10 @@ fn positions(all: &[Calibration]) -> Table {
         .flat_map(|row| row.positions.iter().map(|share| (&row.subject, *share)));
     let mut table = TableBuilder::new("positions", rows)
         .page(CONFIDENCE, "Probability by the place of a choice")
-        .subject(|row: &(&Subject, PositionShare)| row.0, ToString::to_string)
+        .subject(
+            |row: &(&ModelInCondition, PositionShare)| row.0,
+            ToString::to_string,
+        )
         .column(Text, "csv letter | page letter", |row| {
             TableCell::from(letter(row.1.position).to_string())
         })

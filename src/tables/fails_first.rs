@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::text::table::ColumnKind::{Count, Percent, Text};
 use crate::text::table::{ColumnHeads, Table, TableBuilder};
 use crate::text::words::{family as family_name, light, points};
-use crate::types::{AxisLevel, Family, FrameId, KindReading};
+use crate::types::{AxisLevel, Family, FrameId, Variant};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
@@ -24,7 +24,7 @@ pub(super) fn fails_first(findings: &Findings<'_>) -> [Table; 2] {
 
 /// A row for each family and a column for each variant. No loss detected comes last.
 fn families(findings: &Findings<'_>) -> Table {
-    let variants: Vec<&KindReading> = findings.grid.variants().into_iter().collect();
+    let variants: Vec<&Variant> = findings.grid.variants().into_iter().collect();
     let mut families: Vec<&Family> = findings.grid.groups().into_iter().flatten().collect();
     let order = |family: &Family| {
         variants
@@ -76,7 +76,7 @@ fn families(findings: &Findings<'_>) -> Table {
 fn first_loss<'f>(
     findings: &'f Findings<'_>,
     family: &Family,
-    variant: &KindReading,
+    variant: &Variant,
 ) -> Option<&'f PooledFinding> {
     findings
         .pooled
@@ -117,7 +117,7 @@ impl FrameAnswers {
 
 /// A frame in a variant.
 struct FrameRow<'f> {
-    variant: &'f KindReading,
+    variant: &'f Variant,
     frame: &'f FrameId,
     answers: FrameAnswers,
 }
@@ -174,7 +174,7 @@ fn frames(findings: &Findings<'_>) -> Table {
 /// The answers to each frame by the models over which findings are pooled.
 fn answers<'f>(
     findings: &'f Findings<'_>,
-    variant: &KindReading,
+    variant: &Variant,
 ) -> BTreeMap<&'f FrameId, FrameAnswers> {
     let grid = &findings.grid;
     let models = findings.models_of(variant);

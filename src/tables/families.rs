@@ -8,7 +8,7 @@ use crate::text::words::family as family_name;
 use crate::types::Family;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 pub(super) fn families(findings: &Findings<'_>) -> Table {
     let subjects = findings.grid.subjects.iter().map(Some);
@@ -21,7 +21,7 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
                 .to_owned()
         })
         .column(Text, "page condition | latex Condition", |subject| {
-            subject.map_or(String::new(), Subject::condition)
+            subject.map_or(String::new(), ModelInCondition::condition)
         });
     for family in findings.grid.groups() {
         let name = family_name(family);
@@ -41,7 +41,11 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
 }
 
 /// The cell of a subject and a family; `None` is chance.
-fn share(findings: &Findings<'_>, subject: Option<&Subject>, family: Option<&Family>) -> TableCell {
+fn share(
+    findings: &Findings<'_>,
+    subject: Option<&ModelInCondition>,
+    family: Option<&Family>,
+) -> TableCell {
     let mut cells = findings.summary.family_cells(family, ReadingMode::Strict);
     let cell = cells.find(|cell| match subject {
         Some(subject) => cell.subject == *subject,

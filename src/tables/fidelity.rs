@@ -6,7 +6,7 @@ use crate::text::words::light;
 use crate::types::View;
 use darkqa_score::auc::Auc;
 use darkqa_score::photographs::{ConditionFidelity, FidelityFindings, Prediction};
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// The measures in the order of [`ConditionFidelity::means`]: name in CSV files, and in text.
 const MEASURES: [(&str, &str); 2] = [("psnr", "PSNR"), ("ssim", "SSIM")];
@@ -74,7 +74,7 @@ pub(super) fn fidelity(findings: Option<&FidelityFindings>) -> Option<Table> {
 }
 
 fn condition(row: &ConditionFidelity) -> String {
-    let subject = Subject {
+    let subject = ModelInCondition {
         model: String::new(),
         view: Some(View::Image),
         level: Some(row.level),

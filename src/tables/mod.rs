@@ -27,9 +27,9 @@ mod training;
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{family, name};
-use crate::types::{EnhancerName, Family, KindReading, ModelListing};
+use crate::types::{EnhancerName, Family, ModelListing, Variant};
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 pub(crate) use answers::{commonest_answers, counted_answers};
 pub(crate) use baseline::BASELINE;
@@ -91,8 +91,8 @@ impl<T> TableBuilder<T> {
     /// Adds the columns of the subject of a row.
     pub(crate) fn subject(
         self,
-        of: impl Fn(&T) -> &Subject,
-        variant: impl Fn(&KindReading) -> String,
+        of: impl Fn(&T) -> &ModelInCondition,
+        variant: impl Fn(&Variant) -> String,
     ) -> Self {
         let cell = |text: Option<String>| TableCell::from(text);
         self.column(Text, "csv model", |row| of(row).model.clone())
@@ -113,7 +113,7 @@ impl<T> TableBuilder<T> {
     pub(crate) fn model_facts(
         mut self,
         listing: &ModelListing,
-        of: impl Fn(&T) -> &Subject,
+        of: impl Fn(&T) -> &ModelInCondition,
     ) -> Self {
         if listing.has_groups() {
             self = self.column(Text, "csv model_group", |row| {
@@ -135,7 +135,7 @@ impl<T> TableBuilder<T> {
     }
 
     /// Adds the columns of the curve of a row: model, variant and enhancer.
-    fn line(self, of: impl Fn(&T) -> (&str, &KindReading, Option<&EnhancerName>)) -> Self {
+    fn line(self, of: impl Fn(&T) -> (&str, &Variant, Option<&EnhancerName>)) -> Self {
         self.column(Text, "csv model | terminal model | page model", |row| {
             of(row).0.to_owned()
         })

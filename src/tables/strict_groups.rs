@@ -3,19 +3,19 @@
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::counted;
-use crate::types::{Family, KindReading, LightGroup};
+use crate::types::{Family, RunGroup, Variant};
 use darkqa_score::accuracies::{GroupCell, GroupChance, StrictScore};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::{CHANCE, Subject};
+use darkqa_score::subject::{CHANCE, ModelInCondition};
 
 use super::summary::reading;
 
 /// A row: a cell, or chance.
 enum Line<'a> {
     Cell(&'a GroupCell),
-    Chance(&'a GroupChance, Subject),
+    Chance(&'a GroupChance, ModelInCondition),
 }
 
 /// All groups, then those of one family; empty if questions have no groups.
@@ -196,7 +196,7 @@ impl Line<'_> {
         }
     }
 
-    fn subject(&self) -> &Subject {
+    fn subject(&self) -> &ModelInCondition {
         match self {
             Self::Cell(cell) => &cell.subject,
             Self::Chance(_, subject) => subject,
@@ -219,21 +219,21 @@ impl Line<'_> {
 }
 
 /// The name of the group of runs of a subject, if it has one.
-fn light(subject: &Subject) -> Option<String> {
+fn light(subject: &ModelInCondition) -> Option<String> {
     subject
         .variant
         .group
         .as_ref()
-        .map(LightGroup::name)
+        .map(RunGroup::name)
         .map(str::to_owned)
 }
 
-fn guess() -> Subject {
-    Subject {
+fn guess() -> ModelInCondition {
+    ModelInCondition {
         model: CHANCE.to_owned(),
         view: None,
         level: None,
-        variant: KindReading::NONE,
+        variant: Variant::NONE,
         enhancer: None,
     }
 }

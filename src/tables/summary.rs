@@ -2,10 +2,10 @@
 
 use crate::text::table::ColumnKind::{Count, Share, Text};
 use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
-use crate::types::{LightGroup, ModelListing, PairDark};
+use crate::types::{ModelListing, PairDark, RunGroup};
 use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
 use darkqa_score::choice::ReadingMode;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// A row for each accuracy.
 pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Table {
@@ -41,11 +41,11 @@ pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Tabl
 
 /// The name of the group of runs of a cell, if it has one.
 fn group(cell: &AccuracyCell) -> Option<&str> {
-    cell.subject.variant.group.as_ref().map(LightGroup::name)
+    cell.subject.variant.group.as_ref().map(RunGroup::name)
 }
 
-/// The light reading of a subject, if it has one.
-pub(crate) fn reading(subject: &Subject) -> TableCell {
+/// The noise profile of a subject, if it has one.
+pub(crate) fn reading(subject: &ModelInCondition) -> TableCell {
     let variant = &subject.variant;
     let of_pair = variant.pair.as_ref().and_then(PairDark::reading);
     let reading = variant.reading.as_ref().or(of_pair);

@@ -6,12 +6,10 @@ use crate::text::table::ColumnKind::Text;
 use crate::text::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
 use crate::text::words::light;
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{
-    AxisLevel, EnhancerName, KindReading, LightGroup, ModelListing, SetLight, View,
-};
+use crate::types::{AxisLevel, EnhancerName, ModelListing, RunGroup, SetLight, Variant, View};
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -20,11 +18,11 @@ pub(crate) struct Series<'a> {
     place: usize,
     pub(crate) model: &'a str,
     enhancer: Option<&'a EnhancerName>,
-    variant: &'a KindReading,
+    variant: &'a Variant,
 }
 
 impl<'a> Series<'a> {
-    fn new(subject: &'a Subject, place: usize) -> Self {
+    fn new(subject: &'a ModelInCondition, place: usize) -> Self {
         Self {
             place,
             model: &subject.model,
@@ -68,7 +66,7 @@ pub(crate) struct Ladder<'a, C> {
     /// Cells of models with images.
     pub(crate) series: BTreeMap<Series<'a>, SeriesByLevel<'a, C>>,
     /// Cells without a level: models without images, and chance.
-    pub(crate) without_level: Vec<(&'a Subject, &'a C)>,
+    pub(crate) without_level: Vec<(&'a ModelInCondition, &'a C)>,
     /// How dark the photographs in the dark are.
     pub(crate) pairs: &'a [PairDarkness],
     /// The light in which the photographs of the set were taken.
@@ -76,7 +74,7 @@ pub(crate) struct Ladder<'a, C> {
 }
 
 impl<'a, C> Ladder<'a, C> {
-    pub(crate) fn new(cells: impl Iterator<Item = (&'a Subject, &'a C)>) -> Self {
+    pub(crate) fn new(cells: impl Iterator<Item = (&'a ModelInCondition, &'a C)>) -> Self {
         let mut ladder = Self {
             models: Vec::new(),
             levels: BTreeSet::new(),
@@ -147,7 +145,7 @@ impl<'a, C> Ladder<'a, C> {
                 .filter(|(other, _)| {
                     let groups = [other, &series].map(|series| series.variant.group.as_ref());
                     (other.model, other.enhancer) == (series.model, series.enhancer)
-                        && LightGroup::meet(groups[0], groups[1])
+                        && RunGroup::meet(groups[0], groups[1])
                 })
                 .peekable();
             if same_model.peek().is_some() {
@@ -192,7 +190,7 @@ impl<'a, C> Ladder<'a, C> {
             let groups = [*other, series].map(|series| series.variant.group.as_ref());
             (other.model, other.enhancer) == (series.model, None)
                 && (other.variant == series.variant
-                    || is_clean && LightGroup::meet(groups[0], groups[1]))
+                    || is_clean && RunGroup::meet(groups[0], groups[1]))
         });
         let mut cells = self
             .series
@@ -270,7 +268,7 @@ pub(crate) enum LadderRow<'a, C> {
     /// A series with its cells by level.
     Series(&'a Series<'a>, &'a SeriesByLevel<'a, C>),
     /// A subject without a level, and its cell.
-    WithoutLevel(&'a Subject, &'a C),
+    WithoutLevel(&'a ModelInCondition, &'a C),
 }
 
 impl<C> LadderRow<'_, C> {

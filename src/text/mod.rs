@@ -5,7 +5,7 @@ pub(crate) mod csv;
 pub(crate) mod frame_count;
 pub(crate) mod ladder;
 pub(crate) mod latex;
-pub(crate) mod light_readings;
+pub(crate) mod noise_profiles;
 pub(crate) mod outcome_words;
 pub(crate) mod readable;
 pub(crate) mod script;

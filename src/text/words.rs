@@ -1,17 +1,17 @@
 //! Text formatting of names and numbers in reports: [`light`], [`family`], [`percent`] and others; [`words`] formats any table cell.
 
 use crate::text::table::{ColumnKind, TableCell};
-use crate::types::{EnhancerName, Family, KindReading};
+use crate::types::{EnhancerName, Family, Variant};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// Title of a variant and its enhancer, such as `with noise + lift`.
-pub(crate) fn light(variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
+pub(crate) fn light(variant: &Variant, enhancer: Option<&EnhancerName>) -> String {
     light_with(variant, enhancer.map(EnhancerName::as_str))
 }
 
 /// Title of a variant and an enhancer given by any display name. The group of runs comes last.
-pub(crate) fn light_with(variant: &KindReading, enhancer: Option<&str>) -> String {
+pub(crate) fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
     let (title, group) = (variant.title(), variant.group_suffix());
     match enhancer {
         None => title + &group,
@@ -33,7 +33,7 @@ pub(crate) fn family(family: Option<&Family>) -> &str {
 }
 
 /// Display name of a subject: its model and condition.
-pub(crate) fn name(subject: &Subject) -> String {
+pub(crate) fn name(subject: &ModelInCondition) -> String {
     format!("{} {}", subject.model, subject.condition())
 }
 

@@ -14,8 +14,8 @@ use darkqa_light::raw::negative::{Negative, ladder as develop_ladder};
 use darkqa_light::raw::noise::{Term, add as add_noise};
 use darkqa_light::raw::unprocess;
 use darkqa_light::{
-    Amplify, AppliedDegradation, AutoExposure, CameraModel, Draws, Exposures, FrameView,
-    LightReading, Motion, NoiseKey, Streak, Synthesis,
+    Amplify, AppliedDegradation, AutoExposure, CameraModel, Draws, Exposures, FrameView, Motion,
+    NoiseKey, NoiseProfile, Streak, Synthesis,
 };
 use darkqa_picture::Payload;
 use darkqa_picture::PayloadFormat;
@@ -158,7 +158,7 @@ fn motion(c: &mut Criterion) {
     let (auto, motion) = (AutoExposure::default(), Motion::default());
     for how in ["L5-auto", "L5-noise@physical"] {
         let how: darkqa_eval::Degradation = how.parse().unwrap();
-        let physical = Synthesis::new(LightReading::Physical, CameraModel::default());
+        let physical = Synthesis::new(NoiseProfile::Physical, CameraModel::default());
         let applied =
             AppliedDegradation::new(&how, &physical, &auto, &motion, view, &key()).unwrap();
         group.bench_function(how.to_string(), |b| {

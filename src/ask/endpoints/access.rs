@@ -12,7 +12,7 @@ use rustls::pki_types::CertificateDer;
 use rustls::pki_types::pem::PemObject as _;
 
 use super::own_certificate::client_config;
-use super::own_headers::OwnHeaders;
+use super::own_headers::CustomHeaders;
 use super::proxy::check_proxy;
 use super::url::BaseUrl;
 use crate::ask::secrets::{KeyHeader, Scrub, Secret};
@@ -38,7 +38,7 @@ pub struct Access {
     /// Facts about the vendor; `None` for hosts that no table lists.
     pub vendor: Option<&'static Vendor>,
     /// Headers that the user adds.
-    pub headers: OwnHeaders,
+    pub headers: CustomHeaders,
     /// Certificate authorities that are trusted in addition to those of the system.
     pub authorities: Authorities,
     /// Whether a key may be sent unencrypted to another machine.
@@ -55,7 +55,7 @@ impl Access {
             key: None,
             key_header: KeyHeader::Auto,
             account: Vec::new(),
-            headers: OwnHeaders::default(),
+            headers: CustomHeaders::default(),
             authorities: Authorities::default(),
             allow_http: false,
         }

@@ -1,4 +1,4 @@
-//! Headers that the user adds to every request: [`OwnHeaders`].
+//! Headers that the user adds to every request: [`CustomHeaders`].
 
 use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 
@@ -21,20 +21,20 @@ const RESERVED: [&str; 9] = [
 
 /// Headers that the user adds to every request to an endpoint. Secret values come from environment variables.
 #[derive(Clone, Default)]
-pub struct OwnHeaders {
+pub struct CustomHeaders {
     map: HeaderMap,
     /// Values from environment variables, whole and without a first word such as `Bearer`.
     secrets: Vec<String>,
 }
 
-impl std::fmt::Debug for OwnHeaders {
+impl std::fmt::Debug for CustomHeaders {
     /// Lists the header names without their values.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_list().entries(self.map.keys()).finish()
     }
 }
 
-impl OwnHeaders {
+impl CustomHeaders {
     /// Parses `--header 'NAME: VALUE'` and `--header-env NAME=VARIABLE`.
     ///
     /// # Errors
@@ -140,9 +140,9 @@ impl OwnHeaders {
 mod tests {
     use super::*;
 
-    fn read(plain: &[&str]) -> Result<OwnHeaders> {
+    fn read(plain: &[&str]) -> Result<CustomHeaders> {
         let plain: Vec<String> = plain.iter().map(|text| (*text).to_owned()).collect();
-        OwnHeaders::read(&plain, &[])
+        CustomHeaders::read(&plain, &[])
     }
 
     #[test]
@@ -182,7 +182,7 @@ mod tests {
         }
         assert!(read(&["X-Team: 0123456789abcdef0123"]).is_ok());
         let secret_as_variable = ["X-Auth=sk-0123456789".to_owned()];
-        let error = OwnHeaders::read(&[], &secret_as_variable)
+        let error = CustomHeaders::read(&[], &secret_as_variable)
             .unwrap_err()
             .to_string();
         assert!(!error.contains("0123"), "{error}");

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::access::{Access, Authorities};
-use super::own_headers::OwnHeaders;
+use super::own_headers::CustomHeaders;
 use super::sending::Sending;
 use super::url::BaseUrl;
 use super::variable::variable;
@@ -143,7 +143,7 @@ impl AccessArgs {
                 key,
                 key_header: self.key_header,
                 account: account_headers(vendor),
-                headers: OwnHeaders::read(&self.header, &self.header_env)?,
+                headers: CustomHeaders::read(&self.header, &self.header_env)?,
                 authorities: authorities.clone(),
                 allow_http: self.allow_http,
                 ..Access::new(base)

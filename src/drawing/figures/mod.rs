@@ -16,11 +16,11 @@ use crate::drawing::chart::drawn::Drawn;
 use crate::drawing::chart::{Chart, DarkMark, LineItems, LineStyle, Panel, PanelContent, PlotLine};
 use crate::text::words::{counted, family as family_name, light_with, names_enhancer};
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
+use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::{CHANCE, Subject, pooled_models};
+use darkqa_score::subject::{CHANCE, ModelInCondition, pooled_models};
 
 pub(crate) use names::{KnownNames, Names};
 pub(crate) use overview::{OverviewPanels, overview};
@@ -136,17 +136,18 @@ impl<'a> Overview<'a> {
     fn points(
         &self,
         model: &str,
-        variant: &KindReading,
+        variant: &Variant,
         enhancer: Option<&EnhancerName>,
-        mut number: impl FnMut(&Subject) -> Option<Estimate>,
+        mut number: impl FnMut(&ModelInCondition) -> Option<Estimate>,
     ) -> Vec<(AxisLevel, Estimate)> {
         let points: Vec<_> = self
             .levels
             .iter()
             .filter_map(|&level| {
                 let grid = &self.findings.grid;
-                let of =
-                    |enhancer| grid.stand_in(&Subject::seeing(model, level, variant, enhancer));
+                let of = |enhancer| {
+                    grid.stand_in(&ModelInCondition::seeing(model, level, variant, enhancer))
+                };
                 let raw = || (level == AxisLevel::L0).then(|| of(None)).flatten();
                 let subject = &grid.subjects[of(enhancer).or_else(raw)?];
                 Some((subject.enhancer.as_ref(), level, number(subject)?))
@@ -176,7 +177,7 @@ impl<'a> Overview<'a> {
     }
 
     /// Accuracy of a subject on a family, in the strict reading.
-    fn accuracy_of(&self, subject: &Subject, family: Option<&Family>) -> Option<Estimate> {
+    fn accuracy_of(&self, subject: &ModelInCondition, family: Option<&Family>) -> Option<Estimate> {
         let cell = self
             .findings
             .summary
@@ -234,26 +235,26 @@ impl<'a> Overview<'a> {
     }
 
     /// A variant in words, with its enhancer.
-    fn light(&self, variant: &KindReading, enhancer: Option<&EnhancerName>) -> String {
+    fn light(&self, variant: &Variant, enhancer: Option<&EnhancerName>) -> String {
         let enhancer = enhancer.map(|name| self.names.shown(name.as_str()));
         light_with(variant, enhancer.as_deref())
     }
 
     /// The variant for figures that show only one: noise, if it was asked.
-    fn main_variant(&self) -> Option<KindReading> {
+    fn main_variant(&self) -> Option<Variant> {
         self.findings.grid.main_variant()
     }
 
-    /// All variants that were asked: kinds in each light reading.
-    fn tested_variants(&self) -> Vec<KindReading> {
+    /// All variants that were asked: kinds in each noise profile.
+    fn tested_variants(&self) -> Vec<Variant> {
         self.findings.grid.variants().into_iter().cloned().collect()
     }
 
     /// Lines of a quantity for all models, in one variant, raw.
     fn lines(
         &self,
-        variant: &KindReading,
-        mut number: impl FnMut(&Subject) -> Option<Estimate>,
+        variant: &Variant,
+        mut number: impl FnMut(&ModelInCondition) -> Option<Estimate>,
     ) -> Vec<PlotLine> {
         self.models
             .iter()
@@ -268,7 +269,7 @@ impl<'a> Overview<'a> {
     }
 
     /// Lines of the accuracy of all models, with the flat lines.
-    fn accuracies(&self, variant: &KindReading, family: Option<&Family>) -> Vec<PlotLine> {
+    fn accuracies(&self, variant: &Variant, family: Option<&Family>) -> Vec<PlotLine> {
         let mut lines = self.lines(variant, |subject| self.accuracy_of(subject, family));
         for items in lines.iter_mut().filter_map(|line| line.items.as_mut()) {
             items.family = family.map(|family| family.name().to_owned());
@@ -369,7 +370,7 @@ impl<'a> Overview<'a> {
             .collect();
         let mut marks = self.photographs();
         if panels.is_empty() && !marks.is_empty() {
-            let mut lines = self.accuracies(&KindReading::NONE, None);
+            let mut lines = self.accuracies(&Variant::NONE, None);
             lines.append(&mut marks);
             let title = format!("photographed in the dark, n {}", self.n(None));
             panels.push(Panel {
@@ -399,8 +400,8 @@ impl<'a> Overview<'a> {
         let all = self.tested_variants();
         let mut panels = Vec::new();
         for axis in Axis::ALL {
-            let is_on = |variant: &&KindReading| variant.kind.map(Kind::axis) == Some(axis);
-            let variants: Vec<&KindReading> = all.iter().filter(is_on).collect();
+            let is_on = |variant: &&Variant| variant.kind.map(Kind::axis) == Some(axis);
+            let variants: Vec<&Variant> = all.iter().filter(is_on).collect();
             if variants.len() > 1 {
                 panels.push(Panel {
                     title: title.clone(),
@@ -426,8 +427,8 @@ impl<'a> Overview<'a> {
     }
 
     /// A line for each of these variants, the mean over the models, and chance.
-    fn lines_of_variants(&self, variants: &[&KindReading], models: &[&str]) -> Vec<PlotLine> {
-        let line = |(index, variant): (usize, &&KindReading)| {
+    fn lines_of_variants(&self, variants: &[&Variant], models: &[&str]) -> Vec<PlotLine> {
+        let line = |(index, variant): (usize, &&Variant)| {
             let curves: Vec<Vec<(AxisLevel, Estimate)>> = models
                 .iter()
                 .map(|model| {

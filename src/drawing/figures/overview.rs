@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::{ACCURACY, Names, Overview, horizontal_lines};
 use crate::drawing::chart::{Chart, LineItems, LineStyle, Panel, PanelContent, PlotLine};
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, KindReading};
+use crate::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::CHANCE;
 
@@ -18,7 +18,7 @@ pub(crate) struct OverviewPanels {
     /// Each chart with its caption, or the reason why there is none, after its name.
     pub charts: Vec<(&'static str, PanelChart)>,
     /// The variant of the samples; `None` if no dark image was asked.
-    pub variant: Option<KindReading>,
+    pub variant: Option<Variant>,
     /// The first enhancer and the name that is shown for it.
     pub enhancer: Option<(EnhancerName, String)>,
     /// The meaning of the first chart's intervals.
@@ -28,14 +28,14 @@ pub(crate) struct OverviewPanels {
 /// The panels of a run: each model, the mean over the models by variant, and that mean raw and with each enhancer.
 pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels {
     let overview = Overview::new(findings, names);
-    let of_light = |variant: &KindReading| variant.kind.map(Kind::axis) == Some(Axis::LIGHT);
+    let of_light = |variant: &Variant| variant.kind.map(Kind::axis) == Some(Axis::LIGHT);
     let variant = overview.main_variant();
     let enhancer = overview.enhancers.first().map(|name| {
         let shown = overview.names.shown(name.as_str());
         ((*name).clone(), shown)
     });
-    let variants: Vec<KindReading> = overview.tested_variants();
-    let variants: Vec<&KindReading> = variants.iter().filter(|of| of_light(of)).collect();
+    let variants: Vec<Variant> = overview.tested_variants();
+    let variants: Vec<&Variant> = variants.iter().filter(|of| of_light(of)).collect();
     let models = overview.averaged_models();
     let by_model = variant.as_ref().ok_or("no dark image was asked");
     let by_model = by_model.map(|variant| overview.each_model(variant));
@@ -105,7 +105,7 @@ impl Overview<'_> {
         }
     }
 
-    fn each_model(&self, variant: &KindReading) -> (String, Chart) {
+    fn each_model(&self, variant: &Variant) -> (String, Chart) {
         let light = self.light(variant, None);
         let (lines, alone) = with_dark_levels(self.accuracies(variant, None));
         let mut caption = format!(
@@ -120,11 +120,7 @@ impl Overview<'_> {
     }
 
     /// The mean over the models by variant; `None` unless all of them were asked in two.
-    fn mean_by_variant(
-        &self,
-        variants: &[&KindReading],
-        models: &[&str],
-    ) -> Option<(String, Chart)> {
+    fn mean_by_variant(&self, variants: &[&Variant], models: &[&str]) -> Option<(String, Chart)> {
         let (mut lines, alone) = with_dark_levels(self.lines_of_variants(variants, models));
         if variants.len() - alone.len() < 2 {
             return None;
@@ -148,7 +144,7 @@ impl Overview<'_> {
 
     /// The lines beside a mean over models, other than chance: each model without images, and on raw images the model that is drawn in
     /// black.
-    fn beside_a_mean(&self, variant: &KindReading) -> Vec<PlotLine> {
+    fn beside_a_mean(&self, variant: &Variant) -> Vec<PlotLine> {
         let mut lines: Vec<PlotLine> = self
             .flat_lines(None)
             .into_iter()
@@ -171,7 +167,7 @@ impl Overview<'_> {
     }
 
     /// The mean over the models, raw and with each enhancer; `None` without an enhancer that has a line.
-    fn mean_by_enhancer(&self, variant: &KindReading, models: &[&str]) -> Option<(String, Chart)> {
+    fn mean_by_enhancer(&self, variant: &Variant, models: &[&str]) -> Option<(String, Chart)> {
         let line = |(index, enhancer): (usize, Option<&EnhancerName>)| {
             let curves = models.iter().map(|model| {
                 self.points(model, variant, enhancer, |subject| {

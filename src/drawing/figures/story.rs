@@ -3,15 +3,15 @@
 use super::{Names, Overview};
 use crate::drawing::chart::{LineItems, LineStyle, PanelContent, PlotLine};
 use crate::text::words::light;
-use crate::types::{EnhancerName, KindReading};
+use crate::types::{EnhancerName, Variant};
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::CHANCE;
 
 /// Accuracy over the levels in one variant: each model raw, and each with each enhancer.
 #[derive(Debug, Clone)]
 pub(crate) struct StoryCurves {
-    /// The last kind that was asked, in its first light reading.
-    pub variant: KindReading,
+    /// The last kind that was asked, in its first noise profile.
+    pub variant: Variant,
     /// The variant in words.
     pub light: String,
     /// The enhancers of the run.

@@ -6,12 +6,12 @@ use super::{Names, Overview};
 use crate::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
 use crate::text::words::family as family_name;
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, Family, KindReading, View};
+use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// The words about marks in captions.
 const BELOW: &str = "↓: shown to be below the answers without images.";
@@ -89,7 +89,7 @@ impl Overview<'_> {
         )
     }
 
-    fn by_level(&self, variant: &KindReading) -> Table {
+    fn by_level(&self, variant: &Variant) -> Table {
         let axis = variant.kind.map_or(Axis::LIGHT, Kind::axis);
         let rows: Vec<(&str, BTreeMap<AxisLevel, TableCell>)> = self
             .models
@@ -165,7 +165,7 @@ impl Overview<'_> {
             })
     }
 
-    fn is_best(&self, model: &str, variant: &KindReading) -> bool {
+    fn is_best(&self, model: &str, variant: &Variant) -> bool {
         self.findings.best.as_ref().is_some_and(|best| {
             best.variant == *variant
                 && best.models.len() > 1
@@ -174,7 +174,7 @@ impl Overview<'_> {
         })
     }
 
-    fn by_family(&self, variant: &KindReading) -> Table {
+    fn by_family(&self, variant: &Variant) -> Table {
         let families = self.findings.grid.families();
         let darkest = self
             .models
@@ -211,15 +211,9 @@ impl Overview<'_> {
     }
 
     /// The accuracy of a model on a family at a level.
-    fn at(
-        &self,
-        model: &str,
-        level: AxisLevel,
-        variant: &KindReading,
-        family: &Family,
-    ) -> TableCell {
+    fn at(&self, model: &str, level: AxisLevel, variant: &Variant, family: &Family) -> TableCell {
         let grid = &self.findings.grid;
-        let place = grid.stand_in(&Subject::seeing(model, level, variant, None));
+        let place = grid.stand_in(&ModelInCondition::seeing(model, level, variant, None));
         let subject = place.map(|place| &grid.subjects[place]);
         let of = subject.and_then(|subject| {
             let below = !self.findings.below_blind(subject, Some(family)).is_empty();
@@ -229,7 +223,7 @@ impl Overview<'_> {
     }
 
     /// The effect of an enhancer over the models, then the accuracy of each model with it; `None` if it was not asked in the variant.
-    fn by_enhancer(&self, variant: &KindReading, enhancer: &EnhancerName) -> Option<Table> {
+    fn by_enhancer(&self, variant: &Variant, enhancer: &EnhancerName) -> Option<Table> {
         let pooled: Vec<_> = self
             .findings
             .pooled

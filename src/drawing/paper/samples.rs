@@ -8,7 +8,7 @@ use super::look::Look;
 use super::sheet::{Anchor, Mark, PAPER, Place, Sheet, Stroke, Turn};
 use crate::drawing::figures::OverviewPanels;
 use crate::error::{Error, Result};
-use crate::types::{AxisLevel, EnhancerName, FrameId, KindReading, Rgb, Thumbnail};
+use crate::types::{AxisLevel, EnhancerName, FrameId, Rgb, Thumbnail, Variant};
 
 /// The levels that are shown where all of them were asked.
 const LEVELS: [&str; 4] = ["L0", "L1", "L3", "L5"];
@@ -70,14 +70,14 @@ pub(super) fn samples(
     Ok(Ok((sheet, caption)))
 }
 
-fn variant_title(variant: &KindReading) -> String {
+fn variant_title(variant: &Variant) -> String {
     format!("samples, {}{}", variant.title(), variant.group_suffix())
 }
 
 /// The small copies of the runs in one variant.
 struct Stored<'a> {
     thumbnails: &'a [Thumbnail],
-    variant: &'a KindReading,
+    variant: &'a Variant,
 }
 
 impl<'a> Stored<'a> {

@@ -14,7 +14,7 @@ pub(crate) struct LevelBlock {
     pub rows: Vec<LevelRow>,
 }
 
-/// The images of one kind of degradation, in one light reading.
+/// The images of one kind of degradation, in one noise profile.
 #[derive(Debug, Clone)]
 pub(crate) struct LevelRow {
     pub name: String,

@@ -7,13 +7,13 @@ use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
 use crate::drawing::figures::Drawing;
 use crate::text::words::light;
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, EnhancerName, KindReading};
+use crate::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::ConditionFidelity;
 
 /// A light: a variant, raw or with an enhancer.
-type Light<'f> = (&'f KindReading, Option<&'f EnhancerName>);
+type Light<'f> = (&'f Variant, Option<&'f EnhancerName>);
 
 /// A number of a condition as a share, with its interval where it has one.
 type Quantity = fn(&ConditionFidelity) -> Option<Estimate>;

@@ -7,7 +7,7 @@ use crate::drawing::figures::Drawing;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::ComparisonKind;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// Accuracy of each model in the light, on photographs in the dark, on synthetic images that are as dark, and on enhanced
 /// photographs; `None` where no scene was photographed in the dark.
@@ -31,7 +31,7 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
                     && row.first.model == model
                     && row.first.variant.photograph() == Some(&pair.name)
             });
-            let mut shown: Vec<&Subject> = Vec::new();
+            let mut shown: Vec<&ModelInCondition> = Vec::new();
             let mut bars = Vec::new();
             for row in rows {
                 // The light, the photograph, what is as dark, and the enhanced photograph, each once.

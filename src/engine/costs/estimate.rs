@@ -267,7 +267,7 @@ impl Tokens {
     }
 }
 
-/// The cost line of one model, by the light reading of what it is shown.
+/// The cost line of one model, by the noise profile of what it is shown.
 fn line(
     model: &ModelUnderTest,
     price: Option<Price>,

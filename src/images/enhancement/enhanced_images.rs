@@ -296,7 +296,7 @@ fn size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
     }
     let size = file.check().map_err(|e| e.to_string())?;
     let note = file.note();
-    if note.depth == Some(DepthNote::Codes16) {
+    if note.depth == Some(DepthNote::Rgb16Image) {
         return Err("16 bits".to_owned());
     }
     if note.depth.is_some() || note.orientation.is_some() {

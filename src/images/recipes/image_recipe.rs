@@ -38,11 +38,11 @@ pub(crate) struct ImageRecipe {
     exposure: Option<ExposureFacts>,
 }
 
-/// The inputs of the sensor branch; those of automatic exposure are the light reading `physical` at its own gain.
+/// The inputs of the sensor branch; those of automatic exposure are the noise profile `physical` at its own gain.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct SensorRecord {
     seed: u64,
-    /// The light reading, as defined by the fields below.
+    /// The noise profile, as defined by the fields below.
     #[serde(default = "paper")]
     reading: ReadingName,
     amplify: Amplify,
@@ -78,7 +78,7 @@ impl ImageOrigin for ImageRecipe {
 }
 
 impl SensorRecord {
-    /// The flags that differ, with both values. What follows from others is left out: the state is drawn by the seed, and a light reading
+    /// The flags that differ, with both values. What follows from others is left out: the state is drawn by the seed, and a noise profile
     /// stands for its choices.
     fn differences(&self, wanted: &Self) -> Vec<String> {
         let mut differences = Vec::new();
@@ -232,7 +232,7 @@ impl ImageRecipe {
     }
 }
 
-/// The light reading of files that do not name one.
+/// The noise profile of files that do not name one.
 fn paper() -> ReadingName {
     ReadingName::PAPER
 }

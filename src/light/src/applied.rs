@@ -3,7 +3,7 @@
 use super::auto::{AutoExposure, AutoShot};
 use super::draws::NoiseKey;
 use super::movement::{FrameView, Motion, Streak};
-use super::reading::Synthesis;
+use super::noise_profile::Synthesis;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Degradation, ExposureFacts, ReadingName, Severity};
@@ -17,9 +17,9 @@ pub enum AppliedDegradation {
     Sensor {
         /// How much less light.
         severity: Severity,
-        /// Name of the light reading.
+        /// Name of the noise profile.
         reading: ReadingName,
-        /// Content of the light reading.
+        /// Content of the noise profile.
         synthesis: Synthesis,
     },
     /// Less light, as a camera with automatic exposure meets it.
@@ -28,7 +28,7 @@ pub enum AppliedDegradation {
         shot: AutoShot,
         /// The path of the picture during the exposure.
         streak: Streak,
-        /// The sensor: the light reading `physical` at the gain of the shot.
+        /// The sensor: the noise profile `physical` at the gain of the shot.
         synthesis: Synthesis,
     },
     /// The motion blur of an exposure.
@@ -41,7 +41,7 @@ pub enum AppliedDegradation {
 }
 
 impl AppliedDegradation {
-    /// Resolves a degradation for a frame. `synthesis` is the content of its light reading; a kind without readings uses only its sensor.
+    /// Resolves a degradation for a frame. `synthesis` is the content of its noise profile; a kind without profiles uses only its sensor.
     ///
     /// # Errors
     /// If the sensor lacks the gain of an automatic exposure, or the picture would move too far.

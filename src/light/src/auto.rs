@@ -2,7 +2,7 @@
 //!
 //! The scene is ΔEV darker. The camera opens its shutter s stops longer, adds g stops of gain, and leaves d = ΔEV − s − g dark. So the
 //! photons fall by 2^−(ΔEV − s), the picture by 2^−d, and the longer exposure blurs it if the camera turns. The sensor adds the noise of
-//! the light reading `physical` at the drop d, with the gain K = K₀ · 2^g and the ratio r = 2^d. The shot noise of a sample y then has the
+//! the noise profile `physical` at the drop d, with the gain K = K₀ · 2^g and the ratio r = 2^d. The shot noise of a sample y then has the
 //! relative variance K · r / y = K₀ · 2^(ΔEV − s) / y, however the rest is divided between gain and darkness.
 
 use std::fmt;
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::camera::CameraModel;
 use super::camera::calibration::GAINS;
-use super::reading::{LightReading, Synthesis};
+use super::noise_profile::{NoiseProfile, Synthesis};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::Severity;
 use darkqa_ground::types::flags::key_values::{number, pairs};
@@ -139,7 +139,7 @@ impl AutoShot {
         }
         let mut camera = camera.unpinned();
         camera.pin_gain(gain)?;
-        Ok(Synthesis::new(LightReading::Physical, camera))
+        Ok(Synthesis::new(NoiseProfile::Physical, camera))
     }
 }
 

@@ -12,9 +12,9 @@ use super::draws::NoiseKey;
 use super::exposure::{expose, expose_by, expose_to_light};
 use super::movement::Streak;
 use super::movement::blur::{blur, blurred_codes};
+use super::noise_profile::{Amplify, Coupling, Tone};
 use super::raw::negative::{Capture, Target};
 use super::raw::noise::Term;
-use super::reading::{Amplify, Coupling, Tone};
 
 /// Every number that decides an image besides its frame and its noise key. The images equal those of [`degrade`](super::degrade).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -193,7 +193,7 @@ fn in_range(name: &str, value: f64, [low, high]: [f64; 2]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{AutoExposure, FrameView, LightReading, Motion, Synthesis};
+    use crate::{AutoExposure, FrameView, Motion, NoiseProfile, Synthesis};
     use darkqa_ground::types::{Degradation, FrameId};
 
     fn picture() -> Rgb {
@@ -211,7 +211,7 @@ mod tests {
         NoiseKey::new(5, &FrameId("a".to_owned()))
     }
 
-    fn applied(how: &str, reading: LightReading) -> AppliedDegradation {
+    fn applied(how: &str, reading: NoiseProfile) -> AppliedDegradation {
         let how: Degradation = how.parse().unwrap();
         let synthesis = Synthesis::new(reading, crate::CameraModel::default());
         let view = FrameView {
@@ -222,16 +222,16 @@ mod tests {
         AppliedDegradation::new(&how, &synthesis, &auto, &motion, view, &key()).unwrap()
     }
 
-    const CASES: [(&str, LightReading); 9] = [
-        ("L3-ev", LightReading::Paper),
-        ("E3.3-ev", LightReading::Paper),
-        ("E2.2-ev", LightReading::Paper),
-        ("L2-noise", LightReading::Paper),
-        ("L2-noise@eld", LightReading::Eld),
-        ("L5-noise@level", LightReading::Level),
-        ("L2-noise@physical", LightReading::Physical),
-        ("L4-auto", LightReading::Paper),
-        ("T33.33-motion", LightReading::Paper),
+    const CASES: [(&str, NoiseProfile); 9] = [
+        ("L3-ev", NoiseProfile::Paper),
+        ("E3.3-ev", NoiseProfile::Paper),
+        ("E2.2-ev", NoiseProfile::Paper),
+        ("L2-noise", NoiseProfile::Paper),
+        ("L2-noise@eld", NoiseProfile::Eld),
+        ("L5-noise@level", NoiseProfile::Level),
+        ("L2-noise@physical", NoiseProfile::Physical),
+        ("L4-auto", NoiseProfile::Paper),
+        ("T33.33-motion", NoiseProfile::Paper),
     ];
 
     #[test]
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn without_noise_the_key_changes_the_camera_alone() {
-        let state = CaptureState::new(&applied("L2-noise@eld", LightReading::Eld), &key());
+        let state = CaptureState::new(&applied("L2-noise@eld", NoiseProfile::Eld), &key());
         let other = NoiseKey::new(6, &FrameId("b".to_owned()));
         let image = |key: &NoiseKey, noise| state.image((&picture()).into(), key, noise);
         let target = image(&key(), NoiseTerms::None);
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn numbers_out_of_range_are_named() {
-        let state = CaptureState::new(&applied("L2-noise", LightReading::Paper), &key());
+        let state = CaptureState::new(&applied("L2-noise", NoiseProfile::Paper), &key());
         let mut wrong = state.clone();
         wrong.drop_ev = f64::NAN;
         assert!(wrong.check().unwrap_err().to_string().contains("drop_ev"));

@@ -1,6 +1,6 @@
 //! The clean frame in any of the forms that images are made from: [`Clean`].
 
-use darkqa_ground::types::{Codes16, Light, Pixels, Rgb};
+use darkqa_ground::types::{Light, Pixels, Rgb, Rgb16Image};
 
 /// A clean frame, in the form in which its pixels are known.
 #[derive(Debug, Clone, Copy)]
@@ -8,7 +8,7 @@ pub enum Clean<'a> {
     /// 8-bit sRGB codes.
     Codes(&'a Rgb),
     /// 16-bit sRGB codes.
-    Codes16(&'a Codes16),
+    Rgb16Image(&'a Rgb16Image),
     /// Light as a display shows it; codes are its power 1/2.2. Above 1 it counts as 1. It is not rounded to codes.
     Light(&'a Light),
     /// Light in front of the camera, which no tone curve has changed. It may be more than 1, the light of white.
@@ -21,7 +21,7 @@ impl Clean<'_> {
     pub fn height(self) -> usize {
         match self {
             Self::Codes(codes) => codes.height(),
-            Self::Codes16(codes) => codes.height(),
+            Self::Rgb16Image(codes) => codes.height(),
             Self::Light(light) | Self::Scene(light) => light.height(),
         }
     }
@@ -31,7 +31,7 @@ impl Clean<'_> {
     pub fn width(self) -> usize {
         match self {
             Self::Codes(codes) => codes.width(),
-            Self::Codes16(codes) => codes.width(),
+            Self::Rgb16Image(codes) => codes.width(),
             Self::Light(light) | Self::Scene(light) => light.width(),
         }
     }
@@ -43,7 +43,7 @@ impl Clean<'_> {
     pub fn with_light(self, light: &Light) -> Clean<'_> {
         match self {
             Self::Scene(_) => Clean::Scene(light),
-            Self::Codes(_) | Self::Codes16(_) | Self::Light(_) => Clean::Light(light),
+            Self::Codes(_) | Self::Rgb16Image(_) | Self::Light(_) => Clean::Light(light),
         }
     }
 }
@@ -58,7 +58,7 @@ impl<'a> From<&'a Pixels> for Clean<'a> {
     fn from(pixels: &'a Pixels) -> Self {
         match pixels {
             Pixels::Codes8(codes) => Self::Codes(codes),
-            Pixels::Codes16(codes) => Self::Codes16(codes),
+            Pixels::Rgb16Image(codes) => Self::Rgb16Image(codes),
             Pixels::Light(light) => Self::Scene(light),
         }
     }

@@ -8,9 +8,9 @@ use super::camera::CameraState;
 use super::camera::tests::median;
 use super::curve;
 use super::draws::{Component, NoiseKey};
+use super::noise_profile::{Amplify, Tone};
 use super::raw::noise::{self, Term};
 use super::raw::{Bayer, Developer, Plane, unprocess};
-use super::reading::{Amplify, Tone};
 use darkqa_ground::types::images::Isa;
 use darkqa_ground::types::{FrameId, Rgb, Severity};
 

@@ -6,7 +6,7 @@ use super::clean::Clean;
 use super::codes::shown_light;
 use super::curve;
 use darkqa_ground::types::images::{Isa, Kernel};
-use darkqa_ground::types::{Codes16, Light, Rgb, Severity};
+use darkqa_ground::types::{Light, Rgb, Rgb16Image, Severity};
 
 /// Version of the exposure branch, raised whenever a pixel changes.
 pub const VERSION: u32 = 1;
@@ -56,14 +56,14 @@ pub fn expose_by<'a>(clean: impl Into<Clean<'a>>, drop_ev: f64) -> Rgb {
     let mut degraded = Rgb::black(clean.height(), clean.width());
     match clean {
         Clean::Codes(codes) => expose_into(codes, drop_ev, &mut degraded),
-        Clean::Codes16(codes) => expose_16_bits(codes, drop_ev, &mut degraded),
+        Clean::Rgb16Image(codes) => expose_16_bits(codes, drop_ev, &mut degraded),
         Clean::Light(light) | Clean::Scene(light) => expose_light(light, drop_ev, &mut degraded),
     }
     degraded
 }
 
 /// The codes floor(2^(−ΔEV/2.2) · 255 · v/65535 + ½) of 16-bit codes v, at most 255; ties are rounded up.
-fn expose_16_bits(clean: &Codes16, drop_ev: f64, degraded: &mut Rgb) {
+fn expose_16_bits(clean: &Rgb16Image, drop_ev: f64, degraded: &mut Rgb) {
     let factor = 255.0 * curve::display_factor(drop_ev);
     let code = |code: u16| {
         let scaled = factor * (f64::from(code) / 65_535.0) + 0.5 + TIE;
@@ -106,7 +106,7 @@ pub(super) fn expose_to_light(clean: Clean<'_>, drop_ev: f64) -> Light {
                 *light = table[usize::from(*code)];
             }
         }
-        Clean::Codes16(codes) => {
+        Clean::Rgb16Image(codes) => {
             for (light, code) in degraded.samples_mut().iter_mut().zip(codes.samples()) {
                 *light = darker(curve::gamma_expand(f64::from(*code) / 65_535.0));
             }

@@ -12,7 +12,7 @@ use super::raw::negative::{Negative, develop_by};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{Light, ReadingName, Rgb};
 
-/// The degraded images of one frame, with a cache of one [`Negative`] for each light reading, and of the blurred light.
+/// The degraded images of one frame, with a cache of one [`Negative`] for each noise profile, and of the blurred light.
 #[derive(Debug, Default)]
 pub struct Exposures {
     negatives: BTreeMap<ReadingName, Negative>,
@@ -21,7 +21,7 @@ pub struct Exposures {
 }
 
 impl Exposures {
-    /// The frame after a degradation. Frame, key and the contents of the light readings must be the same in each call.
+    /// The frame after a degradation. Frame, key and the contents of the noise profiles must be the same in each call.
     #[must_use]
     pub fn degrade(
         &mut self,
@@ -85,9 +85,9 @@ pub fn version(kind: Kind) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise_profile::{Amplify, NoiseProfile, Synthesis};
     use crate::raw::noise::{Term, add};
     use crate::raw::{Bayer, unprocess};
-    use crate::reading::{Amplify, LightReading, Synthesis};
     use crate::{AutoSettings, CameraModel, CameraState, FrameView, Motion};
     use darkqa_ground::error::Result;
     use darkqa_ground::types::{Degradation, FrameId, Severity};
@@ -130,7 +130,7 @@ mod tests {
         let mut camera = CameraModel::default();
         camera.pin_gain(3.0).unwrap();
         camera.pin_ratio(7.0).unwrap();
-        let synthesis = Synthesis::new(LightReading::Eld, camera);
+        let synthesis = Synthesis::new(NoiseProfile::Eld, camera);
         applied_by(&synthesis, how, auto, motion).unwrap()
     }
 
@@ -138,15 +138,15 @@ mod tests {
         Exposures::default().degrade((&picture()).into(), &applied(how, auto, motion), &key("a"))
     }
 
-    /// The noise variant in the light reading physical, with the gain pinned.
+    /// The noise variant in the noise profile physical, with the gain pinned.
     fn physical(severity: Severity, gain: f64) -> Rgb {
         let mut camera = CameraModel::default();
         camera.pin_gain(gain).unwrap();
-        let synthesis = Synthesis::new(LightReading::Physical, camera);
+        let synthesis = Synthesis::new(NoiseProfile::Physical, camera);
         Negative::new(&picture(), &key("a"), &synthesis, severity).develop(severity)
     }
 
-    /// Without shutter, gain and motion, automatic exposure is the physical reading at its gain.
+    /// Without shutter, gain and motion, automatic exposure is the physical profile at its gain.
     #[test]
     fn what_is_met_by_nothing_is_the_physical_reading() {
         let none = "shutter=0,gain=0,base-gain=1.5";
@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// At L3 the shutter and the gain meet all of the drop: the picture is as bright as the physical reading without a drop, with
+    /// At L3 the shutter and the gain meet all of the drop: the picture is as bright as the physical profile without a drop, with
     /// the noise of the gain K = 0.375 · 2⁴.
     #[test]
     fn gain_brightens_and_keeps_the_noise_of_its_photons() {

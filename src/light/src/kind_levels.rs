@@ -1,7 +1,7 @@
 //! The levels of the kinds of a run: those that are named, or each kind's own ladder.
 
 use super::levels::{LIGHT, Levels, ladder};
-use super::reading::Readings;
+use super::noise_profile::Readings;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::degradations::{Axis, Kind};
 use darkqa_ground::types::{AxisLevel, KindSet, PairDark};
@@ -55,7 +55,7 @@ impl Levels {
         Ok(levels)
     }
 
-    /// The kinds and readings whose synthetic images are as dark as each frame's own photograph; empty unless `match` is among the
+    /// The kinds and profiles whose synthetic images are as dark as each frame's own photograph; empty unless `match` is among the
     /// levels.
     ///
     /// # Errors

@@ -53,9 +53,9 @@ mod kind_levels;
 #[cfg(feature = "flags")]
 mod levels;
 pub mod movement;
+mod noise_profile;
 mod pair_ev;
 pub mod raw;
-mod reading;
 #[cfg(feature = "flags")]
 mod settings;
 
@@ -69,10 +69,10 @@ pub use exposure::{expose, expose_by};
 pub use exposures::Exposures;
 pub use exposures::version;
 pub use movement::{FrameView, Motion, MotionAngle, Streak, Tap};
+pub use noise_profile::{Amplify, Coupling, Draws, NoiseProfile, Readings, Synthesis, Tone};
 pub use pair_ev::{PairEv, mean_luminance};
 pub use raw::CleanRaw;
 pub use raw::negative::{Negative, develop_with_state};
-pub use reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
 #[cfg(feature = "flags")]
 pub use settings::{
     CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings,
@@ -87,7 +87,7 @@ pub const VERSION: u32 = 2;
 
 /// The frame after a degradation; without one, the frame itself.
 ///
-/// `synthesis` is the content of the degradation's light reading. Automatic exposure and the camera's motion are as by default, and
+/// `synthesis` is the content of the degradation's noise profile. Automatic exposure and the camera's motion are as by default, and
 /// the focal length is not known. For other settings, and for several degradations of one frame, [`Exposures`] makes the images of
 /// [`AppliedDegradation`]s with less work.
 ///

@@ -9,7 +9,7 @@ use super::auto::{AutoExposure, AutoSettings};
 use super::draws::NoiseKey;
 use super::levels::{LIGHT, Levels, ladder};
 use super::movement::{FrameView, Motion};
-use super::reading::{Amplify, Coupling, Draws, LightReading, Readings, Synthesis, Tone};
+use super::noise_profile::{Amplify, Coupling, Draws, NoiseProfile, Readings, Synthesis, Tone};
 use super::{CameraModel, Sampling};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::degradations::Kind;
@@ -61,7 +61,7 @@ pub struct CameraArgs {
     ///
     /// Settings that are not named have their defaults. Those of gain and base-gain follow from the sensor of --noise camera: the gain ends at
     /// its greatest K, and starts 4 stops below, or at its least K (the paper's: gain=4,base-gain=0.375). The noise is that of the
-    /// light reading physical at this gain, in this sensor.
+    /// noise profile physical at this gain, in this sensor.
     #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoSettings::default(), add = Decides::Pixels)]
     pub auto: AutoSettings,
     /// How the camera turns during an exposure, in the variants motion and auto: speed in degrees per second, horizontal field of view in
@@ -79,13 +79,13 @@ pub struct SensorArgs {
     /// The seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
-    /// Light readings, ways to understand the paper's noise, one or several as paper,eld; amplify, tone, draws and
-    /// coupling of --noise replace choices of a single reading, which is then custom, or has the name of the reading with the same choices
+    /// Noise profiles, ways to understand the paper's noise, one or several as paper,eld; amplify, tone, draws and
+    /// coupling of --noise replace choices of a single profile, which is then custom, or has the name of the profile with the same choices
     ///
     /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image at five
-    /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every reading of the paper.
+    /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every profile of the paper.
     ///
-    /// Conditions with noise carry the reading's name, as L3-noise@physical; that of paper is left out: L3-noise.
+    /// Conditions with noise carry the profile's name, as L3-noise@physical; that of paper is left out: L3-noise.
     #[arg(
         long,
         value_name = "LIST",
@@ -126,7 +126,7 @@ pub struct SensorArgs {
     pub fixed: bool,
 }
 
-/// Word of `--profile`: a light reading or all of them.
+/// Word of `--profile`: a noise profile or all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Profile {
     /// As the DarkQA paper states it
@@ -142,13 +142,13 @@ pub enum Profile {
 }
 
 impl Profile {
-    fn readings(self) -> &'static [LightReading] {
+    fn readings(self) -> &'static [NoiseProfile] {
         match self {
-            Self::Paper => &[LightReading::Paper],
-            Self::Eld => &[LightReading::Eld],
-            Self::Level => &[LightReading::Level],
-            Self::Physical => &[LightReading::Physical],
-            Self::All => &LightReading::ALL,
+            Self::Paper => &[NoiseProfile::Paper],
+            Self::Eld => &[NoiseProfile::Eld],
+            Self::Level => &[NoiseProfile::Level],
+            Self::Physical => &[NoiseProfile::Physical],
+            Self::All => &NoiseProfile::ALL,
         }
     }
 }
@@ -182,7 +182,7 @@ pub struct KindSettings {
 pub struct SensorSettings {
     /// Seed of all random draws.
     pub seed: u64,
-    /// Light readings that noisy images are made in.
+    /// Noise profiles that noisy images are made in.
     pub readings: Readings,
 }
 
@@ -220,7 +220,7 @@ impl LightSettings {
         Err(Error::usage("--levels", problem))
     }
 
-    /// Degradations of each frame, level by level: each kind, in each light reading if it has readings; `None` is L0.
+    /// Degradations of each frame, level by level: each kind, in each of its noise profiles; `None` is L0.
     pub fn degradations(&self) -> Vec<Option<Degradation>> {
         let mut all = Vec::new();
         for level in &self.levels {
@@ -267,7 +267,7 @@ impl KindSettings {
     /// Resolves a degradation for a frame.
     ///
     /// # Errors
-    /// If the light reading is not among those of `--profile`, the sensor lacks the gain of an automatic exposure, or the picture would
+    /// If the noise profile is not among those of `--profile`, the sensor lacks the gain of an automatic exposure, or the picture would
     /// move too far.
     pub fn apply(
         &self,
@@ -305,10 +305,10 @@ impl SensorSettings {
     }
 }
 
-/// The readings of `--profile`; for a single one, with the choices of the other flags.
+/// The profiles of `--profile`; for a single one, with the choices of the other flags.
 fn readings(args: &SensorArgs) -> Result<Readings> {
     let profiles = args.profile.iter();
-    let mut chosen: Vec<LightReading> = Vec::new();
+    let mut chosen: Vec<NoiseProfile> = Vec::new();
     for reading in profiles.flat_map(|profile| profile.readings()) {
         if !chosen.contains(reading) {
             chosen.push(*reading);
@@ -340,7 +340,7 @@ fn readings(args: &SensorArgs) -> Result<Readings> {
     Ok(Readings::named(&chosen, &camera))
 }
 
-/// A reading's choices, each replaced if its flag is set.
+/// A profile's choices, each replaced if its flag is set.
 fn synthesis(args: &SensorArgs, reading: Synthesis) -> Result<Synthesis> {
     let synthesis = Synthesis {
         amplify: args.amplify.unwrap_or(reading.amplify),

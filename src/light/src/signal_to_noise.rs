@@ -1,12 +1,12 @@
-//! Signal-to-noise ratio of flat greys by level and light reading: that of RAW samples against its formula, and that of codes.
+//! Signal-to-noise ratio of flat greys by level and noise profile: that of RAW samples against its formula, and that of codes.
 //!
-//! With the sample y in ADU and v = σ_TL² · var(λ) + σ_row² + 1/12, the noise of a light reading has the variance r · K · y + v,
+//! With the sample y in ADU and v = σ_TL² · var(λ) + σ_row² + 1/12, the noise of a noise profile has the variance r · K · y + v,
 //! and r · K · y + r² · v if r amplifies all terms; r is 2^ΔEV if light is photons.
 
 use super::camera::{CameraModel, CameraState, Sampling};
 use super::raw::noise::{self, Term};
 use super::raw::{Plane, unprocess};
-use super::{Amplify, LightReading, Negative, NoiseKey, Synthesis};
+use super::{Amplify, Negative, NoiseKey, NoiseProfile, Synthesis};
 use darkqa_ground::types::{FrameId, Rgb, Severity};
 
 const SIZE: usize = 256;
@@ -24,8 +24,8 @@ fn tukey_variance(shape: f64) -> f64 {
     2.0 / (shape * shape) * (1.0 / (1.0 + 2.0 * shape) - middle)
 }
 
-/// The light reading with the camera in the middle of its ranges, of gain `gain`.
-fn fixed(reading: LightReading, gain: f64) -> Synthesis {
+/// The noise profile with the camera in the middle of its ranges, of gain `gain`.
+fn fixed(reading: NoiseProfile, gain: f64) -> Synthesis {
     let mut camera = CameraModel::default();
     camera.set_sampling(Sampling::Fixed);
     camera.pin_gain(gain).unwrap();
@@ -61,7 +61,7 @@ fn formula(amplify: Amplify, state: &CameraState, y: f64) -> f64 {
 }
 
 /// The ratio of green RAW samples: measured, and by formula.
-fn raw(reading: LightReading, gain: f64, code: u8, level: Severity) -> [f64; 2] {
+fn raw(reading: NoiseProfile, gain: f64, code: u8, level: Severity) -> [f64; 2] {
     let synthesis = fixed(reading, gain);
     let state = synthesis.state(&key(code), level);
     let mut raw = unprocess(&flat(code), &state);
@@ -79,7 +79,7 @@ fn raw(reading: LightReading, gain: f64, code: u8, level: Severity) -> [f64; 2] 
 }
 
 /// The ratio of green codes: their mean over their standard deviation.
-fn code(reading: LightReading, gain: f64, code: u8, level: Severity) -> f64 {
+fn code(reading: NoiseProfile, gain: f64, code: u8, level: Severity) -> f64 {
     let synthesis = fixed(reading, gain);
     let image = Negative::new(&flat(code), &key(code), &synthesis, level).develop(level);
     let greens = image.samples().iter().skip(1).step_by(3);
@@ -94,7 +94,7 @@ fn middle_gain() -> f64 {
 
 #[test]
 fn the_ratio_of_raw_samples_is_that_of_the_formula() {
-    for reading in LightReading::ALL {
+    for reading in NoiseProfile::ALL {
         for grey in GREYS {
             let falls: Vec<f64> = Severity::LADDER
                 .map(|level| {
@@ -110,11 +110,11 @@ fn the_ratio_of_raw_samples_is_that_of_the_formula() {
                 .map(|pair| pair[0] / pair[1])
                 .collect();
             match reading {
-                LightReading::Paper | LightReading::Eld => {
+                NoiseProfile::Paper | NoiseProfile::Eld => {
                     assert!(falls.iter().all(|fall| (fall - 1.0).abs() < 0.01));
                 }
                 // At least as the root of the light.
-                LightReading::Level | LightReading::Physical => {
+                NoiseProfile::Level | NoiseProfile::Physical => {
                     let steps = Severity::LADDER
                         .windows(2)
                         .map(|pair| pair[1].value() - pair[0].value());
@@ -128,22 +128,22 @@ fn the_ratio_of_raw_samples_is_that_of_the_formula() {
     }
 }
 
-/// The formula tells the readings apart: that of one misses the other by far more than the bound of the test above.
+/// The formula tells the profiles apart: that of one misses the other by far more than the bound of the test above.
 #[test]
 fn the_formula_of_another_reading_does_not_hold() {
     let (grey, level) = (GREYS[0], Severity::L5);
-    let [of_paper, _] = raw(LightReading::Paper, middle_gain(), grey, level);
+    let [of_paper, _] = raw(NoiseProfile::Paper, middle_gain(), grey, level);
     for other in [
-        LightReading::Eld,
-        LightReading::Level,
-        LightReading::Physical,
+        NoiseProfile::Eld,
+        NoiseProfile::Level,
+        NoiseProfile::Physical,
     ] {
         let [_, expected] = raw(other, middle_gain(), grey, level);
         assert!((of_paper / expected - 1.0).abs() > 0.2, "{other:?}");
     }
 }
 
-/// The rows of the table in `src/docs/light.md`: the name of a light reading, and RAW and code ratios at L1 to L5 of both greys.
+/// The rows of the table in `src/docs/light.md`: the name of a noise profile, and RAW and code ratios at L1 to L5 of both greys.
 fn documented() -> Vec<(String, [[f64; 5]; 4])> {
     let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/light.md");
     let page = std::fs::read_to_string(place).unwrap();
@@ -173,9 +173,9 @@ fn documented() -> Vec<(String, [[f64; 5]; 4])> {
 fn the_table_of_the_documentation_is_measured() {
     let mut off = Vec::new();
     let documented = documented();
-    let names = LightReading::ALL.map(|reading| reading.name().to_string());
+    let names = NoiseProfile::ALL.map(|reading| reading.name().to_string());
     assert!(documented.iter().map(|(name, _)| name).eq(&names));
-    for (reading, (_, rows)) in LightReading::ALL.into_iter().zip(documented) {
+    for (reading, (_, rows)) in NoiseProfile::ALL.into_iter().zip(documented) {
         let [first, second] = GREYS;
         let raw = |grey| Severity::LADDER.map(|level| raw(reading, middle_gain(), grey, level)[0]);
         let code = |grey| Severity::LADDER.map(|level| code(reading, middle_gain(), grey, level));

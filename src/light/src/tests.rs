@@ -105,12 +105,12 @@ fn bytes_of_every_choice_are_those_of_this_version() {
     let clean = ramps(37, 130);
     let camera = || CameraModel::preset("nikon-d850").unwrap();
     let choices = [
-        Synthesis::new(LightReading::Physical, CameraModel::default()),
-        Synthesis::new(LightReading::Physical, camera()),
+        Synthesis::new(NoiseProfile::Physical, CameraModel::default()),
+        Synthesis::new(NoiseProfile::Physical, camera()),
         Synthesis {
             draws: Draws::Fresh,
             tone: Tone::AfterEv,
-            ..Synthesis::new(LightReading::Paper, camera())
+            ..Synthesis::new(NoiseProfile::Paper, camera())
         },
     ];
     let mut bytes = Vec::new();
@@ -321,10 +321,10 @@ fn the_tone_curve_is_applied_where_it_is_set() {
     );
 }
 
-/// With `photon`, less light means fewer photons: the ratio grows with the level. In the paper's reading it does not.
+/// With `photon`, less light means fewer photons: the ratio grows with the level. In the paper's profile it does not.
 #[test]
 fn coupling_makes_the_ratio_the_drop() {
-    let physical = Synthesis::new(LightReading::Physical, CameraModel::default());
+    let physical = Synthesis::new(NoiseProfile::Physical, CameraModel::default());
     for (found, expected) in Severity::LADDER
         .map(|level| physical.state(&key(1, "a"), level).ratio)
         .iter()
@@ -342,7 +342,7 @@ fn coupling_makes_the_ratio_the_drop() {
 fn ladders_are_their_negatives() {
     let settings = [
         Synthesis::default(),
-        Synthesis::new(LightReading::Physical, CameraModel::default()),
+        Synthesis::new(NoiseProfile::Physical, CameraModel::default()),
         Synthesis {
             draws: Draws::Fresh,
             tone: Tone::AfterEv,

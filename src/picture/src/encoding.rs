@@ -11,7 +11,7 @@ use image::{ExtendedColorType, ImageEncoder as _};
 
 use crate::payload_format::Quality;
 use darkqa_ground::error::{Error, Result};
-use darkqa_ground::types::{Codes16, Light, Rgb};
+use darkqa_ground::types::{Light, Rgb, Rgb16Image};
 
 /// An error about an image that has no name here.
 pub(crate) fn image_error(problem: impl fmt::Display) -> Error {
@@ -44,7 +44,7 @@ pub fn png(image: &Rgb) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// If a side is too long for the format.
-pub(crate) fn png_16(image: &Codes16) -> Result<Vec<u8>> {
+pub(crate) fn png_16(image: &Rgb16Image) -> Result<Vec<u8>> {
     let (width, height) = (side(image.width())?, side(image.height())?);
     let samples: Vec<u8> = image
         .samples()

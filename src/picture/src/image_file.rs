@@ -27,7 +27,7 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::files::guarded::guarded;
 use darkqa_ground::files::reading;
 use darkqa_ground::types::{
-    Codes16, ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb,
+    ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb, Rgb16Image,
 };
 
 /// A PNG, JPEG, WebP, TIFF, BMP or OpenEXR file that is not decoded.
@@ -152,7 +152,7 @@ impl ImageFile {
         let samples = self.samples(facts);
         let depth = match (&samples, facts.depth) {
             (Ok(Samples::Light(_)), _) => Some(DepthNote::Light),
-            (Ok(Samples::Codes(_)), Depth::Sixteen) => Some(DepthNote::Codes16),
+            (Ok(Samples::Codes(_)), Depth::Sixteen) => Some(DepthNote::Rgb16Image),
             _ => None,
         };
         let is_light = depth == Some(DepthNote::Light);
@@ -294,7 +294,8 @@ impl ImageFile {
                 if let Some(space) = space {
                     space.conversion.convert_16(&mut codes);
                 }
-                Codes16::new(height, width, codes).map(|codes| Pixels::Codes16(Arc::new(codes)))
+                Rgb16Image::new(height, width, codes)
+                    .map(|codes| Pixels::Rgb16Image(Arc::new(codes)))
             }
             Samples::Codes(space) => {
                 let mut codes = image.into_rgb8().into_raw();

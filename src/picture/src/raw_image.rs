@@ -6,7 +6,7 @@ mod mosaic;
 use std::borrow::Cow;
 
 use darkqa_ground::error::Error;
-use darkqa_ground::types::{Codes16, Image, Rgb};
+use darkqa_ground::types::{Image, Rgb, Rgb16Image};
 
 use self::layout::{Depth, Layout, Order};
 use self::mosaic::{RawSample, demosaic};
@@ -36,7 +36,7 @@ pub enum RawPixels {
     /// 8-bit codes.
     Codes8(Rgb),
     /// 16-bit codes.
-    Codes16(Codes16),
+    Rgb16Image(Rgb16Image),
 }
 
 impl RawPixels {
@@ -44,7 +44,7 @@ impl RawPixels {
     pub fn size(&self) -> (usize, usize) {
         match self {
             Self::Codes8(image) => (image.width(), image.height()),
-            Self::Codes16(image) => (image.width(), image.height()),
+            Self::Rgb16Image(image) => (image.width(), image.height()),
         }
     }
 
@@ -52,14 +52,14 @@ impl RawPixels {
     pub fn peak_16(&self) -> Option<u16> {
         match self {
             Self::Codes8(_) => None,
-            Self::Codes16(image) => image.samples().iter().copied().max(),
+            Self::Rgb16Image(image) => image.samples().iter().copied().max(),
         }
     }
 
     /// Scales an image of 16 bits so that `white` becomes 65535; larger codes are clipped. Images of 8 bits do not change.
     #[must_use]
     pub fn with_white(self, white: u16) -> Self {
-        let Self::Codes16(mut image) = self else {
+        let Self::Rgb16Image(mut image) = self else {
             return self;
         };
         let white = u32::from(white.max(1));
@@ -67,7 +67,7 @@ impl RawPixels {
             let scaled = (u32::from(*sample) * u32::from(u16::MAX) + white / 2) / white;
             *sample = u16::try_from(scaled).unwrap_or(u16::MAX);
         }
-        Self::Codes16(image)
+        Self::Rgb16Image(image)
     }
 
     /// The image as a lossless PNG file of its depth.
@@ -77,7 +77,7 @@ impl RawPixels {
     pub fn png(&self) -> Result<Vec<u8>, Error> {
         match self {
             Self::Codes8(image) => png(image),
-            Self::Codes16(image) => png_16(image),
+            Self::Rgb16Image(image) => png_16(image),
         }
     }
 }
@@ -94,7 +94,7 @@ impl RawImage<'_> {
             Depth::Eight => RawPixels::Codes8(self.image(layout, rows, |row, samples| {
                 samples.extend_from_slice(row);
             })?),
-            Depth::Sixteen => RawPixels::Codes16(self.image(layout, rows, |row, samples| {
+            Depth::Sixteen => RawPixels::Rgb16Image(self.image(layout, rows, |row, samples| {
                 let pairs = row.as_chunks::<2>().0.iter();
                 if self.is_big_endian {
                     samples.extend(pairs.map(|pair| u16::from_be_bytes(*pair)));
@@ -224,7 +224,7 @@ mod tests {
         assert_eq!(little.peak_16(), Some(0x1234));
         raw.is_big_endian = true;
         assert_eq!(raw.decode().unwrap().peak_16(), Some(0xff0f));
-        let RawPixels::Codes16(scaled) = little.with_white(4095) else {
+        let RawPixels::Rgb16Image(scaled) = little.with_white(4095) else {
             panic!("16 bits expected")
         };
         assert_eq!(scaled.samples()[3..], [65535; 3]);

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use darkqa_ground::types::degradations::{Axis, Kind};
 use darkqa_ground::types::{Degradation, FrameId, ReadingName, Severity};
 use darkqa_light::{
-    AppliedDegradation, AutoExposure, AutoSettings, CameraModel, CaptureState, FrameView,
-    LightReading, Motion, NoiseKey, Streak, Synthesis,
+    AppliedDegradation, AutoExposure, AutoSettings, CameraModel, CaptureState, FrameView, Motion,
+    NoiseKey, NoiseProfile, Streak, Synthesis,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -63,14 +63,14 @@ impl Settings {
             }
         };
         let reading = match profile {
-            None => LightReading::Paper,
+            None => NoiseProfile::Paper,
             Some(given) => {
                 let word = text("profile", "a str", given)?;
-                LightReading::ALL
+                NoiseProfile::ALL
                     .into_iter()
                     .find(|reading| reading.name().as_str() == word)
                     .ok_or_else(|| {
-                        let names = LightReading::ALL.map(LightReading::name);
+                        let names = NoiseProfile::ALL.map(NoiseProfile::name);
                         one_of("profile", &word, &names.each_ref().map(ReadingName::as_str))
                     })?
             }

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::types::AxisLevel;
 use darkqa_score::open::{Group, OpenCell};
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// One chart of all questions, and one with a panel per category. None if the run has fewer than two levels.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
@@ -114,7 +114,7 @@ fn curve(
 }
 
 /// Score of a model without images, which is the same at all levels; `None` without a score.
-fn flat_line(subject: &Subject, cell: &OpenCell, style: LineStyle) -> Option<PlotLine> {
+fn flat_line(subject: &ModelInCondition, cell: &OpenCell, style: LineStyle) -> Option<PlotLine> {
     Some(PlotLine {
         name: format!("{} without images", subject.model),
         style,

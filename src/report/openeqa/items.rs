@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 use super::open_report::{OpenReport, ReportedAnswer};
 use crate::error::Result;
 use crate::report::page::data::{
-    ABSENT, Distinct, FAILED, Item, PageData, PageKind, Question, SizeLimit, Subject, UNREAD,
-    levels, packed_by, shortened, sizes, thumbnails,
+    ABSENT, Distinct, FAILED, Item, ModelInCondition, PageData, PageKind, Question, SizeLimit,
+    UNREAD, levels, packed_by, shortened, sizes, thumbnails,
 };
 use crate::text::words;
 use crate::types::{AxisLevel, View};
@@ -21,7 +21,7 @@ const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was
 /// # Errors
 /// If the data cannot be written.
 pub(super) fn packed(report: &OpenReport<'_>) -> Result<String> {
-    let subjects: Vec<&subject::Subject> = report
+    let subjects: Vec<&subject::ModelInCondition> = report
         .summary
         .cells
         .iter()
@@ -44,7 +44,7 @@ struct Results<'a> {
 
 fn data<'a>(
     report: &'a OpenReport<'_>,
-    subjects: &[&'a subject::Subject],
+    subjects: &[&'a subject::ModelInCondition],
     limit: SizeLimit,
 ) -> PageData<'a> {
     let (mut frames, mut families) = (Distinct::new(), Distinct::new());
@@ -91,13 +91,17 @@ fn data<'a>(
     }
 }
 
-fn shown<'a>(own: &'a subject::Subject, all: &[&subject::Subject]) -> Subject<'a> {
+fn shown<'a>(
+    own: &'a subject::ModelInCondition,
+    all: &[&subject::ModelInCondition],
+) -> ModelInCondition<'a> {
     let clean = own.level.and_then(|_| {
-        let clean = subject::Subject::seeing(&own.model, AxisLevel::L0, &own.variant, None);
+        let clean =
+            subject::ModelInCondition::seeing(&own.model, AxisLevel::L0, &own.variant, None);
         all.iter()
             .position(|other| other.matches_up_to_group(&clean))
     });
-    Subject {
+    ModelInCondition {
         name: words::name(own),
         model: &own.model,
         condition: own.condition(),
@@ -116,8 +120,9 @@ fn shown<'a>(own: &'a subject::Subject, all: &[&subject::Subject]) -> Subject<'a
 }
 
 /// The answers, an item for each question; where several people answered, further items of the same question.
-fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&subject::Subject]) -> Results<'a> {
-    let places: BTreeMap<&subject::Subject, usize> = subjects.iter().copied().zip(0..).collect();
+fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&subject::ModelInCondition]) -> Results<'a> {
+    let places: BTreeMap<&subject::ModelInCondition, usize> =
+        subjects.iter().copied().zip(0..).collect();
     let mut cells = HashMap::<(usize, usize), Vec<&ReportedAnswer>>::new();
     for answer in report.answers {
         if let Some(&place) = places.get(&answer.subject) {

@@ -24,7 +24,7 @@ use crate::report::json;
 use crate::report::products::{PAGE, table_files};
 use crate::report::report_length::ReportLength;
 use crate::text::alert::{Alert, lines};
-use crate::text::light_readings::LightReadings;
+use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::table::Table;
 use crate::text::terminal;
 use crate::text::wrapped::wrapped;
@@ -62,8 +62,8 @@ struct Head<'a> {
     protocol: String,
     clustered_by: &'static str,
     clusters: usize,
-    /// The light readings of the noisy images.
-    readings: LightReadings,
+    /// The noise profiles of the noisy images.
+    readings: NoiseProfiles,
     alerts: &'a [Alert],
 }
 
@@ -87,7 +87,7 @@ pub(crate) fn summary_json(
         protocol: report.protocol.to_string(),
         clustered_by: report.summary.unit,
         clusters: report.summary.clusters,
-        readings: report.light_readings(),
+        readings: report.noise_profiles(),
         alerts: report.alerts,
     };
     json::document(head, &tables[0], tables, length)
@@ -103,7 +103,7 @@ pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folders: &[&Path
         Some(_) => text += &terminal::render(tables),
         None => text += "No answer is marked: name a judge with --judge NAME\n",
     }
-    let open = report.light_readings().open_question();
+    let open = report.noise_profiles().open_question();
     for line in coverage(report).into_iter().chain(open) {
         text += &wrapped("", &line, " ");
     }

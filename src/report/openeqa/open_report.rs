@@ -2,12 +2,12 @@
 
 use crate::tables::EnhancerRow;
 use crate::text::alert::Alert;
-use crate::text::light_readings::LightReadings;
+use crate::text::noise_profiles::NoiseProfiles;
 use crate::types::manifests::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
 use darkqa_score::choice::llm_match::Protocol;
 use darkqa_score::open::{AnswerOutcome, OpenSummary};
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// Everything that a report on open questions shows.
 #[derive(Debug, Clone)]
@@ -44,16 +44,16 @@ impl OpenReport<'_> {
             .collect()
     }
 
-    /// The light readings of the noisy images.
-    pub(super) fn light_readings(&self) -> LightReadings {
-        LightReadings::new(self.answers.iter().map(|answer| &answer.subject))
+    /// The noise profiles of the noisy images.
+    pub(super) fn noise_profiles(&self) -> NoiseProfiles {
+        NoiseProfiles::new(self.answers.iter().map(|answer| &answer.subject))
     }
 }
 
 /// One answer of one subject to one question.
 #[derive(Debug, Clone)]
 pub(crate) struct ReportedAnswer {
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Index of the question in the report.
     pub question: usize,
     /// The full text of the answer; `None` if there is none.

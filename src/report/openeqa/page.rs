@@ -89,6 +89,6 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
         ),
         coverage(report).join("; ") + ".",
     ];
-    lines.extend(report.light_readings().open_question());
+    lines.extend(report.noise_profiles().open_question());
     lines
 }

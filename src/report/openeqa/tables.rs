@@ -12,7 +12,7 @@ use crate::text::words::ends;
 use crate::types::degradations::Axis;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::open::{Baseline, Group, OpenCell, OpenSummary};
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// Name of the page section that has all tables.
 pub(super) const SECTION: &str = "scores";
@@ -200,7 +200,8 @@ fn by_group(
     }
     if !whole.without_level.is_empty() {
         builder = builder.column(Accuracy, "terminal blind", |(_, (_, ladder))| {
-            let is_same = |(subject, _): &&(&Subject, &OpenCell)| subject.model == series.model;
+            let is_same =
+                |(subject, _): &&(&ModelInCondition, &OpenCell)| subject.model == series.model;
             let mut without_level = ladder.without_level.iter();
             let cell_of_model = without_level.find(is_same).or(ladder.without_level.first());
             score(summary, cell_of_model.map(|(_, cell)| *cell))

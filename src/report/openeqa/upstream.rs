@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::open_report::{OpenReport, ReportedAnswer};
 use crate::error::{Error, Result};
 use darkqa_score::open::AnswerOutcome;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// Folder of these files in a run.
 const FOLDER: &str = "upstream";
@@ -27,7 +27,8 @@ struct GivenAnswer<'a> {
 /// Missing answers and marks are left out. A subject with several answers to one question has no such files, because the format
 /// has one answer per question.
 pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut by_subject = BTreeMap::<&Subject, BTreeMap<usize, Vec<&ReportedAnswer>>>::new();
+    let mut by_subject =
+        BTreeMap::<&ModelInCondition, BTreeMap<usize, Vec<&ReportedAnswer>>>::new();
     for reported in report.answers {
         if reported.outcome != AnswerOutcome::Missing {
             let questions = by_subject.entry(&reported.subject).or_default();

@@ -70,7 +70,7 @@ pub(in crate::report) struct PageData<'a> {
     pub(in crate::report) frames: Vec<&'a str>,
     /// Width and height of each frame of which there are small copies, in pixels.
     pub(in crate::report) sizes: Vec<Option<[u32; 2]>>,
-    pub(in crate::report) subjects: Vec<Subject<'a>>,
+    pub(in crate::report) subjects: Vec<ModelInCondition<'a>>,
     pub(in crate::report) questions: Vec<Question<'a>>,
     pub(in crate::report) choices: Vec<&'a [String]>,
     pub(in crate::report) items: Vec<Item>,
@@ -87,7 +87,7 @@ pub(in crate::report) struct PageData<'a> {
 }
 
 #[derive(Serialize)]
-pub(in crate::report) struct Subject<'a> {
+pub(in crate::report) struct ModelInCondition<'a> {
     pub(in crate::report) name: String,
     pub(in crate::report) model: &'a str,
     pub(in crate::report) condition: String,

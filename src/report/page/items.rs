@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use super::data::{
-    ABSENT, Confusion, Distinct, FAILED, Item, PageData, PageKind, Question, SizeLimit, Subject,
-    UNREAD, levels, packed_by, shortened, sizes, thumbnails,
+    ABSENT, Confusion, Distinct, FAILED, Item, ModelInCondition, PageData, PageKind, Question,
+    SizeLimit, UNREAD, levels, packed_by, shortened, sizes, thumbnails,
 };
 use super::inputs::PageInputs;
 use super::sample::sample;
@@ -123,8 +123,8 @@ fn code(result: TrialResult, mode: ReadingMode) -> u8 {
     }
 }
 
-fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
-    let subject = |subject: &'a darkqa_score::subject::Subject| Subject {
+fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<ModelInCondition<'a>> {
+    let subject = |subject: &'a darkqa_score::subject::ModelInCondition| ModelInCondition {
         name: crate::text::words::name(subject),
         model: &subject.model,
         condition: subject.condition(),
@@ -144,9 +144,14 @@ fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<Subject<'a>> {
 }
 
 /// Index of the subject of the clean frames of a subject with images.
-fn clean(grid: &Grid<'_>, of: &darkqa_score::subject::Subject) -> Option<usize> {
+fn clean(grid: &Grid<'_>, of: &darkqa_score::subject::ModelInCondition) -> Option<usize> {
     of.level?;
-    let clean = darkqa_score::subject::Subject::seeing(&of.model, AxisLevel::L0, &of.variant, None);
+    let clean = darkqa_score::subject::ModelInCondition::seeing(
+        &of.model,
+        AxisLevel::L0,
+        &of.variant,
+        None,
+    );
     grid.stand_in(&clean)
 }
 

@@ -31,7 +31,7 @@ use crate::report::template::filled;
 use crate::sentences::{Sentence, how_to_read};
 use crate::tables::{SECTIONS, Section};
 use crate::text::alert::Alert;
-use crate::text::light_readings::LightReadings;
+use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::table::Table;
 use crate::types::Truths;
 use crate::types::flags::spelled_setting;
@@ -274,7 +274,7 @@ fn title(who: &str, inputs: &PageInputs<'_>) -> String {
 fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
     let grid = &report.findings.grid;
     let size = format!("{} (95 %) · strict parsing", head(report));
-    let readings = LightReadings::new(&grid.subjects);
+    let readings = NoiseProfiles::new(&grid.subjects);
     std::iter::once(size)
         .chain(readings.open_question())
         .collect()

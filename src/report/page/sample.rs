@@ -83,8 +83,12 @@ fn fates(grid: &Grid<'_>) -> Vec<Fate> {
         let fate = if base.enhancer.take().is_some() {
             [Fate::Harmed, Fate::Rescued]
         } else {
-            base =
-                darkqa_score::subject::Subject::seeing(&of.model, AxisLevel::L0, &of.variant, None);
+            base = darkqa_score::subject::ModelInCondition::seeing(
+                &of.model,
+                AxisLevel::L0,
+                &of.variant,
+                None,
+            );
             [Fate::Lost, Fate::Stable]
         };
         let Some(base) = grid.stand_in(&base) else {

@@ -7,10 +7,10 @@ use serde::Serialize;
 use super::inputs::PageInputs;
 use crate::error::Result;
 use crate::text::words::light;
-use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, KindReading, Thumbnail};
+use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::{Grid, TrialResult};
-use darkqa_score::subject::{Subject, pooled_models};
+use darkqa_score::subject::{ModelInCondition, pooled_models};
 
 /// Most models whose answers stand on an image, and most rows; chosen for one screen.
 const MAX_MODELS: usize = 3;
@@ -50,7 +50,7 @@ struct Answer {
 
 /// One row of images: a variant, raw or with an enhancer.
 struct Row<'a> {
-    variant: KindReading,
+    variant: Variant,
     enhancer: Option<&'a EnhancerName>,
 }
 
@@ -186,7 +186,7 @@ fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
     let Some(main) = grid.main_variant() else {
         return Vec::new();
     };
-    let shown: BTreeSet<(KindReading, Option<&EnhancerName>)> = thumbnails
+    let shown: BTreeSet<(Variant, Option<&EnhancerName>)> = thumbnails
         .iter()
         .map(|thumbnail| {
             let condition = &thumbnail.condition;
@@ -237,7 +237,7 @@ struct Seen<'a> {
 impl Seen<'_> {
     /// The result, with an enhancer of the row or without; `None` if the grid has no such subject.
     fn result(self, enhancer: Option<&EnhancerName>) -> Option<TrialResult> {
-        let subject = Subject::seeing(self.model, self.level, &self.row.variant, enhancer);
+        let subject = ModelInCondition::seeing(self.model, self.level, &self.row.variant, enhancer);
         Some(self.grid.result(self.grid.stand_in(&subject)?, self.item))
     }
 

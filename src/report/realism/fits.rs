@@ -12,7 +12,7 @@ use darkqa_score::photographs::realism::mean::Mean;
 pub(crate) const AS_SAVED: &str =
     "as saved; a smaller K than the sensor's means that noise was averaged away";
 
-/// The table of the gains over pairs, a row for each light reading.
+/// The table of the gains over pairs, a row for each noise profile.
 pub(super) fn table(fits: &[ReadingFit]) -> String {
     let range = |gains: &PooledGain| {
         let [low, high] = gains.range.map(number);
@@ -61,7 +61,7 @@ fn mean(fit: &ReadingFit, gains: &PooledGain, factor: f64) -> String {
         .join(", ")
 }
 
-/// A line of text for each pair and each light reading.
+/// A line of text for each pair and each noise profile.
 pub(super) fn by_pair(fits: &[ReadingFit]) -> impl Iterator<Item = String> {
     fits.iter()
         .flat_map(|fit| fit.pairs.iter().map(|pair| line(fit, pair)))
@@ -95,7 +95,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// CSV file with a row for each pair and each light reading.
+/// CSV file with a row for each pair and each noise profile.
 pub(crate) fn csv(fits: &[ReadingFit]) -> Result<Vec<u8>> {
     let rows = fits
         .iter()

@@ -33,9 +33,9 @@ pub(crate) struct RealismSummary {
     /// Mean exposure drop in EV.
     drop: Mean,
     exposure: MethodRow,
-    /// A row for each light reading and camera.
+    /// A row for each noise profile and camera.
     noise: Vec<NoiseRow>,
-    /// Fitted gains by light reading; empty without `--fit`.
+    /// Fitted gains by noise profile; empty without `--fit`.
     fits: Vec<ReadingFit>,
     /// A line of text for each pair.
     #[serde(skip)]
@@ -65,7 +65,7 @@ impl ResidualRules {
 pub(crate) struct ComparedData {
     /// Seed of the noise.
     pub seed: u64,
-    /// Settings of the synthesis, by light reading.
+    /// Settings of the synthesis, by noise profile.
     pub synthesis: serde_json::Value,
     /// Number of images without a partner.
     pub unmatched: usize,

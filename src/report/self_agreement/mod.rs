@@ -22,7 +22,7 @@ use crate::report::report_length::ReportLength;
 use crate::report::short::who_is_judged;
 use crate::sentences::Sentence;
 use crate::text::alert::Alert;
-use crate::text::light_readings::LightReadings;
+use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::table::Table;
 use crate::text::words::counted;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
@@ -72,7 +72,7 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
         found.grid.subjects.len(),
         found.grid.clusters
     );
-    let readings = LightReadings::new(&found.grid.subjects);
+    let readings = NoiseProfiles::new(&found.grid.subjects);
     std::iter::once(facts)
         .chain(readings.open_question())
         .collect()
@@ -108,7 +108,7 @@ struct Head<'a> {
     #[serde(flatten)]
     runs: RunsHead<'a>,
     measure: &'static str,
-    readings: LightReadings,
+    readings: NoiseProfiles,
     alerts: &'a [Alert],
     findings: &'a [Sentence],
     /// The rows of `own_answers.csv`.
@@ -129,7 +129,7 @@ pub(crate) fn summary(
     let head = Head {
         runs: runs.head("darkqa.self-agreement/1"),
         measure: AGREEMENT,
-        readings: LightReadings::new(&report.found.grid.subjects),
+        readings: NoiseProfiles::new(&report.found.grid.subjects),
         alerts: &report.alerts,
         findings: &report.sentences,
         own_answers: own_answers.map(Rows::new),

@@ -9,7 +9,7 @@ use crate::text::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share,
 use crate::text::table::SUMMARY;
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{counted, light};
-use crate::types::LightGroup;
+use crate::types::RunGroup;
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
@@ -69,7 +69,7 @@ fn mode(mode: ReadingMode) -> &'static str {
 }
 
 fn group(cell: &AgreementCell) -> Option<&str> {
-    cell.subject.variant.group.as_ref().map(LightGroup::name)
+    cell.subject.variant.group.as_ref().map(RunGroup::name)
 }
 
 /// Number of replies in which no answer could be read.

@@ -9,7 +9,7 @@ use super::measure::HOW_TO_READ;
 use crate::report::finding_groups::FindingGroups;
 use crate::report::report_length::ReportLength;
 use crate::report::short::findings::findings;
-use crate::text::light_readings::LightReadings;
+use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::terminal::{render, table};
 use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
@@ -30,7 +30,7 @@ pub(crate) fn text(
         ReportLength::Summary => text += &short_tables(report),
         ReportLength::Full => text += &render(&report.tables),
     }
-    let readings = LightReadings::new(&report.found.grid.subjects);
+    let readings = NoiseProfiles::new(&report.found.grid.subjects);
     let open = readings.open_question();
     text += &open.map_or_else(String::new, |open| wrapped(" ", &open, " "));
     for (_, folder) in runs {

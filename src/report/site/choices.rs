@@ -6,14 +6,14 @@ use crate::tables::level_words as why;
 use crate::text::table::ColumnKind::{Count, Points, Share, Text, Threshold};
 use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::text::words::points;
-use crate::types::{AxisLevel, KindReading, View};
+use crate::types::{AxisLevel, Variant, View};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::{Comparison, ComparisonKind, RankRange};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::{Subject, is_reference};
+use darkqa_score::subject::{ModelInCondition, is_reference};
 use darkqa_score::threshold::{NoThreshold, Threshold as EvThreshold};
 
 /// A model of a run.
@@ -81,7 +81,7 @@ impl ChoiceRow {
 /// A row for each model with images of a run, in the kind of degradation that its report leads with. All numbers are those of its report.
 pub(crate) fn choice_rows(
     findings: &Findings<'_>,
-    variant: &KindReading,
+    variant: &Variant,
     run: &RunLink,
 ) -> Vec<ChoiceRow> {
     let seeing = findings
@@ -101,9 +101,14 @@ pub(crate) fn choice_rows(
         .collect()
 }
 
-fn row(findings: &Findings<'_>, variant: &KindReading, model: &str, run: &RunLink) -> ChoiceRow {
+fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -> ChoiceRow {
     let grid = &findings.grid;
-    let clean = grid.stand_in(&Subject::seeing(model, AxisLevel::L0, variant, None));
+    let clean = grid.stand_in(&ModelInCondition::seeing(
+        model,
+        AxisLevel::L0,
+        variant,
+        None,
+    ));
     let clean = clean.and_then(|index| {
         let summary = &findings.summary;
         let cell = summary.cell(&grid.subjects[index], None, ReadingMode::Strict)?;

@@ -52,7 +52,7 @@ pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Id
     Ok(fields.chain(light(config)).collect())
 }
 
-/// The settings of each light reading and of each further variant, and the version of the synthesis.
+/// The settings of each noise profile and of each further variant, and the version of the synthesis.
 fn light(config: &Evaluation) -> impl Iterator<Item = (String, Value)> {
     let job = &config.job;
     let recipe = Recipe::lossless(&job.light.kinds, &[]);

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use crate::dataset::Dataset;
 use crate::report::power::PowerForecast;
 use crate::types::degradations::Kind;
-use crate::types::{Condition, KindReading, Question};
+use crate::types::{Condition, Question, Variant};
 use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::tested_sentences::AskedSets;
 
@@ -44,7 +44,7 @@ pub(super) fn power(
 
 /// The sets of trials in these conditions.
 pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> AskedSets {
-    let variants: BTreeSet<KindReading> = conditions.iter().map(Condition::kind_reading).collect();
+    let variants: BTreeSet<Variant> = conditions.iter().map(Condition::kind_reading).collect();
     let last = variants.iter().filter_map(|variant| variant.kind).max();
     let lights = variants.iter().filter(|variant| variant.kind == last);
     let base = last.and_then(Kind::base);

@@ -329,7 +329,7 @@ pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<T
     match parse(channel, bytes)?.image {
         MessageImage::Raw(image) => match image.decode()?.with_white(white) {
             RawPixels::Codes8(image) => Ok(Thumbnail::new(&image)),
-            RawPixels::Codes16(image) => {
+            RawPixels::Rgb16Image(image) => {
                 let high = image
                     .samples()
                     .iter()

@@ -51,7 +51,7 @@ pub(super) fn compare(
     (works, failed)
 }
 
-/// The ways of making noise for a pair: each light reading with the given camera, and with the fitted one.
+/// The ways of making noise for a pair: each noise profile with the given camera, and with the fitted one.
 fn methods(
     sensor: &SensorSettings,
     fits: &[ReadingFit],

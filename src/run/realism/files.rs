@@ -56,7 +56,7 @@ fn pooled(works: &[PairWork]) -> PooledResiduals {
     }
 }
 
-/// Writes the fitted gains of each pair, and a camera file for each light reading with fitted pairs. `fitted.toml` is the only
+/// Writes the fitted gains of each pair, and a camera file for each noise profile with fitted pairs. `fitted.toml` is the only
 /// one; of several, each has the name of its reading.
 pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ReadingFit]) -> Result<()> {
     if fits.is_empty() {
@@ -98,7 +98,7 @@ fn camera_file(synthesis: &Synthesis, fit: &ReadingFit, gains: &PooledGain) -> R
     );
     let mut comments = vec![
         format!(
-            "The sensor {base} with its gain K fitted to the noise of real images under the light reading {}, {}.",
+            "The sensor {base} with its gain K fitted to the noise of real images under the noise profile {}, {}.",
             fit.reading,
             report::AS_SAVED
         ),

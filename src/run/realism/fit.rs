@@ -13,7 +13,7 @@ use darkqa_score::photographs::realism::gain::{
 };
 use darkqa_score::photographs::realism::smooth::SmoothBlocks;
 
-/// The fits of all pairs, light reading by light reading. A pair that cannot be read is logged and left out.
+/// The fits of all pairs, noise profile by noise profile. A pair that cannot be read is logged and left out.
 ///
 /// # Errors
 /// If the camera takes none of the gains of the fit.
@@ -45,7 +45,7 @@ pub(super) fn fit(
     Ok(by_reading.collect())
 }
 
-/// A light reading with the camera in the middle of its ranges, at each gain of the ladder.
+/// A noise profile with the camera in the middle of its ranges, at each gain of the ladder.
 struct FitReading {
     name: ReadingName,
     ladder: [Synthesis; LADDER_STEPS],
@@ -83,7 +83,7 @@ fn fixed_state(synthesis: &Synthesis, drop_ev: f64) -> CameraState {
     synthesis.state_by(&NoiseKey::new(0, &FrameId(String::new())), drop_ev)
 }
 
-/// The fits to one pair, one for each light reading.
+/// The fits to one pair, one for each noise profile.
 fn fit_pair(
     seed: u64,
     readings: &[FitReading],
@@ -113,7 +113,7 @@ fn fit_pair(
         .collect()
 }
 
-/// The camera of a light reading with its gain drawn from a fitted range, and with the ratio of the fit.
+/// The camera of a noise profile with its gain drawn from a fitted range, and with the ratio of the fit.
 ///
 /// # Errors
 /// If the camera does not take the range or the ratio.

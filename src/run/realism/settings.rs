@@ -32,7 +32,7 @@ pub(crate) struct RealismArgs {
     /// The exposure drop of every pair in EV, -20 to 20; default: estimated for each from its mean light
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = drop_ev, add = Decides::Pixels)]
     pub ev: Option<f32>,
-    /// Fit the sensor's gain K to the noise of each pair, in each light reading, and compare the fitted camera too
+    /// Fit the sensor's gain K to the noise of each pair, in each noise profile, and compare the fitted camera too
     ///
     /// The gain is the one whose noise has the spread of the low-light image in blocks that are smooth in normal light, as saved: a
     /// smaller K than the sensor's means that noise was averaged away. paper and eld take the middle of the camera's r, or --noise ratio,

@@ -18,7 +18,7 @@ use crate::runs::rebuild::ImageRebuilder;
 use crate::runs::run_parts::choice_run;
 use crate::types::degradations::Kind;
 use crate::types::manifests::{RunManifest, Status};
-use crate::types::{AxisLevel, Condition, KindReading, Record, Rgb, TrialOutcome};
+use crate::types::{AxisLevel, Condition, Record, Rgb, TrialOutcome, Variant};
 use darkqa_score::subject::is_control;
 
 /// Draws the picture and writes it. The outcome states which conditions are left out, and which images are not those that were sent.
@@ -168,7 +168,7 @@ impl SheetItem {
                     let variant = condition.kind_reading();
                     condition.level() == *level
                         && condition.enhancer.as_ref() == enhancer
-                        && (variant == self.curves.variant || variant == KindReading::NONE)
+                        && (variant == self.curves.variant || variant == Variant::NONE)
                 };
                 self.asked().find(fits).cloned()
             });

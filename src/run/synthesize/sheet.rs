@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::images::frame_work::FrameWork;
 use crate::images::stored::ImageOrigin;
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{AxisLevel, Degradation, FrameId, KindReading, Rgb, Severity};
+use crate::types::{AxisLevel, Degradation, FrameId, Rgb, Severity, Variant};
 use darkqa_light::raw::noise::{self, Term};
 use darkqa_light::raw::{Bayer, unprocess_up_to};
 use darkqa_light::{Coupling, Draws, LightSettings, NoiseKey, Synthesis, version};
@@ -51,7 +51,7 @@ pub(super) struct SheetRecipe {
     images: Vec<String>,
     /// The versions of all kinds of degradation.
     synthesis: Vec<u32>,
-    /// The settings of the kinds: seed, light readings, automatic exposure and motion.
+    /// The settings of the kinds: seed, noise profiles, automatic exposure and motion.
     light: Value,
 }
 
@@ -93,7 +93,7 @@ impl Sheet {
     }
 }
 
-/// Describes how the images were made: camera and seed, gain and light ratio in each light reading, and the flags of further variants.
+/// Describes how the images were made: camera and seed, gain and light ratio in each noise profile, and the flags of further variants.
 fn foot(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) -> String {
     let has = |test: fn(Kind) -> bool| degradations.iter().any(|how| test(how.kind()));
     let mut facts = Vec::new();
@@ -150,9 +150,9 @@ fn levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
     let mut blocks = Vec::new();
     for axis in Axis::ALL {
         let on_axis = degradations.iter().filter(|how| how.kind().axis() == axis);
-        let mut of_rows: Vec<(KindReading, Vec<&Degradation>)> = Vec::new();
+        let mut of_rows: Vec<(Variant, Vec<&Degradation>)> = Vec::new();
         for how in on_axis {
-            let row = KindReading::from(Some(how));
+            let row = Variant::from(Some(how));
             match of_rows.iter_mut().find(|(other, _)| *other == row) {
                 Some((_, all)) => all.push(how),
                 None => of_rows.push((row, vec![how])),

@@ -15,7 +15,7 @@ use darkqa_score::answers::record::Detail;
 /// 255 · 2^(−EV/2.2) = 8 there.
 const FEW_CODES: u16 = 1100;
 
-/// The light readings whose levels all have the same signal-to-noise ratio, where a run has several levels with noise.
+/// The noise profiles whose levels all have the same signal-to-noise ratio, where a run has several levels with noise.
 pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut of_draws = BTreeMap::<&str, BTreeSet<&str>>::new();
     for run in &joined.runs {
@@ -48,7 +48,7 @@ pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     }).collect()
 }
 
-/// In which way the levels of a light reading have the same noise, if its light ratio r does not depend on the level.
+/// In which way the levels of a noise profile have the same noise, if its light ratio r does not depend on the level.
 fn same_noise(reading: &Value) -> &'static str {
     if reading["--draws"] == "shared" {
         "the levels are one noisy image at several brightnesses"

@@ -116,12 +116,12 @@ pub(super) fn people_alerts(combined: &Combined) -> Vec<Alert> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darkqa_score::subject::Subject;
+    use darkqa_score::subject::ModelInCondition;
 
     #[test]
     fn one_condition_that_cannot_be_read_is_named() {
         let health = |condition: &str, read: usize| Health {
-            subject: Subject::new("m", Some(&condition.parse().unwrap())),
+            subject: ModelInCondition::new("m", Some(&condition.parse().unwrap())),
             replies: 100,
             read,
             lenient_only: 100 - read,

@@ -12,7 +12,7 @@ use crate::run_reports::settings::{Settings, differing, identity, pixels, short,
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::StoredRun;
 use crate::types::manifests::RunManifest;
-use crate::types::{AxisLevel, Digest, KindReading, OpenDetail, RunQuestion};
+use crate::types::{AxisLevel, Digest, OpenDetail, RunQuestion, Variant};
 
 /// The field of an identity with the digest of the words around the questions.
 const PROMPTS: &str = "--prompts";
@@ -46,7 +46,7 @@ impl GroupKey {
     ///
     /// # Errors
     /// If a setting cannot be written.
-    pub(super) fn from_choices(combined: &Combined, variant: &KindReading) -> Result<Self> {
+    pub(super) fn from_choices(combined: &Combined, variant: &Variant) -> Result<Self> {
         let manifest = &combined.runs[0].manifest;
         let mut levels = BTreeSet::new();
         let mut images = HashMap::<_, BTreeSet<Digest>>::new();

@@ -18,7 +18,7 @@ use crate::report::products::{PAGE, products};
 use crate::report::site::{GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows};
 use crate::runs::stored::{AnyRun, StoredRun};
 use crate::types::manifests::RunManifest;
-use crate::types::{ChoiceDetail, KindReading, OpenDetail, Trials, Truths};
+use crate::types::{ChoiceDetail, OpenDetail, Trials, Truths, Variant};
 
 use group::{GroupKey, grouped};
 use member::ChoiceMember;
@@ -123,7 +123,7 @@ fn add_choices(
         .with_enhancers(&enhancers::rows(&combined.runs));
     let page = page_of(products(&report, &combined.shown())?)?;
     let variant = findings.shown().grid.main_variant();
-    let variant = variant.unwrap_or(KindReading::NONE);
+    let variant = variant.unwrap_or(Variant::NONE);
     let rows = choice_rows(findings.shown(), &variant, &link);
     if rows.is_empty() {
         let why = "no model was shown an image";
@@ -145,7 +145,7 @@ fn add_choices(
 }
 
 /// The trials that models are compared by: of raw images at L0 and in the main variant.
-fn compared_trials(combined: &Combined, variant: &KindReading) -> Trials<ChoiceDetail> {
+fn compared_trials(combined: &Combined, variant: &Variant) -> Trials<ChoiceDetail> {
     let trials = combined.trials.iter().filter(|trial| {
         trial.condition().is_some_and(|condition| {
             let own = condition.kind_reading();

@@ -70,7 +70,7 @@ fn run_from_parts<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<StoredR
         folder: folder.to_owned(),
         layout: RunLayout::Parts,
         texts: RunTexts::Parts(texts?),
-        thumbnails: store::more_thumbnails(&[], &folders, |frame| wanted.wants(frame)),
+        thumbnails: store::missing_thumbnails(&[], &folders, |frame| wanted.wants(frame)),
         fidelity: store::more_fidelity(&[], &folders, |_| true),
         left_out: Trials::default(),
         manifest: parts.manifest,

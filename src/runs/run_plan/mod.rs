@@ -83,7 +83,7 @@ impl RunPlan {
     /// # Errors
     /// Names the setting that differs.
     pub(crate) fn check_identity(&self, run: &Identity) -> Result<()> {
-        // A flag is said before what it is made of: the variant before the light readings that it has.
+        // A flag is said before what it is made of: the variant before the noise profiles that it has.
         let differences = differences(&self.identity, run);
         match differences.min_by_key(|(field, ..)| field.contains(" of the ")) {
             None => Ok(()),

@@ -299,7 +299,7 @@ impl Room {
             rgb: view.pixels.codes(),
             light: match view.pixels {
                 Pixels::Light(light) => Some(light),
-                Pixels::Codes8(_) | Pixels::Codes16(_) => None,
+                Pixels::Codes8(_) | Pixels::Rgb16Image(_) => None,
             },
             depth: view.depth,
             things: view.things,

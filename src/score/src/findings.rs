@@ -19,9 +19,9 @@ use super::observed::ObserverSummary;
 use super::photographs::pair_darkness::{self, PairDarkness};
 use super::photographs::{FidelityFindings, PhotographedSet};
 use super::significance::Significance;
-use super::subject::{Subject, is_control, is_observer};
+use super::subject::{ModelInCondition, is_control, is_observer};
 use darkqa_ground::types::{
-    ChoiceDetail, Family, ImageFidelity, KindReading, ModelListing, RunQuestion, Trials,
+    ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials, Variant,
 };
 
 /// All results that are computed from the trials of a run.
@@ -41,7 +41,7 @@ pub struct Findings<'a> {
     pub averaged: Vec<PooledFinding>,
     /// Models that the pooled findings leave out, because they answered less than others.
     pub left_out: Vec<ModelsLeftOut>,
-    /// Whether each finding about noise holds under every light reading; empty with one reading.
+    /// Whether each finding about noise holds under every noise profile; empty with one reading.
     pub by_reading: Vec<FindingByReading>,
     /// The models by their mean accuracy in the dark, if there are two or more.
     pub best: Option<BestInTheDark>,
@@ -236,7 +236,7 @@ impl<'a> Findings<'a> {
     /// The models that findings about a variant are about: those with images, without people and without those that answered less than
     /// others there, sorted.
     #[must_use]
-    pub fn models_of(&self, variant: &KindReading) -> Vec<&str> {
+    pub fn models_of(&self, variant: &Variant) -> Vec<&str> {
         let mut models = pool(&self.grid);
         let apart: Vec<&String> = self
             .left_out
@@ -253,7 +253,7 @@ impl<'a> Findings<'a> {
     /// The blind models that are significantly more accurate than a subject: the subject's own model, or any if that one was not asked
     /// without images. The test is paired, with Holm's correction over the conditions of the two models.
     #[must_use]
-    pub fn below_blind(&self, subject: &Subject, family: Option<&Family>) -> Vec<&str> {
+    pub fn below_blind(&self, subject: &ModelInCondition, family: Option<&Family>) -> Vec<&str> {
         self.comparisons
             .iter()
             .filter(|comparison| {

@@ -5,11 +5,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use super::choice::ReadingMode;
 use super::cluster::Clusters;
 use super::estimate::ClusterCount;
-use super::subject::Subject;
+use super::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{
-    AnswerReading, AskedItem, ChoiceDetail, Family, KindReading, ModelListing, TrialOutcome,
-    TrialRef, Trials,
+    AnswerReading, AskedItem, ChoiceDetail, Family, ModelListing, TrialOutcome, TrialRef, Trials,
+    Variant,
 };
 
 /// Marks a missing index.
@@ -82,7 +82,7 @@ impl GridItem<'_> {
 #[derive(Debug)]
 pub struct Grid<'a> {
     /// Subjects (model and condition), in the order of the models in `listing`, then sorted.
-    pub subjects: Vec<Subject>,
+    pub subjects: Vec<ModelInCondition>,
     /// Order, groups and labels of the models.
     pub listing: ModelListing,
     /// Items, sorted by frame, question, repeat and choices.
@@ -92,7 +92,7 @@ pub struct Grid<'a> {
     /// Results of all items for the first subject, then for the next one, and so on.
     results: Vec<TrialResult>,
     /// Index of each subject.
-    indices: BTreeMap<Subject, usize>,
+    indices: BTreeMap<ModelInCondition, usize>,
     trials: &'a Trials<ChoiceDetail>,
     /// Index in `trials` of the trial of each result; [`NO_INDEX`] if the item was not asked.
     places: Vec<u32>,
@@ -140,20 +140,21 @@ impl<'a> Grid<'a> {
             let has_cluster = clusters.get(&item.frame, &item.question).is_some();
             has_cluster && is_shown(item, model)
         });
-        let subject_by_asked: Vec<Option<Subject>> = trials
+        let subject_by_asked: Vec<Option<ModelInCondition>> = trials
             .asked()
             .into_iter()
             .zip(scope.asked)
             .map(|(asked, is_in_scope)| {
                 let (model, condition) = asked.filter(|_| is_in_scope)?;
-                Some(Subject::new(model, condition))
+                Some(ModelInCondition::new(model, condition))
             })
             .collect();
-        let sorted: BTreeSet<&Subject> = subject_by_asked.iter().flatten().collect();
-        let mut subjects: Vec<Subject> = sorted.into_iter().cloned().collect();
+        let sorted: BTreeSet<&ModelInCondition> = subject_by_asked.iter().flatten().collect();
+        let mut subjects: Vec<ModelInCondition> = sorted.into_iter().cloned().collect();
         // The sort is stable, so the subjects of a model stay sorted.
         subjects.sort_by_cached_key(|subject| listing.place(&subject.model));
-        let indices: BTreeMap<Subject, usize> = subjects.iter().cloned().zip(0..).collect();
+        let indices: BTreeMap<ModelInCondition, usize> =
+            subjects.iter().cloned().zip(0..).collect();
         let index_by_asked: Vec<Option<usize>> = subject_by_asked
             .iter()
             .map(|subject| indices.get(subject.as_ref()?).copied())
@@ -230,13 +231,13 @@ impl<'a> Grid<'a> {
 
     /// Index of a subject; `None` if the grid does not contain it.
     #[must_use]
-    pub fn find(&self, subject: &Subject) -> Option<usize> {
+    pub fn find(&self, subject: &ModelInCondition) -> Option<usize> {
         self.indices.get(subject).copied()
     }
 
-    /// All variants of the subjects, sorted: each kind of degradation in each light reading.
+    /// All variants of the subjects, sorted: each kind of degradation in each noise profile.
     #[must_use]
-    pub fn variants(&self) -> BTreeSet<&KindReading> {
+    pub fn variants(&self) -> BTreeSet<&Variant> {
         self.subjects
             .iter()
             .map(|subject| &subject.variant)
@@ -245,9 +246,9 @@ impl<'a> Grid<'a> {
     }
 
     /// The variant to show if only one can be shown. Among the first kind of degradation and the kinds that extend it, this is the last
-    /// kind, in its first light reading. Noise therefore remains the main variant if other kinds are asked as well.
+    /// kind, in its first noise profile. Noise therefore remains the main variant if other kinds are asked as well.
     #[must_use]
-    pub fn main_variant(&self) -> Option<KindReading> {
+    pub fn main_variant(&self) -> Option<Variant> {
         let variants = self.variants();
         let root = variants.first()?.kind.map(Kind::root);
         let kind = variants
@@ -264,7 +265,7 @@ impl<'a> Grid<'a> {
     /// Index of a subject or, if the grid does not contain it, of the first subject that differs only in its group of runs and whose
     /// group overlaps. `None` if the grid contains neither.
     #[must_use]
-    pub fn stand_in(&self, subject: &Subject) -> Option<usize> {
+    pub fn stand_in(&self, subject: &ModelInCondition) -> Option<usize> {
         self.find(subject).or_else(|| {
             self.subjects
                 .iter()

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::cluster::Clusters;
 use super::estimate::Estimate;
-use super::subject::{Subject, is_control, is_observer};
+use super::subject::{ModelInCondition, is_control, is_observer};
 use darkqa_ground::types::replies::OBSERVER;
 use darkqa_ground::types::{
     AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef,
@@ -15,7 +15,7 @@ use darkqa_ground::types::{
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObserverCell {
     /// The observer or the control, and the condition.
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Expected score: 1 for a right answer from evidence, 1 / k for a guess among k choices.
     pub score: Estimate,
     /// Score of guessing every answer.
@@ -70,11 +70,13 @@ impl ObserverSummary {
     #[must_use]
     pub fn new(trials: &Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
         // The later of two trials for the same item counts.
-        let mut items = BTreeMap::<Subject, BTreeMap<ItemKey<'_>, TrialRef<'_>>>::new();
+        let mut items = BTreeMap::<ModelInCondition, BTreeMap<ItemKey<'_>, TrialRef<'_>>>::new();
         for trial in trials.iter() {
             if trial.observed().is_some() {
                 let key = trial.item().key();
-                let subject = items.entry(Subject::from_trial(trial)).or_default();
+                let subject = items
+                    .entry(ModelInCondition::from_trial(trial))
+                    .or_default();
                 subject.insert(key, trial);
             }
         }
@@ -88,9 +90,9 @@ impl ObserverSummary {
             }
             cells.extend(cell(subject.clone(), &trials, clusters));
         }
-        let controls = by_control
-            .into_iter()
-            .filter_map(|(model, trials)| cell(Subject::new(model, None), &trials, clusters));
+        let controls = by_control.into_iter().filter_map(|(model, trials)| {
+            cell(ModelInCondition::new(model, None), &trials, clusters)
+        });
         Self {
             controls: controls.collect(),
             cells,
@@ -150,7 +152,7 @@ impl ObserverSummary {
             .map(Control::model_name)
             .flat_map(|name| [format!("{name}{run}"), name])
             .find_map(|model| {
-                let subject = Subject {
+                let subject = ModelInCondition {
                     model,
                     ..cell.subject.clone()
                 };
@@ -163,7 +165,11 @@ impl ObserverSummary {
 type ItemKey<'a> = (&'a QuestionId, &'a [String], u32);
 
 /// The results of some trials; `None` without trials of frames that have a cluster.
-fn cell(subject: Subject, trials: &[TrialRef<'_>], clusters: &Clusters) -> Option<ObserverCell> {
+fn cell(
+    subject: ModelInCondition,
+    trials: &[TrialRef<'_>],
+    clusters: &Clusters,
+) -> Option<ObserverCell> {
     let mut sums = vec![(0.0, 0.0); clusters.count()];
     let mut frames = BTreeMap::<(&FrameId, String), &Observed>::new();
     let (mut guesses, mut evidence, mut n) = (0.0, 0, 0);
@@ -211,7 +217,7 @@ mod tests {
 
     fn cell(model: &str, [value, low, high]: [f64; 3]) -> ObserverCell {
         ObserverCell {
-            subject: Subject::new(model, None),
+            subject: ModelInCondition::new(model, None),
             score: Estimate {
                 value,
                 low,

@@ -1,4 +1,4 @@
-//! A model in a condition: [`Subject`].
+//! A model in a condition: [`ModelInCondition`].
 
 use std::collections::BTreeSet;
 
@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use darkqa_ground::types::replies::OBSERVER;
 use darkqa_ground::types::{
-    AxisLevel, Condition, Control, EnhancerName, KindReading, LightGroup, TrialRef, View,
+    AxisLevel, Condition, Control, EnhancerName, RunGroup, TrialRef, Variant, View,
 };
 
 /// Model name of the chance line in results.
@@ -72,20 +72,20 @@ pub fn pooled_models<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<
 
 /// A model in a condition. Every table cell belongs to one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-pub struct Subject {
+pub struct ModelInCondition {
     /// Name of the model, or [`CHANCE`].
     pub model: String,
     /// Whether the model saw images; `None` for chance.
     pub view: Option<View>,
     /// Level of degradation; `None` if the model saw no image.
     pub level: Option<AxisLevel>,
-    /// Kind of degradation with its light reading.
-    pub variant: KindReading,
+    /// Kind of degradation with its noise profile.
+    pub variant: Variant,
     /// Enhancer; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
 }
 
-impl Subject {
+impl ModelInCondition {
     /// Model and condition of a trial.
     #[must_use]
     pub fn from_trial(trial: TrialRef<'_>) -> Self {
@@ -99,7 +99,7 @@ impl Subject {
             model: model.to_owned(),
             view: Some(condition.map_or(View::Blind, |_| View::Image)),
             level: condition.map(Condition::level),
-            variant: condition.map_or(KindReading::NONE, Condition::kind_reading),
+            variant: condition.map_or(Variant::NONE, Condition::kind_reading),
             enhancer: condition.and_then(|condition| condition.enhancer.clone()),
         }
     }
@@ -139,7 +139,7 @@ impl Subject {
             && variant.reading == other_variant.reading
             && variant.pair == other_variant.pair
             && self.enhancer == other.enhancer
-            && LightGroup::meet(variant.group.as_ref(), other_variant.group.as_ref())
+            && RunGroup::meet(variant.group.as_ref(), other_variant.group.as_ref())
     }
 
     /// The same model in the same condition, for images from any group of runs.
@@ -156,7 +156,7 @@ impl Subject {
     pub fn seeing(
         model: &str,
         level: AxisLevel,
-        variant: &KindReading,
+        variant: &Variant,
         enhancer: Option<&EnhancerName>,
     ) -> Self {
         let is_clean = level == AxisLevel::L0;
@@ -165,9 +165,9 @@ impl Subject {
             view: Some(View::Image),
             level: Some(level),
             variant: if is_clean {
-                KindReading {
+                Variant {
                     group: variant.group.clone(),
-                    ..KindReading::NONE
+                    ..Variant::NONE
                 }
             } else {
                 variant.clone()
@@ -223,7 +223,7 @@ mod tests {
             (CHANCE, false),
         ] {
             assert_eq!(
-                Subject::new(model, None).is_reference(),
+                ModelInCondition::new(model, None).is_reference(),
                 expected,
                 "{model}"
             );

@@ -11,9 +11,9 @@ use super::findings::Findings;
 use super::grid::Grid;
 use super::head::{TestTree, adjusted};
 use super::significance::ALPHA;
-use super::subject::{Subject, judged};
+use super::subject::{ModelInCondition, judged};
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{AxisLevel, EnhancerName, KindReading};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Variant};
 
 /// A test, by its place in the findings.
 #[derive(Debug, Clone, Copy)]
@@ -131,7 +131,7 @@ fn tests(findings: &Findings<'_>) -> Tests {
 
 /// Whether sentences are about raw or enhanced images of a variant: those of the last kind of each root. The others have sentences about
 /// darkness alone.
-fn is_main(grid: &Grid<'_>, variant: &KindReading) -> bool {
+fn is_main(grid: &Grid<'_>, variant: &Variant) -> bool {
     let root = variant.kind.map(Kind::root);
     let last = grid
         .variants()
@@ -145,7 +145,7 @@ fn is_main(grid: &Grid<'_>, variant: &KindReading) -> bool {
 /// A set of pooled findings, by their places in ascending order of levels.
 struct PooledTests<'f> {
     kind: PooledKind,
-    variant: &'f KindReading,
+    variant: &'f Variant,
     enhancer: Option<&'f EnhancerName>,
     levels: Vec<(usize, &'f PooledFinding)>,
 }
@@ -300,9 +300,9 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
 }
 
 /// The subjects of raw images at the darkest level of each main variant, of the models over which findings are pooled.
-fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f Subject> {
+fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
     let grid = &findings.grid;
-    let raw: Vec<&Subject> = grid
+    let raw: Vec<&ModelInCondition> = grid
         .subjects
         .iter()
         .filter(|subject| {
@@ -314,7 +314,7 @@ fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f Subject> {
                     .contains(&&*subject.model)
         })
         .collect();
-    let level = |variant: &KindReading| -> Option<AxisLevel> {
+    let level = |variant: &Variant| -> Option<AxisLevel> {
         raw.iter()
             .filter(|subject| subject.variant == *variant)
             .filter_map(|subject| subject.level)

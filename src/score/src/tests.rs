@@ -8,7 +8,7 @@ use super::comparisons::{PooledFinding, PooledKind, best_in_the_dark, pooled};
 use super::findings::Findings;
 use super::grid::Grid;
 use super::significance::Significance;
-use super::subject::Subject;
+use super::subject::ModelInCondition;
 use darkqa_ground::types::{
     AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, QuestionId, Record,
     TrialOutcome,
@@ -259,7 +259,7 @@ fn below_blind_is_what_the_corrected_test_shows() {
     let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
     let below = |condition: &str| {
         let condition: Condition = condition.parse().unwrap();
-        findings.below_blind(&Subject::new("m", Some(&condition)), None)
+        findings.below_blind(&ModelInCondition::new("m", Some(&condition)), None)
     };
     // Two points less are below, and not shown to be.
     assert!(below("L3-noise").is_empty());

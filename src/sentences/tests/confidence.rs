@@ -3,11 +3,11 @@
 use super::checked;
 use crate::sentences::confidence::{Confidence, confidence};
 use crate::types::degradations::Kind;
-use crate::types::{AxisLevel, KindReading, Severity};
+use crate::types::{AxisLevel, Severity, Variant};
 use darkqa_score::calibration::{Calibration, RiskCoverage, TestedConfidence};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::estimate::Estimate;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 fn around(value: f64) -> Estimate {
     Estimate {
@@ -31,7 +31,7 @@ fn tested(value: f64) -> TestedConfidence {
 fn calibration(confidence: f64, accuracy: f64) -> Calibration {
     let zero = around(0.0);
     Calibration {
-        subject: Subject::seeing("a", AxisLevel::L0, &KindReading::NONE, None),
+        subject: ModelInCondition::seeing("a", AxisLevel::L0, &Variant::NONE, None),
         replies: 1200,
         reasoned: 0,
         unstated: 0,

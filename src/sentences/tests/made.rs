@@ -3,8 +3,8 @@
 use super::checked;
 use crate::sentences::{Sentence, Tone, sentences};
 use crate::types::{
-    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, LightGroup, ModelListing,
-    QuestionId, Record, TrialOutcome, UnreadReason,
+    AnswerReading, ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, QuestionId,
+    Record, RunGroup, TrialOutcome, UnreadReason,
 };
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
@@ -383,7 +383,7 @@ fn the_best_model_has_its_light_and_each_level_once() {
             let mut records = asked(model, FRAMES, &[("L0", 1.0), ("L3-noise", dark)]);
             for record in &mut records {
                 let condition = record.condition.as_mut().unwrap();
-                condition.group = Some(LightGroup::new(name, &[run]));
+                condition.group = Some(RunGroup::new(name, &[run]));
             }
             all.extend(records);
         }

@@ -9,7 +9,7 @@ mod words_alone;
 use super::sentence::{Sentence, level_runs};
 use super::{darkness, pooled, sample, words_alone as below};
 use crate::types::degradations::Kind;
-use crate::types::{AxisLevel, EnhancerName, KindReading, Severity};
+use crate::types::{AxisLevel, EnhancerName, Severity, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{PooledDifference, PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
@@ -27,9 +27,9 @@ fn finding(
     PooledFinding {
         kind,
         family: None,
-        variant: KindReading {
+        variant: Variant {
             kind: Some(Kind::Sensor),
-            ..KindReading::NONE
+            ..Variant::NONE
         },
         enhancer,
         level: AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]),

@@ -18,7 +18,7 @@ use darkqa_score::comparisons::{PooledKind, baseline_rows};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// The questions of a simulated run, and the truth.
 #[derive(Debug, Clone, Copy)]
@@ -400,7 +400,7 @@ fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
                 .enumerate()
                 .filter_map(|(index, subject)| {
                     let number: usize = subject.model[1..].parse().ok()?;
-                    let old = Subject {
+                    let old = ModelInCondition {
                         model: format!("m{:02}", number + models),
                         ..subject.clone()
                     };

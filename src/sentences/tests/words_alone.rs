@@ -3,7 +3,7 @@
 use super::{checked, finding};
 use crate::sentences::words_alone;
 use crate::types::degradations::Kind;
-use crate::types::{AxisLevel, Family, KindReading, Severity};
+use crate::types::{AxisLevel, Family, Severity, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::paired::{PairedComparison, Spread};
 use darkqa_score::comparisons::{
@@ -11,7 +11,7 @@ use darkqa_score::comparisons::{
 };
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
 /// A model against words alone in a family.
 fn against_words(
@@ -21,14 +21,14 @@ fn against_words(
     (difference, significance): (f64, Significance),
 ) -> Comparison {
     let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]);
-    let variant = KindReading {
+    let variant = Variant {
         kind: Some(Kind::Sensor),
-        ..KindReading::NONE
+        ..Variant::NONE
     };
     Comparison {
         kind: ComparisonKind::Blind,
-        first: Subject::seeing(model, level, &variant, None),
-        second: Subject::new(other, None),
+        first: ModelInCondition::seeing(model, level, &variant, None),
+        second: ModelInCondition::new(other, None),
         family: Some(family.clone()),
         strict: tested(difference, significance),
         lenient: tested(difference, significance),

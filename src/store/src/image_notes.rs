@@ -1,4 +1,4 @@
-//! Image notes merged from several run folders, without duplicates: [`more_thumbnails`], [`more_fidelity`].
+//! Image notes merged from several run folders, without duplicates: [`missing_thumbnails`], [`more_fidelity`].
 
 use std::collections::HashSet;
 use std::hash::Hash;
@@ -8,7 +8,7 @@ use super::folder::{read_fidelity, read_thumbnails};
 use darkqa_ground::types::{FrameId, ImageFidelity, Thumbnail};
 
 /// Thumbnails in these folders that are not `present`, of the wanted frames. Each is returned once.
-pub fn more_thumbnails(
+pub fn missing_thumbnails(
     present: &[Thumbnail],
     folders: &[&Path],
     is_wanted: impl Fn(&FrameId) -> bool,

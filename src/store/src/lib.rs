@@ -49,7 +49,7 @@ use own_files::check_own;
 use unlocked_log::UnlockedLog;
 
 pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
-pub use image_notes::{more_fidelity, more_thumbnails};
+pub use image_notes::{missing_thumbnails, more_fidelity};
 pub use log_mark::LogMark;
 use lost_questions::LostQuestions;
 pub use pieces::LinePlace;
@@ -233,7 +233,7 @@ impl<D: Detail> Store<D> {
         is_wanted: impl Fn(&FrameId) -> bool,
     ) -> Result<()> {
         let present = read_thumbnails(&self.folder);
-        for thumbnail in more_thumbnails(&present, folders, is_wanted) {
+        for thumbnail in missing_thumbnails(&present, folders, is_wanted) {
             self.append_thumbnail(&thumbnail)?;
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Images of every light reading and every variant are the same bytes, however and by whichever command they are made.
+//! Images of every noise profile and every variant are the same bytes, however and by whichever command they are made.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::support::run::{Bench, assert_same_products, files, records, words};
 
-/// All light readings and variants, with settings that are drawn for each frame.
+/// All noise profiles and variants, with settings that are drawn for each frame.
 const LIGHT: &str = "--profile all --variant all --levels L0,L2,9,T33.33 --seed 3 --motion speed=90,angle=random --auto gain=3";
 /// Conditions of `LIGHT`: L0, and by level exposure drop alone, four readings of noise, automatic exposure; and a motion blur.
 const CONDITIONS: usize = 1 + 2 * 6 + 1;

@@ -304,7 +304,7 @@ fn every_field_of_open_questions_refuses_another_value() {
 /// A value more in a run: what was said before and what is said then, and how many trials are new.
 type Addition = (&'static str, &'static str, usize);
 
-/// What may be added to an evaluation. A part of the noise model that is said makes another light reading.
+/// What may be added to an evaluation. A part of the noise model that is said makes another noise profile.
 const ADDITIONS: [Addition; 23] = [
     ("", "--blind", 3),
     ("", "--model m --model n", 9),

@@ -16,8 +16,8 @@ use crate::support::made::record;
 use crate::support::table::check_rows;
 use darkqa_eval::Kind;
 use darkqa_ground::types::{
-    AnswerReading, AxisLevel, Condition, Degradation, EnhancerName, Family, KindReading, Record,
-    Severity,
+    AnswerReading, AxisLevel, Condition, Degradation, EnhancerName, Family, Record, Severity,
+    Variant,
 };
 use darkqa_score::accuracies::curves;
 use darkqa_score::bootstrap::Resamples;
@@ -36,7 +36,7 @@ use darkqa_score::open::OpenSummary;
 use darkqa_score::open::QuestionGroups;
 use darkqa_score::open::ScoredAnswer;
 use darkqa_score::open::open_summary;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Beta, Distribution as _};
@@ -157,7 +157,7 @@ fn walks(
                 (Some(Severity::L4), if kept { lit } else { dark }),
             ] {
                 answers.push(ScoredAnswer {
-                    subject: Subject::new(MODEL, Some(&at(level))),
+                    subject: ModelInCondition::new(MODEL, Some(&at(level))),
                     question,
                     outcome: AnswerOutcome::Marked(mark),
                     cut: false,
@@ -190,8 +190,8 @@ fn intervals_of_open_scores_hold_the_truth() {
                 let (mut scores, mut drops) = (0, 0);
                 for _ in 0..RUNS {
                     let summary = walks(&mut random, count, marks, mean, rho);
-                    let dark = Subject::new(MODEL, Some(&at(Some(Severity::L4))));
-                    let lit = Subject::new(MODEL, Some(&at(None)));
+                    let dark = ModelInCondition::new(MODEL, Some(&at(Some(Severity::L4))));
+                    let lit = ModelInCondition::new(MODEL, Some(&at(None)));
                     let score = summary.cell(&lit, &Group::All).unwrap().score.unwrap();
                     let change = summary.change(&dark, Baseline::Clean, &Group::All).unwrap();
                     scores += usize::from((score.low..=score.high).contains(&truth));
@@ -460,5 +460,5 @@ fn a_made_set_gives_the_papers_arithmetic() {
         .iter()
         .find(|cell| cell.subject.view.is_none() && cell.family.is_none());
     assert!((chance.unwrap().accuracy.unwrap().value - 43.0 / 102.0).abs() < 1e-15);
-    assert_eq!(findings.grid.subjects[0].variant, KindReading::NONE);
+    assert_eq!(findings.grid.subjects[0].variant, Variant::NONE);
 }

@@ -13,15 +13,15 @@ pub mod values;
 
 pub use degradations::{
     Axis, AxisLevel, Condition, ConditionColumns, Degradation, EnhancerName, ExposureFacts,
-    KindReading, KindSet, LightGroup, PairDark, PairFacts, PhotoName, ReadingName, SetLight,
-    Severity, Treatment, TreatmentSet,
+    KindSet, PairDark, PairFacts, PhotoName, ReadingName, RunGroup, SetLight, Severity, Treatment,
+    TreatmentSet, Variant,
 };
 #[cfg(feature = "program")]
 pub use flags::Decides;
 #[cfg(feature = "program")]
 pub use images::Frame;
 pub use images::{
-    Codes16, DepthKind, FrameId, Image, Intrinsics, Label, Labels, Light, Pixels, Rgb, Sample,
+    DepthKind, FrameId, Image, Intrinsics, Label, Labels, Light, Pixels, Rgb, Rgb16Image, Sample,
     SegmentName, Segmentation,
 };
 pub use manifests::{

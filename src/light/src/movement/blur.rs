@@ -155,7 +155,7 @@ impl Blur {
                             *light = shown[usize::from(*code)];
                         }
                     }
-                    Clean::Codes16(codes) => {
+                    Clean::Rgb16Image(codes) => {
                         for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
                             *light = curve::gamma_expand(f64::from(*code) / 65_535.0) as f32;
                         }

@@ -10,7 +10,7 @@ use super::unprocess::unprocess_up_to;
 use crate::camera::CameraState;
 use crate::clean::Clean;
 use crate::draws::NoiseKey;
-use crate::reading::{Amplify, Tone};
+use crate::noise_profile::{Amplify, Tone};
 use darkqa_ground::types::images::Isa;
 
 /// Noise-free RAW image of a frame, by one camera.
@@ -27,7 +27,7 @@ pub struct CleanRaw {
 }
 
 impl CleanRaw {
-    /// The noise-free RAW image of `clean` by a camera in the given state. `headroom_ev` is that of the light reading
+    /// The noise-free RAW image of `clean` by a camera in the given state. `headroom_ev` is that of the noise profile
     /// ([`Synthesis::headroom_ev`](crate::Synthesis::headroom_ev)); it matters for light alone.
     #[must_use]
     pub fn new<'a>(clean: impl Into<Clean<'a>>, camera: CameraState, headroom_ev: f64) -> Self {

@@ -14,7 +14,7 @@ use super::bayer::{self, Bayer, Plane, RawRow, Sites};
 use crate::camera::CameraState;
 use crate::curve;
 use crate::draws::{LANES, Lanes, Piecewise};
-use crate::reading::Tone;
+use crate::noise_profile::Tone;
 use darkqa_ground::types::images::{Isa, Kernel};
 
 /// Gamma compression of light from 2⁻³¹ up; light below 10⁻⁸ is treated as 10⁻⁸.

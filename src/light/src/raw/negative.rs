@@ -9,7 +9,7 @@ use super::unprocess::Unprocess;
 use crate::camera::CameraState;
 use crate::clean::Clean;
 use crate::draws::NoiseKey;
-use crate::reading::{Amplify, Coupling, Draws, Synthesis, Tone};
+use crate::noise_profile::{Amplify, Coupling, Draws, Synthesis, Tone};
 use darkqa_ground::types::images::{Isa, Sample};
 use darkqa_ground::types::{Image, Rgb, Severity};
 
@@ -48,7 +48,7 @@ impl Negative {
     }
 
     /// The negative of `clean` for a camera in the given state and with the given terms of noise, for all levels.
-    /// `headroom_ev` is that of the light reading ([`Synthesis::headroom_ev`]); it matters for light alone.
+    /// `headroom_ev` is that of the noise profile ([`Synthesis::headroom_ev`]); it matters for light alone.
     #[must_use]
     pub fn with_state<'a>(
         clean: impl Into<Clean<'a>>,
@@ -159,7 +159,7 @@ pub(crate) fn develop_by(
     develop_with_state(clean, key, &state, amplify, tone, [drop_ev, headroom])
 }
 
-/// A frame after an exposure drop, with the noise of a camera in the given state; the drop and the headroom of the light reading
+/// A frame after an exposure drop, with the noise of a camera in the given state; the drop and the headroom of the noise profile
 /// ([`Synthesis::headroom_ev`]) are in EV.
 #[must_use]
 pub fn develop_with_state(
@@ -215,7 +215,7 @@ impl Capture {
         Self::with(&key, &state, amplify, tone, &Term::ALL, isa)
     }
 
-    /// The image of a frame after an exposure drop; drop and headroom of the light reading are in EV.
+    /// The image of a frame after an exposure drop; drop and headroom of the noise profile are in EV.
     pub(crate) fn image<T: Target>(
         self,
         clean: Clean<'_>,

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::bayer::{Bayer, Plane, RawRow};
 use crate::camera::CameraState;
 use crate::draws::{Component, LANES, Lanes, NoiseKey, Quantile, Site, Stream, poisson};
-use crate::reading::Amplify;
+use crate::noise_profile::Amplify;
 use darkqa_ground::types::images::{Isa, Kernel};
 
 /// One term of the noise.

@@ -212,7 +212,7 @@ impl Unprocess {
             Clean::Codes(codes) => {
                 self.fill_from(&*LINEAR_LIGHT, &codes.samples()[samples], row, line);
             }
-            Clean::Codes16(codes) => {
+            Clean::Rgb16Image(codes) => {
                 let curve: &[f32; 65_536] = &LINEAR_LIGHT_16;
                 self.fill_from(curve, &codes.samples()[samples], row, line);
             }

@@ -10,14 +10,14 @@ use super::health::Health;
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem, TrialResult};
-use crate::subject::{CHANCE, Subject};
-use darkqa_ground::types::{Family, KindReading, UnreadReason};
+use crate::subject::{CHANCE, ModelInCondition};
+use darkqa_ground::types::{Family, UnreadReason, Variant};
 
 /// Accuracy of one subject on one family in one reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AccuracyCell {
     #[serde(flatten)]
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
     /// How the replies were read.
@@ -70,7 +70,7 @@ impl AccuracySummary {
     #[must_use]
     pub fn cell(
         &self,
-        subject: &Subject,
+        subject: &ModelInCondition,
         family: Option<&Family>,
         mode: ReadingMode,
     ) -> Option<&AccuracyCell> {
@@ -205,11 +205,11 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
                 .filter(|question| family.is_none_or(|family| question.family == *family));
             let accuracy = chance(of_family);
             ReadingMode::ALL.map(|mode| AccuracyCell {
-                subject: Subject {
+                subject: ModelInCondition {
                     model: CHANCE.to_owned(),
                     view: None,
                     level: None,
-                    variant: KindReading::NONE,
+                    variant: Variant::NONE,
                     enhancer: None,
                 },
                 family: family.cloned(),

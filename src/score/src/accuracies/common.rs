@@ -6,7 +6,7 @@ use super::accuracy::{AccuracySummary, summarize};
 use super::chance::OfferedChoices;
 use super::health::healths;
 use crate::grid::Grid;
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::{QuestionId, View};
 
 /// The questions that a model was asked, in any condition.
@@ -83,7 +83,7 @@ impl CommonItems {
 }
 
 /// The subjects with their indices, without those of people beside models.
-fn model_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g Subject)> {
+fn model_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g ModelInCondition)> {
     let models = grid.subjects.iter().map(|subject| &*subject.model);
     let models: BTreeSet<&str> = grid.listing.without_people(models).into_iter().collect();
     grid.subjects

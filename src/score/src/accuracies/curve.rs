@@ -5,16 +5,16 @@ use rayon::prelude::*;
 use crate::bootstrap::Resamples;
 use crate::choice::ReadingMode;
 use crate::grid::{Grid, TrialResult};
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use crate::threshold::{CurveSummary, LevelCounts};
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{Axis, AxisLevel, EnhancerName, Family, KindReading, LightGroup, View};
+use darkqa_ground::types::{Axis, AxisLevel, EnhancerName, Family, RunGroup, Variant, View};
 
 /// Summary of one model over all levels, in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     pub model: String,
-    pub variant: KindReading,
+    pub variant: Variant,
     /// Enhancer; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
     /// Question family; `None` for all families together.
@@ -46,7 +46,7 @@ impl Curve {
 #[derive(Debug)]
 pub struct CurvePoints {
     pub model: String,
-    pub variant: KindReading,
+    pub variant: Variant,
     pub enhancer: Option<EnhancerName>,
     /// Levels in increasing severity, with the index of the subject at each. L0 is the clean frame for every curve.
     pub subjects: Vec<(AxisLevel, usize)>,
@@ -55,7 +55,7 @@ pub struct CurvePoints {
 impl CurvePoints {
     /// All curves of a grid that have L0 and at least one degraded level.
     pub(crate) fn all(grid: &Grid<'_>) -> Vec<Self> {
-        let mut keys: Vec<(&str, &KindReading, Option<&EnhancerName>)> = grid
+        let mut keys: Vec<(&str, &Variant, Option<&EnhancerName>)> = grid
             .subjects
             .iter()
             .filter(|subject| subject.view == Some(View::Image) && subject.variant.kind.is_some())
@@ -66,12 +66,12 @@ impl CurvePoints {
         keys.dedup();
         keys.sort_by_cached_key(|(model, ..)| grid.listing.place(model));
         let points = keys.into_iter().map(|(model, variant, enhancer)| {
-            let on_curve = |subject: &Subject| {
+            let on_curve = |subject: &ModelInCondition| {
                 subject.view == Some(View::Image)
                     && subject.model == model
                     && (subject.level == Some(AxisLevel::L0)
                         && subject.enhancer.is_none()
-                        && LightGroup::meet(subject.variant.group.as_ref(), variant.group.as_ref())
+                        && RunGroup::meet(subject.variant.group.as_ref(), variant.group.as_ref())
                         || subject.variant == *variant && subject.enhancer.as_ref() == enhancer)
             };
             let mut subjects: Vec<(AxisLevel, usize)> = grid

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use crate::choice::ReadingMode;
 use crate::grid::{Grid, TrialResult};
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::{FailureKind, TrialRef, UnreadReason};
 
 /// Counts of replies, unreadable replies and failures of one subject.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Health {
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Number of trials with a reply.
     pub replies: usize,
     /// Number of replies in which the strict reading found a choice.

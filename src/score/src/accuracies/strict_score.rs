@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, TrialResult};
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::{Family, QuestionId, RunQuestion, StrictGroup};
 
 /// Share of groups in which a subject answers all questions right, in one reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupCell {
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Question family, with the groups that are wholly of it; `None` for all groups.
     pub family: Option<Family>,
     /// How the replies were read.

@@ -7,7 +7,7 @@ use crate::comparisons::paired::PairedComparison;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem};
 use crate::significance::ALPHA;
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, Family};
 
 /// Maximum number of different answers of a family that gets a confusion table.
@@ -16,7 +16,7 @@ const MAX_LABELS: usize = 26;
 /// Confusion table of one subject on one family, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confusion {
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     pub family: Family,
     /// The different answers, sorted.
     pub labels: Vec<String>,
@@ -134,7 +134,7 @@ impl AgainstClean {
         if dark.enhancer.is_some() || !dark.variant.is_degraded() {
             return None;
         }
-        let clean = Subject::seeing(&dark.model, AxisLevel::L0, &dark.variant, None);
+        let clean = ModelInCondition::seeing(&dark.model, AxisLevel::L0, &dark.variant, None);
         let clean = grid.stand_in(&clean)?;
         let mut times = BTreeMap::<&str, usize>::new();
         for (index, item) in grid.items.iter().enumerate() {
@@ -302,7 +302,7 @@ impl FalseAnswer {
 /// Rates at which a subject reports absent objects and overlooks present ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hallucination {
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Share of "yes" among replies to questions whose truth is "no".
     pub false_positive: Option<Estimate>,
     /// Share of "no" among replies to questions whose truth is "yes".

@@ -2,7 +2,7 @@
 
 use super::confident_reply::usable;
 use crate::grid::Grid;
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::View;
 
 /// For each item its cluster and the Jensen–Shannon distance, 0 to 1, between the probabilities of a subject and those of the same
@@ -10,7 +10,7 @@ use darkqa_ground::types::View;
 /// there are none of the latter.
 pub(super) fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
     let seeing = &grid.subjects[subject];
-    let blind = grid.find(&Subject::new(&seeing.model, None));
+    let blind = grid.find(&ModelInCondition::new(&seeing.model, None));
     let Some(blind) = blind.filter(|_| seeing.view == Some(View::Image)) else {
         return Vec::new();
     };

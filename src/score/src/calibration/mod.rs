@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use super::bootstrap::Resamples;
 use super::estimate::Estimate;
 use super::grid::Grid;
-use super::subject::Subject;
+use super::subject::ModelInCondition;
 use confident_reply::{ConfidentReply, accuracy, confident_replies};
 use darkqa_ground::types::AxisLevel;
 use darkqa_statistics::auc::{Auc, PairCounts, RankedReply};
@@ -37,7 +37,7 @@ const LEAST_REPLIES: usize = 100;
 #[derive(Debug, Clone)]
 pub struct Calibration {
     /// The model in its condition.
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Number of replies with probabilities, which all figures are of.
     pub replies: usize,
     /// Number of replies with reasoning before the answer, which no figure is of.
@@ -129,7 +129,7 @@ fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option
     if dark.enhancer.is_some() || !dark.variant.is_degraded() {
         return None;
     }
-    let clean = Subject::seeing(&dark.model, AxisLevel::L0, &dark.variant, None);
+    let clean = ModelInCondition::seeing(&dark.model, AxisLevel::L0, &dark.variant, None);
     let clean = confident_replies(grid, grid.stand_in(&clean)?).replies;
     let clean: BTreeMap<usize, f64> = clean
         .iter()

@@ -4,14 +4,14 @@ use super::comparison::{ComparisonKind, pairs};
 use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_statistics::quantiles::{degrees_of_freedom, student};
 
 /// Agreement of two models in one condition, in the strict reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
-    pub first: Subject,
-    pub second: Subject,
+    pub first: ModelInCondition,
+    pub second: ModelInCondition,
     /// Share of items to which both models gave the same answer.
     pub same: Estimate,
     /// Cohen's κ of being right: 0 if the two err independently, 1 if they err on the same items ("error consistency",

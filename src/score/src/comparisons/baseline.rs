@@ -6,13 +6,13 @@ use crate::accuracies::Health;
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
 use crate::significance::{ALPHA, Significance, holm, least_p};
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 
 /// A model in a condition, in the new runs against the old one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaselineRow {
     /// The model and condition of the new runs.
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// New less old on the items that both answered about the same image.
     pub paired: PairedComparison,
     /// p-value after Holm's correction over all conditions of all models under test. Reference models (`random`, the observer) are

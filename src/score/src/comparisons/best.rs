@@ -11,15 +11,15 @@ use crate::choice::ReadingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
 use crate::significance::{ALPHA, Significance, SwapMethod, holm, least_p};
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{AxisLevel, KindReading};
+use darkqa_ground::types::{AxisLevel, Variant};
 
 /// Comparison of the models by their mean accuracy over the dark levels ([`is_dark`]), each level alike, on raw images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BestInTheDark {
-    /// Kind of degradation: the last kind that was asked (noise, if it was), in its first light reading.
-    pub variant: KindReading,
+    /// Kind of degradation: the last kind that was asked (noise, if it was), in its first noise profile.
+    pub variant: Variant,
     /// The dark levels that every model was asked.
     pub levels: Vec<AxisLevel>,
     /// The lighter levels that every model was asked, from L0.
@@ -232,8 +232,8 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheD
 }
 
 /// The levels at which a model was asked about raw images of a variant, with L0 if its clean frames are those of the same runs.
-fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> BTreeSet<AxisLevel> {
-    let clean = Subject::seeing(model, AxisLevel::L0, variant, None);
+fn levels(grid: &Grid<'_>, model: &str, variant: &Variant) -> BTreeSet<AxisLevel> {
+    let clean = ModelInCondition::seeing(model, AxisLevel::L0, variant, None);
     grid.subjects
         .iter()
         .filter(|subject| {
@@ -250,13 +250,14 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &KindReading) -> BTreeSet<AxisL
 fn with_most_answers<'g>(
     grid: &Grid<'_>,
     models: Vec<Asked<'g>>,
-    variant: &KindReading,
+    variant: &Variant,
 ) -> (Vec<Asked<'g>>, Vec<Asked<'g>>) {
     let coverages: Vec<Coverage> = models
         .iter()
         .map(|(model, levels)| {
             let sides = levels.iter().filter_map(|level| {
-                let subject = grid.stand_in(&Subject::seeing(model, *level, variant, None))?;
+                let subject =
+                    grid.stand_in(&ModelInCondition::seeing(model, *level, variant, None))?;
                 Some((*level, vec![subject]))
             });
             Coverage::new(grid, sides, |_| true)
@@ -308,12 +309,13 @@ impl Scores {
     fn new(
         grid: &Grid<'_>,
         models: &[&str],
-        variant: &KindReading,
+        variant: &Variant,
         levels: &[AxisLevel],
         mode: ReadingMode,
     ) -> Self {
-        let subject =
-            |model: &str, level| grid.stand_in(&Subject::seeing(model, level, variant, None));
+        let subject = |model: &str, level| {
+            grid.stand_in(&ModelInCondition::seeing(model, level, variant, None))
+        };
         let subjects: Vec<Vec<usize>> = models
             .iter()
             .map(|model| {

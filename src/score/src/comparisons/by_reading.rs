@@ -1,6 +1,6 @@
-//! Findings about noise, tested under each light reading: [`FindingByReading`].
+//! Findings about noise, tested under each noise profile: [`FindingByReading`].
 //!
-//! The paper's noise model can be interpreted in several ways; each interpretation is a light reading. A conclusion that holds under
+//! The paper's noise model can be interpreted in several ways; each interpretation is a noise profile. A conclusion that holds under
 //! only one reading is a conclusion about that reading. Each finding is therefore computed under every reading, on the same items and by
 //! the same formula, and the results are reported side by side. Only the paper's levels, L1–L5, are tested. Holm's correction covers all
 //! claims of all models under all readings (Holm 1979, Scand. J. Stat. 6:65): if there is no effect at all, the report names none with
@@ -15,13 +15,11 @@ use crate::choice::ReadingMode;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use crate::significance::{ALPHA, holm};
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{
-    AxisLevel, EnhancerName, Family, KindReading, LightGroup, ReadingName, View,
-};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, ReadingName, RunGroup, Variant, View};
 
-/// A claim about noise that may hold under one light reading and not under another.
+/// A claim about noise that may hold under one noise profile and not under another.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum NoiseHypothesis {
     /// Accuracy is lower with noise than with the exposure drop alone, at one level; `None` for L1–L5 together.
@@ -149,7 +147,7 @@ impl Robustness {
 /// The effect of a claim under one reading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectInReading {
-    /// The light reading.
+    /// The noise profile.
     pub reading: ReadingName,
     /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items. `None` if a side was
     /// not asked.
@@ -169,13 +167,13 @@ pub struct TestedEffect {
     pub holm: f64,
 }
 
-/// Test results of a claim about one model under every light reading, on the same items.
+/// Test results of a claim about one model under every noise profile, on the same items.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FindingByReading {
     /// The model.
     pub model: String,
     /// The runs that showed these images, if the runs of the report showed different ones.
-    pub group: Option<LightGroup>,
+    pub group: Option<RunGroup>,
     /// The claim that was tested.
     pub claim: NoiseHypothesis,
     /// The levels asked under every reading; a reading under which none was asked does not count.
@@ -190,7 +188,7 @@ pub struct FindingByReading {
     pub dropped: usize,
 }
 
-/// Tests all claims of each model under every light reading; empty if the grid has fewer than two readings.
+/// Tests all claims of each model under every noise profile; empty if the grid has fewer than two readings.
 #[must_use]
 pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
     let readings: BTreeSet<&ReadingName> = noisy_subjects(grid)
@@ -200,12 +198,12 @@ pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
         return Vec::new();
     }
     let readings: Vec<&ReadingName> = readings.into_iter().collect();
-    let models: BTreeSet<(&str, Option<&LightGroup>)> = noisy_subjects(grid)
+    let models: BTreeSet<(&str, Option<&RunGroup>)> = noisy_subjects(grid)
         .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
         .collect();
-    let mut models: Vec<(&str, Option<&LightGroup>)> = models.into_iter().collect();
+    let mut models: Vec<(&str, Option<&RunGroup>)> = models.into_iter().collect();
     models.sort_by_cached_key(|(model, _)| grid.listing.place(model));
-    let jobs: Vec<(&str, Option<&LightGroup>, NoiseHypothesis)> = models
+    let jobs: Vec<(&str, Option<&RunGroup>, NoiseHypothesis)> = models
         .into_iter()
         .flat_map(|(model, group)| {
             claims(grid, model)
@@ -224,7 +222,7 @@ pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
 }
 
 /// The subjects that see noisy images.
-fn noisy_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g Subject> {
+fn noisy_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g ModelInCondition> {
     grid.subjects.iter().filter(|subject| {
         subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_readings)
     })
@@ -263,7 +261,7 @@ fn claims(grid: &Grid<'_>, model: &str) -> Vec<NoiseHypothesis> {
 struct SideLookup<'g, 'a> {
     grid: &'g Grid<'a>,
     model: &'g str,
-    group: Option<&'g LightGroup>,
+    group: Option<&'g RunGroup>,
 }
 
 impl SideLookup<'_, '_> {
@@ -274,15 +272,15 @@ impl SideLookup<'_, '_> {
         level: AxisLevel,
         reading: &ReadingName,
     ) -> Option<(usize, usize)> {
-        let variant = |kind: Option<Kind>, reading: Option<&ReadingName>| KindReading {
+        let variant = |kind: Option<Kind>, reading: Option<&ReadingName>| Variant {
             kind,
             reading: reading.cloned(),
             pair: None,
             group: self.group.cloned(),
         };
         let noisy = variant(Some(Kind::Sensor), Some(reading));
-        let subject_index = |level, variant: &KindReading, enhancer| {
-            let subject = Subject::seeing(self.model, level, variant, enhancer);
+        let subject_index = |level, variant: &Variant, enhancer| {
+            let subject = ModelInCondition::seeing(self.model, level, variant, enhancer);
             self.grid.stand_in(&subject)
         };
         let unenhanced = subject_index(level, &noisy, None);
@@ -303,7 +301,7 @@ impl SideLookup<'_, '_> {
 
     /// Index of the same model asked without images, or else of the only model asked without images.
     fn blind(&self) -> Option<usize> {
-        let blind: Vec<(usize, &Subject)> = self
+        let blind: Vec<(usize, &ModelInCondition)> = self
             .grid
             .subjects
             .iter()

@@ -9,8 +9,8 @@ use super::paired::PairedComparison;
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
 use crate::significance::{Significance, holm, least_p};
-use crate::subject::{Subject, judged};
-use darkqa_ground::types::{AxisLevel, Family, KindReading, PairDark, View};
+use crate::subject::{ModelInCondition, judged};
+use darkqa_ground::types::{AxisLevel, Family, PairDark, Variant, View};
 use rayon::prelude::*;
 
 /// The two sides of a comparison.
@@ -72,9 +72,9 @@ pub const MIN_PAIRS: usize = 30;
 pub struct Comparison {
     pub kind: ComparisonKind,
     /// The first side: the degraded, the noisy, the enhanced, or the one with images.
-    pub first: Subject,
+    pub first: ModelInCondition,
     /// The second side, to which the first is compared.
-    pub second: Subject,
+    pub second: ModelInCondition,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
     /// The comparison in the strict parsing, which is the headline.
@@ -194,7 +194,7 @@ fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
 /// each of them.
 #[must_use]
 pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Comparison> {
-    let named: Vec<(usize, &Subject)> = grid
+    let named: Vec<(usize, &ModelInCondition)> = grid
         .subjects
         .iter()
         .enumerate()
@@ -267,7 +267,8 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
             ComparisonKind::Level
                 if subject.variant.is_degraded() && subject.enhancer.is_none() =>
             {
-                let clean = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
+                let clean =
+                    ModelInCondition::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
                 grid.stand_in(&clean).into_iter().collect()
             }
             ComparisonKind::Variant => match subject
@@ -276,9 +277,9 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
                 .and_then(darkqa_ground::types::degradations::Kind::base)
             {
                 None => Vec::new(),
-                // The same level of the base kind, which has no light readings.
+                // The same level of the base kind, which has no noise profiles.
                 base => changed(grid, subject, |other| {
-                    other.variant = KindReading {
+                    other.variant = Variant {
                         kind: base,
                         reading: None,
                         pair: None,
@@ -307,7 +308,11 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
 }
 
 /// The subject that differs from `subject` by a change only, if the grid has it.
-fn changed(grid: &Grid<'_>, subject: &Subject, change: impl FnOnce(&mut Subject)) -> Vec<usize> {
+fn changed(
+    grid: &Grid<'_>,
+    subject: &ModelInCondition,
+    change: impl FnOnce(&mut ModelInCondition),
+) -> Vec<usize> {
     let mut other = subject.clone();
     change(&mut other);
     grid.stand_in(&other).into_iter().collect()
@@ -320,7 +325,8 @@ fn later_models(grid: &Grid<'_>, index: usize, judged: &BTreeSet<&str>) -> Vec<u
         return Vec::new();
     }
     let later = grid.subjects.iter().enumerate().skip(index + 1);
-    let condition = |of: &Subject| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
+    let condition =
+        |of: &ModelInCondition| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
     later
         .filter(|(_, other)| other.model != subject.model && condition(other) == condition(subject))
         .filter(|(_, other)| judged.contains(&*other.model))
@@ -328,7 +334,7 @@ fn later_models(grid: &Grid<'_>, index: usize, judged: &BTreeSet<&str>) -> Vec<u
         .collect()
 }
 
-/// Later subjects of the grid with the same model at the same level, raw or with the same enhancer, in another light reading or
+/// Later subjects of the grid with the same model at the same level, raw or with the same enhancer, in another noise profile or
 /// with the images of other runs.
 fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
@@ -341,8 +347,8 @@ fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
         .collect()
 }
 
-/// Whether two subjects show the same level, raw or with the same enhancer, in another light reading or with the images of other runs.
-fn is_other_light(one: &Subject, other: &Subject) -> bool {
+/// Whether two subjects show the same level, raw or with the same enhancer, in another noise profile or with the images of other runs.
+fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
     (one.view, one.level) == (other.view, other.level)
         && (one.variant.kind, &one.enhancer) == (other.variant.kind, &other.enhancer)
         && one.variant.pair.as_ref().map(PairDark::sort)
@@ -351,7 +357,7 @@ fn is_other_light(one: &Subject, other: &Subject) -> bool {
 }
 
 /// The same model without images; if it was never asked so, all models without images.
-fn blind(grid: &Grid<'_>, subject: &Subject) -> Vec<usize> {
+fn blind(grid: &Grid<'_>, subject: &ModelInCondition) -> Vec<usize> {
     let all = || {
         grid.subjects
             .iter()

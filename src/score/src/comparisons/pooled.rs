@@ -14,9 +14,9 @@ use super::pooled_kind::PooledKind;
 use crate::accuracies::{Coverage, Lacking, shared};
 use crate::grid::{Grid, TrialResult};
 use crate::significance::{Significance, holm, least_p};
-use crate::subject::{Subject, pooled_models};
+use crate::subject::{ModelInCondition, pooled_models};
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading, View};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant, View};
 
 use finding::is_severe;
 
@@ -47,7 +47,7 @@ fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct PooledSet {
     kind: PooledKind,
-    variant: KindReading,
+    variant: Variant,
     enhancer: Option<EnhancerName>,
 }
 
@@ -81,14 +81,15 @@ impl PooledSet {
         other: &str,
         level: AxisLevel,
     ) -> Option<(usize, usize)> {
-        let seeing = |level, variant, enhancer| Subject::seeing(model, level, variant, enhancer);
+        let seeing =
+            |level, variant, enhancer| ModelInCondition::seeing(model, level, variant, enhancer);
         let first = seeing(level, &self.variant, self.enhancer.as_ref());
         let second = match self.kind {
             PooledKind::Darkness | PooledKind::Hallucination(_) => {
                 seeing(AxisLevel::L0, &self.variant, None)
             }
             PooledKind::Noise => {
-                let base = KindReading {
+                let base = Variant {
                     kind: self.variant.kind.and_then(Kind::base),
                     reading: None,
                     pair: None,
@@ -97,7 +98,7 @@ impl PooledSet {
                 seeing(level, &base, None)
             }
             PooledKind::Enhancer => seeing(level, &self.variant, None),
-            PooledKind::Blind => Subject::new(other, None),
+            PooledKind::Blind => ModelInCondition::new(other, None),
         };
         Some((grid.find(&first)?, grid.stand_in(&second)?))
     }

@@ -42,7 +42,7 @@ mod tests {
     use super::*;
     use crate::estimate::Estimate;
     use crate::significance::SwapMethod;
-    use darkqa_ground::types::KindReading;
+    use darkqa_ground::types::Variant;
 
     fn best(names: &[&str], shown: &[(&str, &str, Significance)]) -> BestInTheDark {
         let share = Estimate {
@@ -69,7 +69,7 @@ mod tests {
             significance: *significance,
         });
         BestInTheDark {
-            variant: KindReading::NONE,
+            variant: Variant::NONE,
             levels: Vec::new(),
             lighter: Vec::new(),
             crossing: None,

@@ -1,7 +1,7 @@
 //! One open answer and its outcome: [`ScoredAnswer`], [`AnswerOutcome`].
 
 use crate::choice::llm_match::points;
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 
 /// Outcome of an open answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +34,7 @@ impl AnswerOutcome {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoredAnswer {
     /// Model and condition that gave the answer.
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Index of the question among those asked.
     pub question: usize,
     /// Outcome of the answer.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::answer::{AnswerOutcome, ScoredAnswer};
 use super::group::Group;
 use crate::estimate::Estimate;
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 
 /// Maximum number of independent right-or-wrong replies that one mark may count for. A mark on a scale of five steps varies
 /// less than such a reply with the same mean, unless all marks are 1 or 5.
@@ -14,7 +14,7 @@ const MAX_WEIGHT: f64 = 4.0;
 /// Score of a subject on a group of questions, with the counts behind it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenCell {
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     pub group: Group,
     /// Number of answers that the run asks for.
     pub planned: usize,
@@ -42,7 +42,7 @@ impl OpenCell {
 
 /// The cell of a subject and a group; `cluster` returns the cluster of a question.
 pub(super) fn cell(
-    subject: &Subject,
+    subject: &ModelInCondition,
     group: &Group,
     answers: &[&ScoredAnswer],
     cluster: impl Fn(usize) -> usize,

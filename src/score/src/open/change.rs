@@ -6,7 +6,7 @@ use super::answer::ScoredAnswer;
 use super::group::Group;
 use crate::comparisons::paired::difference;
 use crate::estimate::Estimate;
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, View};
 
 /// The subject to which a score is compared.
@@ -21,7 +21,7 @@ pub enum Baseline {
 /// Score of a subject minus that of a baseline, on the questions for which both have a score.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoreChange {
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     pub baseline: Baseline,
     pub group: Group,
     /// Difference of the unrounded means. Its `n` is the number of questions.
@@ -29,12 +29,13 @@ pub struct ScoreChange {
 }
 
 /// The baselines of a subject; none for a subject without images.
-pub(super) fn baselines(subject: &Subject) -> Vec<(Baseline, Subject)> {
+pub(super) fn baselines(subject: &ModelInCondition) -> Vec<(Baseline, ModelInCondition)> {
     let Some(level) = subject.level.filter(|_| subject.view == Some(View::Image)) else {
         return Vec::new();
     };
-    let seeing =
-        |level, enhancer| Subject::seeing(&subject.model, level, &subject.variant, enhancer);
+    let seeing = |level, enhancer| {
+        ModelInCondition::seeing(&subject.model, level, &subject.variant, enhancer)
+    };
     let is_clean = level == AxisLevel::L0 && subject.enhancer.is_none();
     let clean = (!is_clean).then(|| (Baseline::Clean, seeing(AxisLevel::L0, None)));
     let raw = subject

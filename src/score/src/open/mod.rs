@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use self::cell::cell;
 use self::change::{baselines, change};
 use self::group::groups;
-use super::subject::Subject;
+use super::subject::ModelInCondition;
 use darkqa_ground::types::ModelListing;
 
 pub use answer::{AnswerOutcome, ScoredAnswer};
@@ -42,7 +42,7 @@ pub struct OpenSummary {
 impl OpenSummary {
     /// Score of a subject on a group.
     #[must_use]
-    pub fn cell(&self, subject: &Subject, group: &Group) -> Option<&OpenCell> {
+    pub fn cell(&self, subject: &ModelInCondition, group: &Group) -> Option<&OpenCell> {
         self.cells
             .iter()
             .find(|cell| cell.subject == *subject && cell.group == *group)
@@ -52,7 +52,7 @@ impl OpenSummary {
     #[must_use]
     pub fn change(
         &self,
-        subject: &Subject,
+        subject: &ModelInCondition,
         baseline: Baseline,
         group: &Group,
     ) -> Option<&ScoreChange> {
@@ -96,12 +96,13 @@ pub fn open_summary_listed(
             question
         }
     };
-    let mut by_subject = BTreeMap::<&Subject, Vec<&ScoredAnswer>>::new();
+    let mut by_subject = BTreeMap::<&ModelInCondition, Vec<&ScoredAnswer>>::new();
     for answer in answers {
         by_subject.entry(&answer.subject).or_default().push(answer);
     }
     let groups = groups(questions);
-    let mut by_subject: Vec<(&Subject, Vec<&ScoredAnswer>)> = by_subject.into_iter().collect();
+    let mut by_subject: Vec<(&ModelInCondition, Vec<&ScoredAnswer>)> =
+        by_subject.into_iter().collect();
     by_subject.sort_by_cached_key(|(subject, _)| listing.place(&subject.model));
     let (mut cells, mut changes) = (Vec::new(), Vec::new());
     for (subject, answers) in &by_subject {

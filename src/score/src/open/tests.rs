@@ -12,7 +12,7 @@ fn groups(episode: usize, category: &str) -> QuestionGroups {
 
 fn scored(level: &str, question: usize, outcome: AnswerOutcome) -> ScoredAnswer {
     ScoredAnswer {
-        subject: Subject::new("m", Some(&level.parse().unwrap())),
+        subject: ModelInCondition::new("m", Some(&level.parse().unwrap())),
         question,
         outcome,
         cut: false,
@@ -70,14 +70,14 @@ fn drops_are_of_unrounded_means_on_shared_questions() {
     ]
     .concat();
     let summary = open_summary(&answers, &questions);
-    let degraded = Subject::new("m", Some(&"L2-noise".parse().unwrap()));
+    let degraded = ModelInCondition::new("m", Some(&"L2-noise".parse().unwrap()));
     let drop = summary
         .change(&degraded, Baseline::Clean, &Group::All)
         .unwrap();
     // (0.25 + 0 + 0.5 + 0.75 + 0) / 5, the fifth question being unanswered at L0.
     assert!((drop.difference.value + 0.3).abs() < 1e-12 && drop.difference.n == 5);
     assert!(drop.difference.low < -0.3 && drop.difference.high > -0.3);
-    let enhanced = Subject::new("m", Some(&"L2-noise+ruas".parse().unwrap()));
+    let enhanced = ModelInCondition::new("m", Some(&"L2-noise+ruas".parse().unwrap()));
     let gain = summary
         .change(&enhanced, Baseline::Raw, &Group::All)
         .unwrap();

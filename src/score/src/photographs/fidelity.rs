@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
 use crate::significance::{Significance, holm};
-use crate::subject::{Subject, pooled_models};
+use crate::subject::{ModelInCondition, pooled_models};
 use darkqa_ground::types::{
-    AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, KindReading, View,
+    AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, Variant, View,
 };
 use darkqa_statistics::auc::{Auc, PairCounts, RankedReply};
 
@@ -34,7 +34,7 @@ pub struct FidelityFindings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConditionFidelity {
     pub level: AxisLevel,
-    pub variant: KindReading,
+    pub variant: Variant,
     /// Enhancer; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
     /// Number of different images.
@@ -67,7 +67,7 @@ type Measured<'a> = HashMap<ImageKey<'a>, [Option<f64>; 2]>;
 type ImageKey<'a> = (&'a FrameId, Digest);
 
 /// A condition of the trials with its subjects, one for each model.
-type ConditionKey<'a> = (AxisLevel, &'a KindReading, Option<&'a EnhancerName>);
+type ConditionKey<'a> = (AxisLevel, &'a Variant, Option<&'a EnhancerName>);
 
 impl FidelityFindings {
     /// The findings for the images that were measured; `None` if no reply is about one of these.
@@ -130,7 +130,7 @@ impl FidelityFindings {
 
     /// The row of a condition.
     #[must_use]
-    pub fn condition(&self, subject: &Subject) -> Option<&ConditionFidelity> {
+    pub fn condition(&self, subject: &ModelInCondition) -> Option<&ConditionFidelity> {
         self.conditions.iter().find(|row| {
             Some(row.level) == subject.level
                 && row.variant == subject.variant

@@ -61,7 +61,7 @@ fn every_code_is_darkened_before_it_is_rounded() {
     ] {
         let file = file(bytes.clone());
         let pixels = file.pixels().unwrap();
-        assert!(matches!(&pixels, Pixels::Codes16(codes) if codes.samples() == image.as_raw()));
+        assert!(matches!(&pixels, Pixels::Rgb16Image(codes) if codes.samples() == image.as_raw()));
         let digest = blake3::hash(&bytes).to_hex().to_string();
         assert_ne!(file.digest().to_string(), digest);
         let mut differ = [0; 6];
@@ -159,7 +159,7 @@ fn profiles_of_16_bits_are_converted_in_16_bits() {
     });
     let profile = profile_chunk(&rgb_profile("P3", DISPLAY_P3, &srgb_curve()));
     let deep = file(with_chunks(&png(&image), std::slice::from_ref(&profile)));
-    let Pixels::Codes16(codes) = deep.pixels().unwrap() else {
+    let Pixels::Rgb16Image(codes) = deep.pixels().unwrap() else {
         panic!("16 bits")
     };
     // The same colours in 8 bits, which are multiples of 257 in 16.

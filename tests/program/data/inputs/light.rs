@@ -9,7 +9,7 @@ use crate::support::run::{Bench, records, words};
 use darkqa_ground::types::{FrameId, Light, Pixels, Severity};
 use darkqa_light::exposure::expose;
 use darkqa_light::raw::negative::Negative;
-use darkqa_light::{CameraModel, LightReading, NoiseKey, Synthesis};
+use darkqa_light::{CameraModel, NoiseKey, NoiseProfile, Synthesis};
 use darkqa_picture::ImageFile;
 use darkqa_picture::ReadingRule;
 use darkqa_picture::reading_rule::ColourRule;
@@ -69,8 +69,8 @@ fn flat(light: f32) -> Light {
     Light::new(64, 64, vec![light; 64 * 64 * 3]).unwrap()
 }
 
-/// The mean code of a flat image in a light reading without noise.
-fn without_noise(reading: LightReading, light: f32, drop: Severity) -> f64 {
+/// The mean code of a flat image in a noise profile without noise.
+fn without_noise(reading: NoiseProfile, light: f32, drop: Severity) -> f64 {
     let synthesis = Synthesis::new(reading, CameraModel::default());
     let key = NoiseKey::new(0, &FrameId("a".to_owned()));
     let state = synthesis.state(&key, drop);
@@ -88,7 +88,7 @@ fn without_noise(reading: LightReading, light: f32, drop: Severity) -> f64 {
 #[test]
 fn the_sensor_saturates_as_the_reading_says() {
     let drop = Severity::L2;
-    for reading in LightReading::ALL {
+    for reading in NoiseProfile::ALL {
         // Greys are those of the exposure branch, since no tone curve is undone.
         for light in [0.0, 0.02, 0.18, 0.5, 0.9] {
             let (found, expected) = (
@@ -103,13 +103,13 @@ fn the_sensor_saturates_as_the_reading_says() {
         let lamp = without_noise(reading, 16.0, drop);
         let bright = without_noise(reading, 4.0, drop);
         match reading {
-            LightReading::Paper | LightReading::Eld => {
+            NoiseProfile::Paper | NoiseProfile::Eld => {
                 assert!(
                     (lamp - 72.0).abs() < 1.0 && (bright - 72.0).abs() < 1.0,
                     "{lamp}"
                 );
             }
-            LightReading::Level | LightReading::Physical => {
+            NoiseProfile::Level | NoiseProfile::Physical => {
                 assert!((lamp - 255.0).abs() < 1.0, "{lamp}");
                 let expected = f64::from(code(4.0, drop.value()));
                 assert!((bright - expected).abs() < 1.0, "{bright} {expected}");

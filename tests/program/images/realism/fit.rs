@@ -9,7 +9,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
-/// The fits of a summary under a light reading, pair by pair.
+/// The fits of a summary under a noise profile, pair by pair.
 fn fits<'s>(summary: &'s Value, reading: &str) -> &'s [Value] {
     let fit = summary["fits"]
         .as_array()
@@ -201,7 +201,7 @@ fn the_fitted_camera_is_read_again_and_gives_the_same_numbers() {
         let camera = format!("out/fitted-{reading}.toml");
         let text = fs::read_to_string(bench.path(&camera)).unwrap();
         assert!(
-            text.contains(&format!("the light reading {reading}, as saved;")),
+            text.contains(&format!("the noise profile {reading}, as saved;")),
             "{text}"
         );
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The rows and columns of the tables: a row for each light reading, and differences pair by pair.
+//! The rows and columns of the tables: a row for each noise profile, and differences pair by pair.
 
 use super::*;
 

@@ -11,7 +11,7 @@ use crate::support::table::check_rows;
 use darkqa_eval::Rgb;
 use darkqa_ground::types::Control;
 use darkqa_ground::types::{Digest, Family};
-use darkqa_light::{CameraModel, LightReading, Synthesis};
+use darkqa_light::{CameraModel, NoiseProfile, Synthesis};
 use darkqa_scenes::Rooms;
 
 use local::{CHANGES, Change, Elsewhere};
@@ -28,9 +28,9 @@ static SMALL: LazyLock<Set> = LazyLock::new(|| {
     Set::rooms(rooms, |_| true)
 });
 
-/// The light reading whose read noise is amplified, too.
+/// The noise profile whose read noise is amplified, too.
 fn physical() -> Synthesis {
-    Synthesis::new(LightReading::Physical, CameraModel::default())
+    Synthesis::new(NoiseProfile::Physical, CameraModel::default())
 }
 
 fn spoiled(set: &Set, place: usize, asked: &Asked, control: Control) -> Rgb {

@@ -1,10 +1,10 @@
-//! The values of the columns `level` and `variant` of tables: [`AxisLevel`] and [`KindReading`].
+//! The values of the columns `level` and `variant` of tables: [`AxisLevel`] and [`Variant`].
 
 use std::borrow::Cow;
 use std::fmt;
 
 use super::degradation::{Degradation, Kind, ReadingName};
-use super::light_group::LightGroup;
+use super::light_group::RunGroup;
 use super::pair_dark::{PairDark, PhotoName};
 use super::severity::{Axis, Severity};
 use super::treatment::Treatment;
@@ -96,21 +96,21 @@ impl fmt::Display for AxisLevel {
     }
 }
 
-/// A kind of degradation in one light reading, at any severity: the levels of one curve share it. Or the darkness of pairs, which is
+/// A kind of degradation in one noise profile, at any severity: the levels of one curve share it. Or the darkness of pairs, which is
 /// on no curve: it has no kind.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct KindReading {
+pub struct Variant {
     /// The darkness of pairs; `None` for untouched frames and degradations. It is the first field, so that pairs follow all others.
     pub pair: Option<PairDark>,
     /// The kind; `None` for untouched frames and pairs.
     pub kind: Option<Kind>,
-    /// The light reading; `None` if the kind has none.
+    /// The noise profile; `None` if the kind has none.
     pub reading: Option<ReadingName>,
     /// The runs that show these images, in a report on runs that show different ones; else `None`.
-    pub group: Option<LightGroup>,
+    pub group: Option<RunGroup>,
 }
 
-impl KindReading {
+impl Variant {
     /// The value for untouched frames: no kind and no reading.
     pub const NONE: Self = Self {
         kind: None,
@@ -156,7 +156,7 @@ impl KindReading {
         }
     }
 
-    /// The name in captions, as `with noise`; with the light reading if it is not the paper's, without the group of runs.
+    /// The name in captions, as `with noise`; with the noise profile if it is not the paper's, without the group of runs.
     #[must_use]
     pub fn title(&self) -> String {
         if let Some(pair) = &self.pair {
@@ -167,7 +167,7 @@ impl KindReading {
             .map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
     }
 
-    /// The kind's word with the light reading if it is not the paper's, as `noise@eld`, or the name of a pair's darkness; without
+    /// The kind's word with the noise profile if it is not the paper's, as `noise@eld`, or the name of a pair's darkness; without
     /// the group of runs.
     #[must_use]
     pub fn kind_and_reading(&self) -> String {
@@ -192,7 +192,7 @@ impl KindReading {
     }
 }
 
-impl From<Option<&Degradation>> for KindReading {
+impl From<Option<&Degradation>> for Variant {
     fn from(degradation: Option<&Degradation>) -> Self {
         Self {
             kind: degradation.map(Degradation::kind),
@@ -202,7 +202,7 @@ impl From<Option<&Degradation>> for KindReading {
     }
 }
 
-impl From<&Treatment> for KindReading {
+impl From<&Treatment> for Variant {
     fn from(treatment: &Treatment) -> Self {
         Self {
             pair: treatment.pair().cloned(),
@@ -211,11 +211,11 @@ impl From<&Treatment> for KindReading {
     }
 }
 
-impl fmt::Display for KindReading {
+impl fmt::Display for Variant {
     /// `none`, `ev`, `noise`, `noise@eld` or `noise @RUN`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&(self.kind_and_reading() + &self.group_suffix()))
     }
 }
 
-written_as_text!(AxisLevel, KindReading);
+written_as_text!(AxisLevel, Variant);

@@ -5,9 +5,9 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::axis_level::{AxisLevel, KindReading};
+use super::axis_level::{AxisLevel, Variant};
 use super::degradation::Degradation;
-use super::light_group::LightGroup;
+use super::light_group::RunGroup;
 use super::pair_dark::{PairDark, PhotoName};
 use super::treatment::Treatment;
 use crate::error::Error;
@@ -59,7 +59,7 @@ pub struct Condition {
     /// The enhancer; `None` if the image is not enhanced.
     pub enhancer: Option<EnhancerName>,
     /// The runs that show these images, in a report on runs that show different ones; else `None`.
-    pub group: Option<LightGroup>,
+    pub group: Option<RunGroup>,
 }
 
 impl Condition {
@@ -104,10 +104,10 @@ impl Condition {
         (&self.treatment).into()
     }
 
-    /// The value of the column `variant`: the kind with its light reading, or the darkness of a pair; and its group of runs.
+    /// The value of the column `variant`: the kind with its noise profile, or the darkness of a pair; and its group of runs.
     #[must_use]
-    pub fn kind_reading(&self) -> KindReading {
-        KindReading {
+    pub fn kind_reading(&self) -> Variant {
+        Variant {
             group: self.group.clone(),
             ..(&self.treatment).into()
         }
@@ -187,10 +187,10 @@ mod tests {
             ("", "not of that form"),
             ("L3-raw", "\"raw\""),
             ("L3-noise-x", "\"noise-x\""),
-            ("L3-ev@eld", "no light readings; write L3-ev"),
+            ("L3-ev@eld", "no noise profiles; write L3-ev"),
             ("L3-noise@paper", "without its name"),
-            ("L3-noise@", "not a valid name of a light reading"),
-            ("L3-noise@a&b", "not a valid name of a light reading"),
+            ("L3-noise@", "not a valid name of a noise profile"),
+            ("L3-noise@a&b", "not a valid name of a noise profile"),
             ("E6-noise", "is written L3"),
             ("E3.30-ev", "is written E3.3"),
             ("E3.333-ev", "two decimals"),

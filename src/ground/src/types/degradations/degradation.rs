@@ -11,7 +11,7 @@ use super::severity::{Axis, Severity};
 use crate::error::Error;
 use crate::types::text::words::written_as_text;
 
-/// A kind of degradation at one severity, in one light reading if the kind has readings.
+/// A kind of degradation at one severity, in one noise profile if the kind has readings.
 ///
 /// The untouched frame, L0, is not a degradation: it is the `None` of an `Option`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -43,7 +43,7 @@ impl Degradation {
         }
         if let Some(reading) = reading.as_ref().filter(|_| !kind.has_readings()) {
             let problem = format_args!(
-                "{}-{kind}@{reading}: {kind} has no light readings; write {}-{kind}",
+                "{}-{kind}@{reading}: {kind} has no noise profiles; write {}-{kind}",
                 kind.label(severity),
                 kind.label(severity)
             );
@@ -69,7 +69,7 @@ impl Degradation {
         self.severity
     }
 
-    /// The light reading; `None` if the kind has no readings.
+    /// The noise profile; `None` if the kind has no readings.
     #[must_use]
     pub fn reading(&self) -> Option<&ReadingName> {
         self.reading.as_ref()
@@ -83,7 +83,7 @@ impl Degradation {
 }
 
 impl Ord for Degradation {
-    /// By level, kind and light reading: the levels of one axis follow each other.
+    /// By level, kind and noise profile: the levels of one axis follow each other.
     fn cmp(&self, other: &Self) -> Ordering {
         let key = |how: &Self| (how.kind.first_of_axis(), how.severity, how.kind);
         let order = key(self).cmp(&key(other));
@@ -211,7 +211,7 @@ impl Kind {
         }
     }
 
-    /// Whether the kind has light readings: several ways to understand it.
+    /// Whether the kind has noise profiles: several ways to understand it.
     #[must_use]
     pub fn has_readings(self) -> bool {
         self == Self::Sensor
@@ -337,7 +337,7 @@ impl fmt::Display for Kind {
 
 written_as_text!(Kind);
 
-/// The name of a light reading: letters, digits, `_`, `.` and `-`.
+/// The name of a noise profile: letters, digits, `_`, `.` and `-`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize)]
 pub struct ReadingName(Cow<'static, str>);
 
@@ -358,7 +358,7 @@ impl ReadingName {
                 .all(|c: char| c.is_ascii_alphanumeric() || "_.-".contains(c))
         {
             let problem = format_args!(
-                "{name:?} is not a valid name of a light reading: only letters, digits, '_', '.' and '-' are allowed"
+                "{name:?} is not a valid name of a noise profile: only letters, digits, '_', '.' and '-' are allowed"
             );
             return Err(Error::usage("reading", problem));
         }

@@ -1,4 +1,4 @@
-//! Runs of a report that show the same images, if other runs show others under the same name: [`LightGroup`].
+//! Runs of a report that show the same images, if other runs show others under the same name: [`RunGroup`].
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,14 +7,14 @@ use std::sync::Arc;
 ///
 /// A condition of a run alone has none. It is never stored: only a report on several runs sets it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct LightGroup {
+pub struct RunGroup {
     /// The name of the first of the runs, which the tables show.
     name: Arc<str>,
     /// The numbers of the runs in the report.
     runs: Arc<[usize]>,
 }
 
-impl LightGroup {
+impl RunGroup {
     /// The group of these runs; the tables show `name`.
     #[must_use]
     pub fn new(name: &str, runs: &[usize]) -> Self {
@@ -39,7 +39,7 @@ impl LightGroup {
 }
 
 /// The name of the group as conditions and variants end with it: ` @RUN`.
-impl fmt::Display for LightGroup {
+impl fmt::Display for RunGroup {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, " @{}", self.name)
     }
@@ -51,11 +51,11 @@ mod tests {
 
     #[test]
     fn groups_meet_in_a_run() {
-        let group = |runs: &[usize]| LightGroup::new("a", runs);
+        let group = |runs: &[usize]| RunGroup::new("a", runs);
         let (one, two, both) = (group(&[0]), group(&[1]), group(&[0, 1]));
-        assert!(!LightGroup::meet(Some(&one), Some(&two)));
-        assert!(LightGroup::meet(Some(&one), Some(&both)));
-        assert!(LightGroup::meet(None, Some(&two)));
+        assert!(!RunGroup::meet(Some(&one), Some(&two)));
+        assert!(RunGroup::meet(Some(&one), Some(&both)));
+        assert!(RunGroup::meet(None, Some(&two)));
         assert_eq!(format!("L3-noise{one}"), "L3-noise @a");
     }
 }

@@ -14,13 +14,13 @@ mod severity;
 mod treatment;
 mod treatment_set;
 
-pub use axis_level::{AxisLevel, KindReading};
+pub use axis_level::{AxisLevel, Variant};
 pub use condition::{Condition, EnhancerName};
 pub use condition_columns::ConditionColumns;
 pub use degradation::{Degradation, Kind, ReadingName};
 pub use exposure_facts::ExposureFacts;
 pub use kind_set::KindSet;
-pub use light_group::LightGroup;
+pub use light_group::RunGroup;
 pub use pair_dark::{PairDark, PhotoName};
 pub use pair_facts::PairFacts;
 pub use set_light::SetLight;

@@ -107,7 +107,7 @@ impl PairDark {
         }
     }
 
-    /// The light reading of synthesis; `None` for a photograph, and for kinds without readings.
+    /// The noise profile of synthesis; `None` for a photograph, and for kinds without readings.
     #[must_use]
     pub fn reading(&self) -> Option<&ReadingName> {
         match self {
@@ -116,7 +116,7 @@ impl PairDark {
         }
     }
 
-    /// The same without the light reading: images of one sort are compared as lights of one level.
+    /// The same without the noise profile: images of one sort are compared as lights of one level.
     #[must_use]
     pub fn sort(&self) -> Self {
         match self {
@@ -175,7 +175,7 @@ impl FromStr for PairDark {
             .filter(|kind| kind.can_match())
             .ok_or_else(|| wrong("the forms are match-ev, match-noise and match-auto"))?;
         if reading.is_some() && !kind.has_readings() {
-            return Err(wrong("this kind has no light readings"));
+            return Err(wrong("this kind has no noise profiles"));
         }
         if reading == Some(ReadingName::PAPER) {
             return Err(wrong("the reading paper is written without its name"));

@@ -1,4 +1,4 @@
-//! Images of three channels, by the depth of their samples: [`Rgb`], [`Codes16`] and [`Light`].
+//! Images of three channels, by the depth of their samples: [`Rgb`], [`Rgb16Image`] and [`Light`].
 
 use std::fmt;
 
@@ -16,7 +16,7 @@ pub struct Image<T> {
 pub type Rgb = Image<u8>;
 
 /// An image of 16-bit sRGB codes.
-pub type Codes16 = Image<u16>;
+pub type Rgb16Image = Image<u16>;
 
 /// Linear light of an image, with the primaries of sRGB; black is 0, white is 1.
 ///
@@ -44,7 +44,7 @@ impl Sample for u8 {
 
 impl Sample for u16 {
     const IMAGE: &str = "image of 16 bits";
-    const NAME: &str = "Codes16";
+    const NAME: &str = "Rgb16Image";
 }
 
 impl Sample for f32 {
@@ -138,11 +138,11 @@ mod tests {
     #[test]
     fn sizes_are_checked() {
         assert!(Rgb::new(2, 2, vec![0; 12]).is_ok());
-        assert!(Codes16::new(2, 2, vec![0; 12]).is_ok());
+        assert!(Rgb16Image::new(2, 2, vec![0; 12]).is_ok());
         assert!(Light::new(2, 2, vec![0.5; 12]).is_ok());
         for (height, width, samples) in [(2, 2, 11), (0, 2, 0), (usize::MAX, 2, 12), (2, 2, 13)] {
             assert!(Rgb::new(height, width, vec![0; samples]).is_err());
-            assert!(Codes16::new(height, width, vec![0; samples]).is_err());
+            assert!(Rgb16Image::new(height, width, vec![0; samples]).is_err());
             assert!(Light::new(height, width, vec![0.5; samples]).is_err());
         }
     }

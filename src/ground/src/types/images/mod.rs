@@ -10,7 +10,7 @@ mod shown_codes;
 #[cfg(feature = "program")]
 pub use frame::Frame;
 pub use frame::{DepthKind, FrameId, Intrinsics, Segmentation, is_image_ending};
-pub use image::{Codes16, Image, Light, Rgb, Sample};
+pub use image::{Image, Light, Rgb, Rgb16Image, Sample};
 pub use isa::{Isa, Kernel};
 pub use labels::{Label, Labels, OTHER_PLACES, SegmentName};
 pub use pixels::Pixels;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::image::{Codes16, Light, Rgb};
+use super::image::{Light, Rgb, Rgb16Image};
 use super::shown_codes::{from_linear, from_rgb16};
 /// The pixels of a clean frame. A copy shares them.
 #[derive(Debug, Clone)]
@@ -10,7 +10,7 @@ pub enum Pixels {
     /// 8-bit sRGB codes.
     Codes8(Arc<Rgb>),
     /// 16-bit sRGB codes.
-    Codes16(Arc<Codes16>),
+    Rgb16Image(Arc<Rgb16Image>),
     /// Linear light of the scene, with the primaries of sRGB. White is 1, and light may be more.
     Light(Arc<Light>),
 }
@@ -21,7 +21,7 @@ impl Pixels {
     pub fn height(&self) -> usize {
         match self {
             Self::Codes8(codes) => codes.height(),
-            Self::Codes16(codes) => codes.height(),
+            Self::Rgb16Image(codes) => codes.height(),
             Self::Light(light) => light.height(),
         }
     }
@@ -31,7 +31,7 @@ impl Pixels {
     pub fn width(&self) -> usize {
         match self {
             Self::Codes8(codes) => codes.width(),
-            Self::Codes16(codes) => codes.width(),
+            Self::Rgb16Image(codes) => codes.width(),
             Self::Light(light) => light.width(),
         }
     }
@@ -41,7 +41,7 @@ impl Pixels {
     pub fn codes(&self) -> Arc<Rgb> {
         match self {
             Self::Codes8(codes) => Arc::clone(codes),
-            Self::Codes16(codes) => Arc::new(from_rgb16(codes)),
+            Self::Rgb16Image(codes) => Arc::new(from_rgb16(codes)),
             Self::Light(light) => Arc::new(from_linear(light)),
         }
     }

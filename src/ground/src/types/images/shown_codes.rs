@@ -2,14 +2,14 @@
 
 use std::sync::LazyLock;
 
-use super::image::{Codes16, Light, Rgb};
+use super::image::{Light, Rgb, Rgb16Image};
 
 /// Exponent between light and codes, the same as of the exposure drop, so that an undarkened image is the drop of 0 EV (DarkQA,
 /// eqs. 1 and 3).
 const GAMMA: f64 = 2.2;
 
 /// The nearest 8-bit codes.
-pub(super) fn from_rgb16(codes: &Codes16) -> Rgb {
+pub(super) fn from_rgb16(codes: &Rgb16Image) -> Rgb {
     let nearest = |code: u16| ((u32::from(code) + 128) / 257) as u8;
     filled(
         codes.height(),
@@ -48,7 +48,7 @@ mod tests {
     #[test]
     fn sixteen_bits_become_the_nearest_eight() {
         let codes: Vec<u16> = (0..=65_535).chain([0, 0]).collect();
-        let image = from_rgb16(&Codes16::new(1, codes.len() / 3, codes.clone()).unwrap());
+        let image = from_rgb16(&Rgb16Image::new(1, codes.len() / 3, codes.clone()).unwrap());
         for (code, shown) in codes.iter().zip(image.samples()) {
             let expected = (f64::from(*code) / 257.0).round();
             assert!((f64::from(*shown) - expected).abs() < 0.5, "{code}");

@@ -41,7 +41,7 @@ pub struct InputNote {
 pub enum DepthNote {
     /// Codes of 16 bits.
     #[serde(rename = "16-bit")]
-    Codes16,
+    Rgb16Image,
     /// Linear light.
     #[serde(rename = "light")]
     Light,
@@ -123,7 +123,7 @@ impl InputNote {
 impl DepthNote {
     fn words(self) -> &'static str {
         match self {
-            Self::Codes16 => "16-bit codes",
+            Self::Rgb16Image => "16-bit codes",
             Self::Light => "linear light",
         }
     }

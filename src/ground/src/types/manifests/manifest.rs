@@ -212,7 +212,7 @@ pub struct RunManifest {
     pub platform: BTreeMap<String, String>,
     /// The settings that all trials share and no column shows, by flag. A run can only be resumed with the same identity.
     pub identity: Identity,
-    /// The meaning of each value in a column of the tables, by column and value: models, enhancers, light readings. A run may
+    /// The meaning of each value in a column of the tables, by column and value: models, enhancers, noise profiles. A run may
     /// get further values; the meaning of an existing value never changes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: Columns,

@@ -1,4 +1,4 @@
-//! Tests of claims under several light readings, from made records.
+//! Tests of claims under several noise profiles, from made records.
 
 use super::*;
 use crate::tests::{records, with_grid};

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::grid::Grid;
 use crate::photographs::pair_darkness::{PairDarkness, pair_facts};
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Axis;
-use darkqa_ground::types::{KindReading, View};
+use darkqa_ground::types::{Variant, View};
 
 /// Distance in EV between a photograph and a level within which the two are compared; chosen: half the largest step of the paper's
 /// levels.
@@ -18,7 +18,7 @@ const NEAR: f64 = 1.0;
 pub(super) fn as_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
     let subject = &grid.subjects[photographed];
     let facts = pair_facts(grid, photographed);
-    let others: Vec<(usize, &Subject)> = grid
+    let others: Vec<(usize, &ModelInCondition)> = grid
         .subjects
         .iter()
         .enumerate()
@@ -29,7 +29,7 @@ pub(super) fn as_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
                 && other.variant.group == subject.variant.group
         })
         .collect();
-    let is_match = |(index, other): &&(usize, &Subject)| {
+    let is_match = |(index, other): &&(usize, &ModelInCondition)| {
         other.variant.pair.is_some() && other.variant.synthetic_kind().is_some() && {
             // Images that are as dark as another photograph of the frames are not as dark as these.
             let of = pair_facts(grid, *index);
@@ -56,11 +56,11 @@ pub(super) fn as_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
     else {
         return Vec::new();
     };
-    let distance = |of: &Subject| {
+    let distance = |of: &ModelInCondition| {
         let level = of.level.filter(|level| level.axis() == Some(Axis::LIGHT))?;
         Some((level.value() - darkness.synthesis).abs())
     };
-    let mut nearest = BTreeMap::<&KindReading, (f64, usize)>::new();
+    let mut nearest = BTreeMap::<&Variant, (f64, usize)>::new();
     for (index, other) in others {
         if let Some(distance) = distance(other).filter(|distance| *distance <= NEAR) {
             let best = nearest.entry(&other.variant).or_insert((distance, index));

@@ -6,7 +6,7 @@ use crate::comparisons::pooled_kind::PooledKind;
 use crate::estimate::{Estimate, largest};
 use crate::significance::{Significance, SwapMethod};
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant};
 
 /// Difference of two conditions at one level, for all models of the pool together, in the strict parsing and the lenient one.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,8 +15,8 @@ pub struct PooledFinding {
     pub kind: PooledKind,
     /// Question family; `None` for all families together. Findings about false answers have [`Family::Presence`] alone.
     pub family: Option<Family>,
-    /// Kind of degradation of the first side, with its light reading; [`KindReading::NONE`] for L0 against no image.
-    pub variant: KindReading,
+    /// Kind of degradation of the first side, with its noise profile; [`Variant::NONE`] for L0 against no image.
+    pub variant: Variant,
     /// Enhancer of the first side; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
     /// Level of the first side; of a mean over several, the darkest one.

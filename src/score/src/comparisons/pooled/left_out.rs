@@ -5,14 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::PooledSet;
 use crate::comparisons::pooled_kind::PooledKind;
 use crate::grid::Grid;
-use darkqa_ground::types::{AxisLevel, EnhancerName, KindReading};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Variant};
 
 /// Models that a set of findings leaves out, because they answered less than others at some levels; or levels that it leaves out, because
 /// only these models were asked there.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ModelsLeftOut {
     pub kind: PooledKind,
-    pub variant: KindReading,
+    pub variant: Variant,
     pub enhancer: Option<EnhancerName>,
     /// The models, sorted.
     pub models: Vec<String>,

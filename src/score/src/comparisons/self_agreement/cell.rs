@@ -13,13 +13,13 @@ use crate::choice::ReadingMode;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::{Grid, TrialResult};
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, Family, View};
 
 /// Agreement of one subject on one family in one reading, and what keeps it honest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AgreementCell {
-    pub subject: Subject,
+    pub subject: ModelInCondition,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
     /// How the replies were read.

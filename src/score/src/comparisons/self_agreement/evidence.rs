@@ -7,9 +7,9 @@ use crate::choice::ReadingMode;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
-use crate::subject::Subject;
+use crate::subject::ModelInCondition;
 use crate::threshold::{LevelCounts, NoThreshold, Threshold};
-use darkqa_ground::types::{AxisLevel, EnhancerName, Family, KindReading};
+use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant};
 
 /// Smallest distance between the floor and the ceiling for which a share of it is given; chosen.
 pub const MIN_DISTANCE: f64 = 0.1;
@@ -46,14 +46,14 @@ impl Bounds {
     /// If one of them was not asked, or they are too close, or may be.
     pub(super) fn new(
         grid: &Grid<'_>,
-        subject: &Subject,
+        subject: &ModelInCondition,
         family: Option<&Family>,
         mode: ReadingMode,
         draws: &Resamples,
     ) -> Result<Self, NoEvidence> {
-        let light = Subject::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
+        let light = ModelInCondition::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
         let again = grid.stand_in(&light).ok_or(NoEvidence::NotAgain)?;
-        let blind = Subject::new(&subject.model, None);
+        let blind = ModelInCondition::new(&subject.model, None);
         let blind = grid.stand_in(&blind).ok_or(NoEvidence::NotBlind)?;
         let [blind, again] = [blind, again].map(|subject| grid.counts(subject, family, mode));
         let ceiling = share(&again).ok_or(NoEvidence::NotAgain)?;
@@ -133,7 +133,7 @@ pub enum NoHalf {
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvidenceCurve {
     pub model: String,
-    pub variant: KindReading,
+    pub variant: Variant,
     /// Enhancer; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
     /// The darkest level of the curve.

@@ -6,8 +6,7 @@ use crate::choice::ReadingMode;
 use crate::estimate::Estimate;
 use darkqa_ground::types::questions::CANNOT_TELL;
 use darkqa_ground::types::{
-    ChoiceDetail, Condition, LightGroup, QuestionId, Treatment, TrialRef, Trials, UnreadReason,
-    View,
+    ChoiceDetail, Condition, QuestionId, RunGroup, Treatment, TrialRef, Trials, UnreadReason, View,
 };
 
 /// Identity of a question for a model: its name, and the order of its choices.
@@ -107,7 +106,7 @@ impl<'a> LightAnswers<'a> {
         let group = |trial: TrialRef<'_>| trial.condition().and_then(|at| at.group.clone());
         let own = group(trial);
         let mut light = self.by_question.get(&key)?.iter();
-        let met = light.find(|light| LightGroup::meet(group(**light).as_ref(), own.as_ref()));
+        let met = light.find(|light| RunGroup::meet(group(**light).as_ref(), own.as_ref()));
         chosen(*met?, mode)
     }
 

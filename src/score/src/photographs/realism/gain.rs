@@ -37,7 +37,7 @@ fn log_gain(index: usize, n: usize) -> f64 {
     low + (high - low) * index as f64 / (n - 1) as f64
 }
 
-/// Fit of the gain to one pair under one light reading.
+/// Fit of the gain to one pair under one noise profile.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GainFit {
     /// The gain whose spread is nearest, in ADU per electron; `None` without enough smooth blocks.
@@ -150,7 +150,7 @@ impl fmt::Display for FitOutcome {
     }
 }
 
-/// The gains of several pairs under one light reading.
+/// The gains of several pairs under one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PooledGain {
     /// Geometric mean with its 95 % interval by Student's t distribution of ln K; `None` for fewer than 3 pairs.
@@ -181,10 +181,10 @@ impl PooledGain {
     }
 }
 
-/// Fits of the gain to all pairs under one light reading.
+/// Fits of the gain to all pairs under one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadingFit {
-    /// Name of the light reading.
+    /// Name of the noise profile.
     pub reading: ReadingName,
     /// Ratio r that the fit took, if images show only the product r · K; `None` if r is 2^ΔEV.
     pub ratio: Option<f64>,

@@ -78,7 +78,7 @@ pub struct NoiseComparison {
 /// A way to make images with sensor noise.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct NoiseMethod {
-    /// Name of the light reading.
+    /// Name of the noise profile.
     pub reading: ReadingName,
     pub camera: CameraOrigin,
 }

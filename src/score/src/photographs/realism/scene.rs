@@ -5,7 +5,7 @@
 //! 2^(−ΔEV/2.2), which does not change a correlation.
 //!
 //! Measured on 33 indoor photographs of 21 scenes at 600 × 400: the correlation is 0.37 to 1 (median 0.99) for 1,055 synthetic
-//! partners of 2 to 9 EV, all light readings, K 0.1 and 6; at most 0.21 for 1,483 pairs of two scenes, 427 of them with real
+//! partners of 2 to 9 EV, all noise profiles, K 0.1 and 6; at most 0.21 for 1,483 pairs of two scenes, 427 of them with real
 //! low-light images; 1.00 and 0.86 for a real and a synthetic pair of LOL-v2. A picture of 4 EV that is moved by 2 % of its shorter
 //! side has 0.67 or more, by 4 % 0.25 or more.
 

@@ -1,4 +1,4 @@
-//! Light readings, ways to understand the paper's noise model: [`Synthesis`], its named contents [`LightReading`], and those
+//! Noise profiles, ways to understand the paper's noise model: [`Synthesis`], its named contents [`NoiseProfile`], and those
 //! of a run, [`Readings`].
 
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ pub struct Synthesis {
 
 /// A named way to understand the paper's noise model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum LightReading {
+pub enum NoiseProfile {
     /// The words of the DarkQA paper. Read, row and quantisation noise act after the amplification, and add less than 0.1 codes.
     #[default]
     Paper,
@@ -39,8 +39,8 @@ pub enum LightReading {
     Physical,
 }
 
-impl LightReading {
-    /// All readings, in the order in which tables list them.
+impl NoiseProfile {
+    /// All profiles, in the order in which tables list them.
     pub const ALL: [Self; 4] = [Self::Paper, Self::Eld, Self::Level, Self::Physical];
 
     /// Name in conditions, as `eld` in `L3-noise@eld`.
@@ -56,14 +56,14 @@ impl LightReading {
 }
 
 impl Synthesis {
-    /// The choices of a named reading, with the given camera.
+    /// The choices of a named profile, with the given camera.
     #[must_use]
-    pub fn new(reading: LightReading, camera: CameraModel) -> Self {
+    pub fn new(reading: NoiseProfile, camera: CameraModel) -> Self {
         let (amplify, tone, coupling) = match reading {
-            LightReading::Paper => Default::default(),
-            LightReading::Eld => (Amplify::All, Tone::None, Coupling::Independent),
-            LightReading::Level => (Amplify::ShotOnly, Tone::None, Coupling::Photon),
-            LightReading::Physical => (Amplify::All, Tone::BeforeEv, Coupling::Photon),
+            NoiseProfile::Paper => Default::default(),
+            NoiseProfile::Eld => (Amplify::All, Tone::None, Coupling::Independent),
+            NoiseProfile::Level => (Amplify::ShotOnly, Tone::None, Coupling::Photon),
+            NoiseProfile::Physical => (Amplify::All, Tone::BeforeEv, Coupling::Photon),
         };
         Self {
             amplify,
@@ -74,17 +74,17 @@ impl Synthesis {
         }
     }
 
-    /// Name of the reading that has these choices, whatever the camera; `custom` if there is none.
+    /// Name of the profile that has these choices, whatever the camera; `custom` if there is none.
     #[must_use]
     pub fn name(&self) -> ReadingName {
-        LightReading::ALL
+        NoiseProfile::ALL
             .into_iter()
             .find(|reading| Self::new(*reading, self.camera.clone()) == *self)
-            .map_or(ReadingName::CUSTOM, LightReading::name)
+            .map_or(ReadingName::CUSTOM, NoiseProfile::name)
     }
 }
 
-/// Light readings of a run by name; at least one.
+/// Noise profiles of a run by name; at least one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(transparent)]
 pub struct Readings(BTreeMap<ReadingName, Synthesis>);
@@ -102,25 +102,25 @@ impl From<Synthesis> for Readings {
 }
 
 impl Readings {
-    /// Several named readings with one camera; `paper` alone for an empty list.
+    /// Several named profiles with one camera; `paper` alone for an empty list.
     #[must_use]
-    pub fn named(readings: &[LightReading], camera: &CameraModel) -> Self {
+    pub fn named(readings: &[NoiseProfile], camera: &CameraModel) -> Self {
         let contents: BTreeMap<_, _> = readings
             .iter()
             .map(|reading| (reading.name(), Synthesis::new(*reading, camera.clone())))
             .collect();
         if contents.is_empty() {
-            return Synthesis::new(LightReading::Paper, camera.clone()).into();
+            return Synthesis::new(NoiseProfile::Paper, camera.clone()).into();
         }
         Self(contents)
     }
 
-    /// Names and contents of the readings, `paper` first.
+    /// Names and contents of the profiles, `paper` first.
     pub fn iter(&self) -> impl Iterator<Item = (&ReadingName, &Synthesis)> {
         self.0.iter()
     }
 
-    /// The sensor of all readings, with neither its gain nor its ratio pinned.
+    /// The sensor of all profiles, with neither its gain nor its ratio pinned.
     pub fn camera(&self) -> CameraModel {
         self.0
             .values()
@@ -129,11 +129,11 @@ impl Readings {
             .map_or_else(CameraModel::default, CameraModel::unpinned)
     }
 
-    /// Content of a degradation's light reading. For a kind without readings it is any of them, because the pixels do not
+    /// Content of a degradation's noise profile. For a kind without profiles it is any of them, because the pixels do not
     /// depend on it.
     ///
     /// # Errors
-    /// If the run does not have the reading.
+    /// If the run does not have the profile.
     pub fn for_degradation(&self, degradation: Option<&Degradation>) -> Result<&Synthesis> {
         let content = match degradation.and_then(Degradation::reading) {
             None => self.0.values().next(),
@@ -142,7 +142,7 @@ impl Readings {
         content.ok_or_else(|| {
             let names: Vec<&str> = self.0.keys().map(ReadingName::as_str).collect();
             let problem = format_args!(
-                "{} needs a light reading that is not among those of --profile ({}); add it there",
+                "{} needs a noise profile that is not among those of --profile ({}); add it there",
                 degradation.map_or("L0".to_owned(), ToString::to_string),
                 names.join(", ")
             );
@@ -150,12 +150,12 @@ impl Readings {
         })
     }
 
-    /// Content of the reading of this name; `None` if the run does not have it.
+    /// Content of the profile of this name; `None` if the run does not have it.
     pub fn get(&self, name: &ReadingName) -> Option<&Synthesis> {
         self.0.get(name)
     }
 
-    /// The content of the only reading.
+    /// The content of the only profile.
     ///
     /// # Errors
     /// If there are several.
@@ -165,7 +165,7 @@ impl Readings {
             (Some(content), None) => Ok(content),
             _ => Err(Error::usage(
                 "--profile",
-                "this command takes one light reading",
+                "this command takes one noise profile",
             )),
         }
     }
@@ -255,10 +255,10 @@ mod tests {
     fn the_default_is_the_paper() {
         let camera = CameraModel::default();
         assert_eq!(
-            Synthesis::new(LightReading::Paper, camera.clone()),
+            Synthesis::new(NoiseProfile::Paper, camera.clone()),
             Synthesis::default()
         );
-        let physical = Synthesis::new(LightReading::Physical, camera);
+        let physical = Synthesis::new(NoiseProfile::Physical, camera);
         assert_eq!(physical.amplify, Amplify::All);
         assert_eq!(physical.coupling, Coupling::Photon);
     }
@@ -267,7 +267,7 @@ mod tests {
     fn parts_that_match_a_reading_have_its_name() {
         let mut camera = CameraModel::default();
         camera.pin_gain(0.1).unwrap();
-        for reading in LightReading::ALL {
+        for reading in NoiseProfile::ALL {
             let synthesis = Synthesis::new(reading, camera.clone());
             assert_eq!(synthesis.name(), reading.name());
             let fresh = Synthesis {
@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn a_reading_that_the_run_lacks_is_named() {
-        let readings = Readings::named(&[LightReading::Paper], &CameraModel::default());
+        let readings = Readings::named(&[NoiseProfile::Paper], &CameraModel::default());
         let degradation: Degradation = "L3-noise@eld".parse().unwrap();
         let error = readings
             .for_degradation(Some(&degradation))
@@ -288,7 +288,7 @@ mod tests {
             .to_string();
         assert!(
             error.contains(
-                "L3-noise@eld needs a light reading that is not among those of --profile (paper)"
+                "L3-noise@eld needs a noise profile that is not among those of --profile (paper)"
             ),
             "{error}"
         );

@@ -1,19 +1,19 @@
-//! The light readings that a report has noisy images in: [`LightReadings`].
+//! The noise profiles that a report has noisy images in: [`NoiseProfiles`].
 
 use std::collections::BTreeSet;
 
 use serde::Serialize;
 
 use crate::types::ReadingName;
-use darkqa_score::subject::Subject;
+use darkqa_score::subject::ModelInCondition;
 
-/// The light readings of the subjects with noise, `paper` first.
+/// The noise profiles of the subjects with noise, `paper` first.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
-pub(crate) struct LightReadings(BTreeSet<ReadingName>);
+pub(crate) struct NoiseProfiles(BTreeSet<ReadingName>);
 
-impl LightReadings {
-    pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s Subject>) -> Self {
+impl NoiseProfiles {
+    pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s ModelInCondition>) -> Self {
         let subjects = subjects.into_iter();
         Self(
             subjects
@@ -22,7 +22,7 @@ impl LightReadings {
         )
     }
 
-    /// The open question of a single light reading, and how the others are asked; `None` without noise or with several readings.
+    /// The open question of a single noise profile, and how the others are asked; `None` without noise or with several readings.
     pub(crate) fn open_question(&self) -> Option<String> {
         let mut readings = self.0.iter();
         let (Some(only), None) = (readings.next(), readings.next()) else {
@@ -47,11 +47,11 @@ mod tests {
                 .iter()
                 .map(|text| text.parse().unwrap())
                 .collect();
-            let subjects: Vec<Subject> = conditions
+            let subjects: Vec<ModelInCondition> = conditions
                 .iter()
-                .map(|c| Subject::new("m", Some(c)))
+                .map(|c| ModelInCondition::new("m", Some(c)))
                 .collect();
-            LightReadings::new(&subjects)
+            NoiseProfiles::new(&subjects)
         };
         let one = of(&["L0", "L3-ev", "L3-noise@eld", "L5-noise@eld+lift"]);
         let said = one.open_question().unwrap();
