@@ -279,7 +279,8 @@ impl Enhancer {
             (Some(found), None) => {
                 self.refused.insert(size);
                 if is_new {
-                    tracing::warn!("{}: {}", self.path.display(), found.words());
+                    let words = sidecar::named(&found.words(), &self.path);
+                    tracing::warn!("{}: {words}", self.path.display());
                 }
                 self.attempt(image, self.rule(size))
             }

@@ -261,7 +261,7 @@ fn vector_length(port: &Port) -> Option<usize> {
         .map(Dim::known)
         .collect::<Option<Vec<usize>>>()?;
     let long = sizes.iter().filter(|size| **size > 1).count();
-    (long == 1 && sizes.len() <= 2).then(|| sizes.iter().product())
+    (long == 1).then(|| sizes.iter().product())
 }
 
 /// The line of a sidecar for a list.
@@ -286,7 +286,10 @@ fn missing(port: &Port, places: Option<Places>) -> String {
         let line = match (known, &port.element) {
             _ if vector_length(port).is_some_and(|length| length > 1) => {
                 let length = vector_length(port).unwrap_or(1);
-                format!("{}, its authors' values", list_line(&key, length))
+                format!(
+                    "{}, its authors' values; if they are computed from the image, as a histogram is, export the model with that computation in the graph",
+                    list_line(&key, length)
+                )
             }
             (Some((value, preset)), _) => format!("`{key} = {value}`, as preset {preset} has it"),
             (None, ElementType::Bool) => format!("`{key} = true` or `{key} = false`"),
@@ -299,7 +302,7 @@ fn missing(port: &Port, places: Option<Places>) -> String {
     let name = port.name.to_lowercase();
     if ATTENTION.iter().any(|word| name.contains(word)) {
         return format!(
-            "takes {port} in addition to the image, which seems to be made from it; {beside} an expression, as `{key} = {{ from = \"1 - max(image)\" }}`, with its authors' formula"
+            "takes {port} in addition to the image, which seems to be made from it; {beside} an expression, as `{key} = {{ from = \"1 - max(image)\" }}`, with its authors' formula; a blur or a maximum over the image must be in the graph"
         );
     }
     let number = known.map_or("NUMBER".to_owned(), |(value, _)| value.to_string());

@@ -94,7 +94,13 @@ impl Enhancer {
             _ => None,
         };
         let problem = problem.or_else(|| probe.problem());
-        Ok(problem.map(|problem| sidecar::named(&problem, self.path())))
+        let unread = self
+            .graph()
+            .unread_images()
+            .map_or(String::new(), |unread| {
+                format!(". Perhaps another output is needed: {unread}")
+            });
+        Ok(problem.map(|problem| sidecar::named(&(problem + &unread), self.path())))
     }
 
     /// Enhances a frame in a condition, and looks at the result; with what its note got from it.

@@ -231,7 +231,7 @@ pub(crate) fn global(rule: SizeRule, size: [usize; 2], why: &str) -> String {
         .fixed
         .map(|side: Option<usize>| side.map_or("any".to_owned(), |side| side.to_string()));
     format!(
-        "takes images of {width} × {height} alone, and the image has {}; filling or cutting would change it, because {why}. Export the model with free sizes: torch.onnx.export(..., dynamic_axes={{\"input\": {{2: \"h\", 3: \"w\"}}, \"output\": {{2: \"h\", 3: \"w\"}}}}); or export it for images of {}; or let --llie-options resize resize each image to {width} × {height} and back, which blurs it and changes its brightness by some codes of 255",
+        "takes images of {width} × {height} alone, and the image has {}; filling or cutting would change it, because {why}. Export the model with free sizes: torch.onnx.export(..., input_names=[\"input\"], output_names=[\"output\"], dynamic_axes={{\"input\": {{2: \"h\", 3: \"w\"}}, \"output\": {{2: \"h\", 3: \"w\"}}}}); or export it for images of {}; or let --llie-options resize resize each image to {width} × {height} and back, which blurs it and changes its brightness by some codes of 255",
         by(size),
         by(size)
     )
