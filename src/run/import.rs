@@ -2,6 +2,7 @@
 
 mod camera_facts;
 mod frame_writer;
+mod mcap_files;
 mod recording;
 mod topic_list;
 mod video;

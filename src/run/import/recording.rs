@@ -11,10 +11,10 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use super::camera_facts::{Cameras, Exposures};
-use super::frame_writer::{COPIED, ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
+use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
+use super::mcap_files::{bytes, files, overview, reader};
 use super::topic_list::{listing, no_images};
 use crate::error::{Error, Result};
-use crate::files::reading::{entries, open};
 use crate::images::progress::{Progress, StepBar};
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::recording::{
@@ -22,8 +22,6 @@ use crate::import::recording::{
     Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview, camera_of,
     seconds, stamp,
 };
-use crate::picture::ImageFile;
-use crate::picture::reading_rule::ReadingRule;
 use crate::runs::Outcome;
 use crate::text::words::{counted, first_names};
 use crate::types::Decides;
@@ -147,97 +145,6 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
     drop(bar);
     let info = args.written.info("mcap", &drive);
     import.finish(args, out, info, &files[0], problems)
-}
-
-/// The MCAP files that paths stand for: a folder for the files in it, in the order of their numbers.
-fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
-    let mut files = Vec::new();
-    for path in paths {
-        if !path.is_dir() {
-            files.push(path.clone());
-            continue;
-        }
-        let mut inside = entries(path)?;
-        inside.retain(|file| file.extension().is_some_and(|ending| ending == "mcap"));
-        if inside.is_empty() {
-            return Err(Error::data(path.display(), no_mcap_inside(path)?));
-        }
-        inside.sort_by_cached_key(|file| {
-            let stem = file
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            let name = stem
-                .trim_end_matches(|c: char| c.is_ascii_digit())
-                .to_owned();
-            let number: u64 = stem[name.len()..].parse().unwrap_or(0);
-            (name, number, stem)
-        });
-        files.extend(inside);
-    }
-    Ok(files)
-}
-
-/// The problem of a folder without MCAP files.
-fn no_mcap_inside(folder: &Path) -> Result<&'static str> {
-    let files = entries(folder)?;
-    let has = |ending: &str| {
-        files
-            .iter()
-            .any(|file| file.extension().is_some_and(|own| own == ending))
-    };
-    Ok(if has("db3") {
-        "a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap"
-    } else if has("zstd") || has("zst") {
-        "its files are compressed as a whole; unpack them first: zstd -d FILE"
-    } else {
-        "no .mcap file in this folder"
-    })
-}
-
-/// Bytes of the files.
-fn bytes(files: &[PathBuf]) -> u64 {
-    files
-        .iter()
-        .filter_map(|file| file.metadata().ok())
-        .map(|facts| facts.len())
-        .sum()
-}
-
-fn reader(path: &Path) -> Result<McapReader<File>> {
-    let file = open(path).map_err(|e| Error::file(path, "read", e))?;
-    McapReader::open(file).map_err(|problem| Error::data(path.display(), problem))
-}
-
-/// The topics of all files.
-fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overview> {
-    let bar = progress.bar("files", files.len());
-    let mut overview = Overview::default();
-    for file in files {
-        bar.inc();
-        let reader = match reader(file) {
-            Ok(reader) => reader,
-            Err(e) if files.len() == 1 => return Err(e),
-            Err(e) => {
-                overview.problems.push(e.to_string());
-                continue;
-            }
-        };
-        overview.add(&file.display().to_string(), reader, image_size);
-    }
-    Ok(overview)
-}
-
-/// Width and height of an image file of a message.
-fn image_size(bytes: &[u8]) -> Result<(u32, u32), String> {
-    let name = "the first image".to_owned();
-    let file = ImageFile::new(bytes.to_vec(), name, ReadingRule::default());
-    let ending = file.ending();
-    if !COPIED.contains(&ending) {
-        return Err(format!("a file .{ending}; JPEG, PNG or WebP expected"));
-    }
-    file.check().map_err(|e| e.to_string())
 }
 
 /// The topics whose images are taken: those that are named, or the only one.

@@ -1,0 +1,103 @@
+//! The MCAP files of a recording: [`files`], [`reader`] and the [`overview`] of their topics.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use super::frame_writer::COPIED;
+use crate::error::{Error, Result};
+use crate::files::reading::{entries, open};
+use crate::images::progress::Progress;
+use crate::import::recording::{McapReader, Overview};
+use crate::picture::ImageFile;
+use crate::picture::reading_rule::ReadingRule;
+
+/// The MCAP files that paths stand for: a folder for the files in it, in the order of their numbers.
+pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let mut inside = entries(path)?;
+        inside.retain(|file| file.extension().is_some_and(|ending| ending == "mcap"));
+        if inside.is_empty() {
+            return Err(Error::data(path.display(), no_mcap_inside(path)?));
+        }
+        inside.sort_by_cached_key(|file| {
+            let stem = file
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            let name = stem
+                .trim_end_matches(|c: char| c.is_ascii_digit())
+                .to_owned();
+            let number: u64 = stem[name.len()..].parse().unwrap_or(0);
+            (name, number, stem)
+        });
+        files.extend(inside);
+    }
+    Ok(files)
+}
+
+/// The problem of a folder without MCAP files.
+fn no_mcap_inside(folder: &Path) -> Result<&'static str> {
+    let files = entries(folder)?;
+    let has = |ending: &str| {
+        files
+            .iter()
+            .any(|file| file.extension().is_some_and(|own| own == ending))
+    };
+    Ok(if has("db3") {
+        "a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap"
+    } else if has("zstd") || has("zst") {
+        "its files are compressed as a whole; unpack them first: zstd -d FILE"
+    } else {
+        "no .mcap file in this folder"
+    })
+}
+
+/// Bytes of the files.
+pub(super) fn bytes(files: &[PathBuf]) -> u64 {
+    files
+        .iter()
+        .filter_map(|file| file.metadata().ok())
+        .map(|facts| facts.len())
+        .sum()
+}
+
+pub(super) fn reader(path: &Path) -> Result<McapReader<File>> {
+    let file = open(path).map_err(|e| Error::file(path, "read", e))?;
+    McapReader::open(file).map_err(|problem| Error::data(path.display(), problem))
+}
+
+/// The topics of all files.
+pub(super) fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overview> {
+    let bar = progress.bar("files", files.len());
+    let mut overview = Overview::default();
+    for file in files {
+        bar.inc();
+        let reader = match reader(file) {
+            Ok(reader) => reader,
+            Err(e) if files.len() == 1 => return Err(e),
+            Err(e) => {
+                overview.problems.push(e.to_string());
+                continue;
+            }
+        };
+        overview.add(&file.display().to_string(), reader, image_size);
+    }
+    Ok(overview)
+}
+
+/// Width and height of an image file of a message.
+fn image_size(bytes: &[u8]) -> Result<(u32, u32), String> {
+    let name = "the first image".to_owned();
+    let file = ImageFile::new(bytes.to_vec(), name, ReadingRule::default());
+    let ending = file.ending();
+    if !COPIED.contains(&ending) {
+        return Err(format!("a file .{ending}; JPEG, PNG or WebP expected"));
+    }
+    file.check().map_err(|e| e.to_string())
+}
