@@ -371,11 +371,12 @@ fn models_values(
     let Some(path) = typed.or_else(layered) else {
         return Ok(BTreeMap::new());
     };
-    let values = models_file::values(&path, &flags)?.into_iter();
-    let values = values.map(|(flag, origin, value)| {
-        let values = vec![value];
-        (flag, LayeredValue { origin, values })
-    });
+    let values = models_file::values(&path, &flags)?
+        .into_iter()
+        .map(|(flag, origin, value)| {
+            let values = vec![value];
+            (flag, LayeredValue { origin, values })
+        });
     Ok(values.collect())
 }
 

@@ -13,8 +13,8 @@ impl Dataset {
         if self.questions.is_empty() {
             return self.sources.keys().collect();
         }
-        let shown = self.questions.iter();
-        shown
+        self.questions
+            .iter()
             .flat_map(|question| self.shown(&question.frame))
             .collect::<BTreeSet<&FrameId>>()
             .into_iter()

@@ -35,8 +35,11 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
         .into_iter()
         .map(|item| item.is_some_and(|item| shared.contains(&owned(item))))
         .collect();
-    let trials = combined.trials.iter();
-    let kept: Vec<bool> = trials.map(|trial| is_shared[trial.item_number()]).collect();
+    let kept: Vec<bool> = combined
+        .trials
+        .iter()
+        .map(|trial| is_shared[trial.item_number()])
+        .collect();
     let mut places = Vec::with_capacity(kept.len());
     let mut next = 0;
     for kept in &kept {

@@ -102,8 +102,9 @@ impl Names {
         let (overlaps, repeated) = overlaps(runs, order, compared);
         found.repeated = repeated;
         for (model, having) in having {
-            let settings = runs.iter().enumerate();
-            let settings: Vec<Option<Settings>> = settings
+            let settings: Vec<Option<Settings>> = runs
+                .iter()
+                .enumerate()
                 .map(|(index, run)| {
                     let settings = parameters(&run.manifest, model);
                     settings.filter(|_| having.contains(&index))

@@ -106,8 +106,7 @@ pub(crate) fn dark_levels(best: &BestInTheDark) -> String {
 /// The families that lose most and least at the darkest level, one against the other, if a loss over all families is detected there and
 /// their intervals do not meet. This is a description without a sign: the two families were chosen by the data.
 pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sentence> {
-    let pooled = findings.pooled.iter();
-    let of_families = pooled.filter(|finding| {
+    let of_families = findings.pooled.iter().filter(|finding| {
         finding.kind == PooledKind::Darkness
             && finding.family.is_some()
             && finding.variant == *variant

@@ -211,8 +211,10 @@ fn read(
     hot: &HotPixels,
     inputs: &mut Inputs,
 ) -> Result<Vec<Vec<PairFacts>>> {
-    let exposures = files.exposures.iter().enumerate();
-    let pairs: Vec<(usize, &[PathBuf])> = exposures
+    let pairs: Vec<(usize, &[PathBuf])> = files
+        .exposures
+        .iter()
+        .enumerate()
         .flat_map(|(index, exposure)| exposure.flats.chunks(2).map(move |pair| (index, pair)))
         .collect();
     let layout = reader.layout;

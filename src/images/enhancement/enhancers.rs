@@ -144,14 +144,15 @@ impl<'a> OpenEnhancers<'a> {
     /// If ONNX Runtime is not found, or a file is not a model that it can run.
     pub(crate) fn open(&mut self) -> Result<()> {
         self.open_runtime()?;
-        let models = std::mem::take(&mut self.models).into_iter();
-        let opened = models.map(|model| match model {
-            Model::Read(file) => {
-                let stated = file.stated()?;
-                Ok(Model::Open(self.settings.open(file)?, stated))
-            }
-            open @ Model::Open(..) => Ok(open),
-        });
+        let opened = std::mem::take(&mut self.models)
+            .into_iter()
+            .map(|model| match model {
+                Model::Read(file) => {
+                    let stated = file.stated()?;
+                    Ok(Model::Open(self.settings.open(file)?, stated))
+                }
+                open @ Model::Open(..) => Ok(open),
+            });
         self.models = opened.collect::<Result<_>>()?;
         Ok(())
     }

@@ -202,8 +202,11 @@ fn by_group(
         builder = builder.column(Accuracy, "terminal blind", |(_, (_, ladder))| {
             let is_same =
                 |(subject, _): &&(&ModelInCondition, &OpenCell)| subject.model == series.model;
-            let mut without_level = ladder.without_level.iter();
-            let cell_of_model = without_level.find(is_same).or(ladder.without_level.first());
+            let cell_of_model = ladder
+                .without_level
+                .iter()
+                .find(is_same)
+                .or(ladder.without_level.first());
             score(summary, cell_of_model.map(|(_, cell)| *cell))
         });
     }

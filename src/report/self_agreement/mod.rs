@@ -124,8 +124,10 @@ pub(crate) fn summary(
     runs: RunList<'_>,
     length: ReportLength,
 ) -> Result<String> {
-    let mut tables = report.tables.iter();
-    let own_answers = tables.find(|table| table.name == tables::OWN_ANSWERS);
+    let own_answers = report
+        .tables
+        .iter()
+        .find(|table| table.name == tables::OWN_ANSWERS);
     let head = Head {
         runs: runs.head("darkqa.self-agreement/1"),
         measure: AGREEMENT,

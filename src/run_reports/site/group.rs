@@ -179,8 +179,7 @@ impl GroupKey {
         if differing > 0 {
             return Some(format!("{differing} of {all} images differ"));
         }
-        let truths = self.truths.iter();
-        let differing = truths.filter(|(question, own)| {
+        let differing = self.truths.iter().filter(|(question, own)| {
             let theirs = other.truths.get(*question);
             theirs.is_some_and(|theirs| theirs != *own)
         });

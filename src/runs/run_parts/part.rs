@@ -59,8 +59,7 @@ impl StoredPart {
 
     /// Whether another part has every column value that this one has.
     fn has_columns_in(&self, other: &Self) -> bool {
-        let mut columns = self.manifest.columns.iter();
-        columns.all(|(column, values)| {
+        self.manifest.columns.iter().all(|(column, values)| {
             let known = other.manifest.columns.get(column);
             values
                 .keys()

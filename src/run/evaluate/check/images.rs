@@ -112,8 +112,8 @@ pub(super) fn images(
 /// The frames that the questions show, each once, in the order of the questions.
 fn first_shown<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a FrameId> {
     let mut seen = HashSet::new();
-    let shown = first_asked(questions).into_iter();
-    shown
+    first_asked(questions)
+        .into_iter()
         .flat_map(|question| dataset.shown(&question.frame))
         .filter(|frame| seen.insert(*frame))
         .collect()
