@@ -1,4 +1,4 @@
-//! The settings that every experiment has: their flags ([`JobArgs`]) and the validated settings ([`JobSettings`]).
+//! Settings that all experiments share: the flags ([`JobArgs`]) and the validated settings ([`JobSettings`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -76,10 +76,10 @@ pub(crate) struct JobArgs {
     /// Flags that decide the images, as typed.
     #[arg(skip)]
     pub image_flags: ImageWords,
-    /// Flags of the call itself, by long name: those that variables and files set are not among them.
+    /// Long names of the flags on the command line, without flags that variables or files set.
     #[arg(skip)]
     pub typed: BTreeSet<String>,
-    /// Words of the call, without the name of the program.
+    /// Arguments of the command line, without the program name.
     #[arg(skip)]
     pub words: Vec<String>,
 }
@@ -124,19 +124,20 @@ pub(crate) struct OutputArgs {
     pub show: ShowArgs,
 }
 
-/// The settings that every experiment has, validated. Files, environment and keys are read for them and nowhere later.
+/// Validated settings that all experiments share. Files, environment variables and API keys are read to resolve them, and not later.
 #[derive(Debug)]
 pub(crate) struct JobSettings {
     /// Levels and kinds of degradation.
     pub light: LightSettings,
     /// The light in which the photographs of the data were taken.
     pub set_light: SetLight,
-    /// Enhancers, and the images they are for.
+    /// Enhancers, and the images that they enhance.
     pub enhancers: EnhancerArgs,
-    /// Running of the enhancers.
+    /// How the enhancers run.
     pub loading: EnhancerRunArgs,
-    /// Models that are asked, and their endpoint.
+    /// Models to ask, and their endpoint.
     pub ask: AskSettings,
+    /// File format of an image as sent.
     pub format: PayloadFormat,
     /// Longest side of an image as sent, in pixels; `None` for no limit.
     pub max_side: Option<NonZeroU32>,
@@ -144,7 +145,7 @@ pub(crate) struct JobSettings {
     pub concurrency: Bounds,
     /// Limits of cost and failures.
     pub money: MoneySettings,
-    /// Part of the run that this process does.
+    /// Shard of the run that this process runs.
     pub shard: Shard,
     /// The longest wait for the requests in flight after an interrupt.
     pub grace: Duration,
@@ -154,7 +155,7 @@ pub(crate) struct JobSettings {
     pub images: StoreArgs,
     /// Folder of the run.
     pub place: RunPlace,
-    /// Who may enter new folders.
+    /// Users who may read new folders.
     pub access: FolderAccess,
     /// Format of the results on standard output.
     pub show: StdoutFormat,
@@ -164,12 +165,12 @@ pub(crate) struct JobSettings {
     pub image_flags: ImageWords,
 }
 
-/// Settings that not every experiment has.
+/// Settings that only some experiments have.
 #[derive(Debug, Default)]
 pub(crate) struct ExperimentSettings {
-    /// Constraint on the replies that the server enforces.
+    /// Constraint that the server enforces on replies.
     pub constrain: Constrain,
-    /// Whether the probabilities of choices are asked for.
+    /// Whether to request the probabilities of choices.
     pub probabilities: bool,
     /// Seed of the server's sampling; `None` if none is sent.
     pub sampling_seed: Option<u64>,
@@ -177,14 +178,14 @@ pub(crate) struct ExperimentSettings {
     pub max_side: Option<NonZeroU32>,
     /// The file or folder of the data; `None` for the built-in rooms.
     pub data: Option<PathBuf>,
-    /// Which models are asked without images, too.
+    /// Models that are also asked without images.
     pub text_baseline: TextBaseline,
     /// The light in which the photographs of the data were taken.
     pub set_light: SetLight,
 }
 
 impl JobSettings {
-    /// Whether a model of the run is shown images.
+    /// True if at least one model of the run gets images.
     pub(crate) fn shows_images(&self) -> bool {
         self.ask
             .models
@@ -192,8 +193,10 @@ impl JobSettings {
             .any(|model| model.view == View::Image)
     }
 
-    /// The files of the enhancement models, each of which works on some images of the run. If they or the model `room-net` need ONNX
-    /// Runtime, it is opened, too, so that an error is found before anything that takes time. An existing run may not need it any more.
+    /// Reads the files of the enhancement models, after a check that the run uses each.
+    ///
+    /// Opens ONNX Runtime if an enhancer or the model `room-net` needs it, to report a missing library before any slow step. The folder
+    /// of an existing run is exempt, because that run may not need the runtime any more.
     pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
         check_used(&self.light, &self.enhancers)?;
         let files = enhancers::read(&self.enhancers.llie)?;
@@ -207,10 +210,15 @@ impl JobSettings {
         }
         Ok(files)
     }
+
+    /// Columns in the manifest of an existing run; empty for a new run.
+    pub(crate) fn columns(&self) -> Columns {
+        self.place.for_shard(self.shard).columns()
+    }
 }
 
 impl JobArgs {
-    /// The error for a call that names no model.
+    /// Error for a command line without a model.
     pub(crate) fn no_model_error(&self) -> Error {
         let remedy = if self.output.resume.is_some() {
             "--resume takes the same flags as the run had, the model's name among them"
@@ -221,8 +229,8 @@ impl JobArgs {
         Error::usage("--model", format_args!("no model is named: {remedy}"))
     }
 
-    /// How models are asked that no file of models says it of.
-    fn asking(&self, experiment: &ExperimentSettings) -> AskingArgs {
+    /// Request settings of models that no models file configures.
+    fn request_defaults(&self, experiment: &ExperimentSettings) -> AskingArgs {
         AskingArgs {
             parameters: self.parameters.clone(),
             request: self.request.clone(),
@@ -235,10 +243,10 @@ impl JobArgs {
         }
     }
 
-    /// The names of the models, after a check that each has an address and the key that it needs. Nothing is sent.
+    /// Checks that each model has an endpoint and the API key that it needs, without sending a request. Returns `NAME (VIEW)` per model.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the flag, variable or file that cannot be used.
+    /// [`Error::Usage`] with the invalid flag, variable or file.
     pub(crate) fn check_models(&self, experiment: &ExperimentSettings) -> Result<Vec<String>> {
         let context = ResolveContext {
             typed: &self.typed,
@@ -248,21 +256,22 @@ impl JobArgs {
             data: experiment.data.as_deref(),
             text_baseline: experiment.text_baseline,
         };
-        let asking = self.asking(experiment);
-        let settings = AskSettings::resolve(&self.models, &asking, context)?;
-        let models = settings.models.iter();
-        Ok(models
+        let defaults = self.request_defaults(experiment);
+        let settings = AskSettings::resolve(&self.models, &defaults, context)?;
+        Ok(settings
+            .models
+            .iter()
             .map(|model| format!("{} ({})", model.name, model.view))
             .collect())
     }
 
-    /// The settings of these flags. Files and variables that they name are read.
+    /// Validates the flags, and reads the files and environment variables that they name.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the flag that cannot be used.
+    /// [`Error::Usage`] with the invalid flag.
     pub(crate) fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
         let shard = Shard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok())?;
-        let asking = self.asking(experiment);
+        let defaults = self.request_defaults(experiment);
         let context = ResolveContext {
             typed: &self.typed,
             shard,
@@ -275,8 +284,8 @@ impl JobArgs {
             data: experiment.data.as_deref(),
             text_baseline: experiment.text_baseline,
         };
-        let mut ask = AskSettings::resolve(&self.models, &asking, context)?;
-        let place = RunPlace::from(self.output.clone()).checked()?;
+        let mut ask = AskSettings::resolve(&self.models, &defaults, context)?;
+        let place = RunPlace::from(self.output.clone()).check_writable()?;
         ask.continue_from(&place.for_shard(shard).columns());
         Ok(JobSettings {
             light: LightSettings::resolve(&self.light, experiment.set_light)?,
@@ -301,24 +310,17 @@ impl JobArgs {
     }
 }
 
-impl JobSettings {
-    /// The columns of the run that is gone on with; none of a new run.
-    pub(crate) fn columns(&self) -> Columns {
-        self.place.for_shard(self.shard).columns()
-    }
-}
-
-/// Parent of the run folders that the user does not name.
+/// Default parent folder of run folders.
 pub(crate) const RESULTS: &str = "results";
 
-/// The choice of the run folder.
+/// Choice of the run folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum RunPlace {
-    /// Folder of the same command, else a new one.
+    /// The folder of an earlier run of the same command, or a new folder.
     Automatic,
-    /// This folder, which may be new.
+    /// This folder, new or existing.
     Named(PathBuf),
-    /// This folder, which must hold a run.
+    /// This folder, which must contain a run.
     Resume(PathBuf),
 }
 
@@ -333,10 +335,10 @@ impl From<OutputArgs> for RunPlace {
 }
 
 impl RunPlace {
-    /// The plan in the folder that is named; `None` if none is, or there is no plan.
+    /// Reads the plan in the named folder; `None` if no folder is named, or if it has no plan.
     ///
     /// # Errors
-    /// As of [`RunPlan::read`].
+    /// See [`RunPlan::read`].
     pub(crate) fn plan(&self) -> Result<Option<RunPlan>> {
         match self {
             Self::Named(folder) | Self::Resume(folder) => RunPlan::read(folder),
@@ -344,26 +346,30 @@ impl RunPlace {
         }
     }
 
-    /// The columns of the run in the folder that is named. There are none if there is no run, or if its manifest cannot be read, which opening
-    /// the folder reports.
+    /// Columns in the manifest of the named folder. Empty without a run, or if the manifest cannot be read: opening the folder reports
+    /// that error.
     fn columns(&self) -> Columns {
-        self.read(store::read_columns)
+        self.read_or_default(store::read_columns)
     }
 
-    /// The settings of the run in the folder that is named, as [`columns`](Self::columns).
+    /// Settings in the manifest of the named folder; empty in the same cases as [`columns`](Self::columns).
     fn settings(&self) -> BTreeMap<String, Value> {
-        self.read(store::read_settings)
+        self.read_or_default(store::read_settings)
     }
 
-    fn read<T: Default>(&self, of_manifest: fn(&Path) -> Result<T>) -> T {
+    /// Reads the manifest of the named folder; the default if no folder is named or reading fails.
+    fn read_or_default<T: Default>(&self, read_manifest: fn(&Path) -> Result<T>) -> T {
         match self {
-            Self::Named(folder) | Self::Resume(folder) => of_manifest(folder).unwrap_or_default(),
+            Self::Named(folder) | Self::Resume(folder) => read_manifest(folder).unwrap_or_default(),
             Self::Automatic => T::default(),
         }
     }
 
-    /// The choice itself, if the folder can be written to: an error here costs nothing, one after the images are made does.
-    fn checked(self) -> Result<Self> {
+    /// Returns the choice if its folder is writable. The check runs before images are made, so that an error costs no time.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if a folder to resume is missing, or if the folder is not writable.
+    fn check_writable(self) -> Result<Self> {
         let (flag, path) = match &self {
             Self::Automatic => ("--out", Path::new(RESULTS)),
             Self::Named(path) => ("--out", path.as_path()),
@@ -375,7 +381,7 @@ impl RunPlace {
                 return Err(Error::usage("--resume", problem));
             }
         };
-        let problem = |folder: &Path, e: &dyn Display| {
+        let not_writable = |folder: &Path, e: &dyn Display| {
             let folder = folder.display();
             let remedy = "--out DIR names another folder";
             Error::usage(
@@ -383,15 +389,17 @@ impl RunPlace {
                 format_args!("cannot write to {folder}: {e}; {remedy}"),
             )
         };
-        let absolute = path::absolute(path).map_err(|e| problem(path, &e))?;
-        let existing = absolute.ancestors().find(|folder| folder.exists());
-        let existing = existing.unwrap_or(&absolute);
-        // A file without a name: it is gone when it is closed.
-        tempfile::tempfile_in(existing).map_err(|e| problem(existing, &e))?;
+        let absolute = path::absolute(path).map_err(|e| not_writable(path, &e))?;
+        let existing = absolute
+            .ancestors()
+            .find(|folder| folder.exists())
+            .unwrap_or(&absolute);
+        // An unnamed temporary file, which the system deletes when it is closed.
+        tempfile::tempfile_in(existing).map_err(|e| not_writable(existing, &e))?;
         Ok(self)
     }
 
-    /// The choice for a shard: a subfolder of the whole run's folder.
+    /// Choice for a shard: a subfolder of the folder of the whole run.
     #[must_use]
     pub(crate) fn for_shard(&self, shard: Shard) -> Self {
         match self {

@@ -1,4 +1,4 @@
-//! `summary.json`: a head about the run, and the rows of `summary.csv` that are shown.
+//! Contents of `summary.json`: a head that describes the run, and the rows of `summary.csv` that the report includes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,24 +17,24 @@ use crate::text::table::{Table, TableRow};
 use crate::types::UnreadReason;
 use crate::types::manifests::RunManifest;
 
-/// A head, and the rows of tables as objects with the column names as keys.
+/// JSON document of a head and table rows; each row is an object with the column names as keys.
 #[derive(Serialize)]
 struct Document<'a, H> {
     #[serde(flatten)]
     head: H,
-    /// The rows of the summary; left out with the findings alone.
+    /// Rows of the summary; omitted if the report contains only findings.
     #[serde(skip_serializing_if = "Option::is_none")]
     rows: Option<Rows<'a>>,
-    /// Every table by the name of its file; only in a full report.
+    /// All tables by file name; only in a full report.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     tables: BTreeMap<&'a str, Rows<'a>>,
 }
 
-/// The rows of tables with the same columns as objects.
+/// Rows of tables that have the same columns; each row becomes an object.
 pub(super) struct Rows<'a>(&'a [Table]);
 
 impl<'a> Rows<'a> {
-    /// The rows of one table.
+    /// Rows of one table.
     pub(super) fn new(table: &'a Table) -> Self {
         Self(std::slice::from_ref(table))
     }
@@ -42,19 +42,21 @@ impl<'a> Rows<'a> {
 
 impl Serialize for Rows<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let rows = self.0.iter();
         serializer.collect_seq(
-            rows.flat_map(|table| table.rows.iter().map(move |row| Named { table, row })),
+            self.0
+                .iter()
+                .flat_map(|table| table.rows.iter().map(move |row| RowObject { table, row })),
         )
     }
 }
 
-struct Named<'a> {
+/// One row as an object with the column names as keys.
+struct RowObject<'a> {
     table: &'a Table,
     row: &'a TableRow,
 }
 
-impl Serialize for Named<'_> {
+impl Serialize for RowObject<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let cells = self.table.cells(self.row);
         serializer.collect_map(cells.flat_map(|(column, cell)| {
@@ -64,10 +66,10 @@ impl Serialize for Named<'_> {
     }
 }
 
-/// A head, the summary's rows, and in a full report every table, as one JSON document.
+/// Serialises a head, the rows of the summary and, in a full report, all tables as one JSON document.
 ///
 /// # Errors
-/// If the document cannot be written.
+/// If the document cannot be serialised.
 pub(super) fn document(
     head: impl Serialize,
     rows: &Table,
@@ -80,8 +82,11 @@ pub(super) fn document(
         tables: tables
             .chunk_by(|one, other| one.name == other.name)
             .filter(|parts| {
-                let mut columns = parts[0].columns.iter();
-                length == ReportLength::Full && columns.any(|column| !column.heads.csv.is_empty())
+                length == ReportLength::Full
+                    && parts[0]
+                        .columns
+                        .iter()
+                        .any(|column| !column.heads.csv.is_empty())
             })
             .map(|parts| (parts[0].name, Rows(parts)))
             .collect(),
@@ -91,25 +96,25 @@ pub(super) fn document(
         .map_err(|e| Error::data("summary.json", e))
 }
 
-/// The head of the summary of an evaluation.
+/// Head of the summary of an evaluation.
 #[derive(Serialize)]
 struct Head<'a> {
     #[serde(flatten)]
     runs: RunsHead<'a>,
-    /// The noise profiles of the noisy images.
+    /// Noise profiles of the noisy images.
     readings: NoiseProfiles,
     unread: &'a BTreeMap<UnreadReason, usize>,
     alerts: &'a [Alert],
     findings: &'a [Sentence],
-    /// The rows of `groups.csv`, without the observer if it is not shown.
+    /// Rows of `groups.csv`, without the observer if the report hides it; omitted if empty.
     #[serde(skip_serializing_if = "Option::is_none")]
     groups: Option<Rows<'a>>,
-    /// The rows of `baseline.csv`.
+    /// Rows of `baseline.csv`; omitted if the report has no such table.
     #[serde(skip_serializing_if = "Option::is_none")]
     baseline: Option<Rows<'a>>,
 }
 
-/// The head of a summary of runs: one run with its folder, or several; the others are left out.
+/// Runs in the head of a summary: `run` and `folder` for a single run, `runs` for several; unused fields are omitted.
 #[derive(Serialize)]
 pub(super) struct RunsHead<'a> {
     schema: &'static str,
@@ -121,51 +126,50 @@ pub(super) struct RunsHead<'a> {
     runs: Vec<ComparedRun<'a>>,
 }
 
-/// One of several runs.
+/// One of several runs, with its folder.
 #[derive(Serialize)]
 struct ComparedRun<'a> {
     folder: &'a Path,
     run: &'a RunManifest,
 }
 
-/// The runs that a summary is about.
+/// Runs that a summary describes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum RunList<'a> {
-    /// One run, with its folder if the summary is not stored there.
+    /// One run, with its folder if the summary is stored elsewhere.
     One(&'a RunManifest, Option<&'a Path>),
     /// Several runs, each with its folder.
     Several(&'a [(&'a RunManifest, &'a Path)]),
 }
 
 impl<'a> RunList<'a> {
-    /// The head of a summary in this schema.
+    /// Head of a summary, with the name of its schema.
     pub(super) fn head(self, schema: &'static str) -> RunsHead<'a> {
         let (run, folder, runs) = match self {
             Self::One(run, folder) => (Some(run), folder, [].as_slice()),
             Self::Several(runs) => (None, None, runs),
         };
-        let runs = runs
-            .iter()
-            .map(|&(run, folder)| ComparedRun { folder, run });
         RunsHead {
             schema,
             folder,
             run,
-            runs: runs.collect(),
+            runs: runs
+                .iter()
+                .map(|&(run, folder)| ComparedRun { folder, run })
+                .collect(),
         }
     }
 }
 
-/// The summary of runs as JSON.
+/// Serialises the summary of runs as JSON.
 ///
 /// # Errors
-/// If the document cannot be written.
+/// If the document cannot be serialised.
 pub(crate) fn summary(
     report: &ChoiceReport<'_>,
     runs: RunList<'_>,
     length: ReportLength,
 ) -> Result<String> {
-    let mut tables = report.tables.iter();
     let groups = strict_groups(report.findings);
     let head = Head {
         runs: runs.head("darkqa.summary/1"),
@@ -174,7 +178,11 @@ pub(crate) fn summary(
         alerts: &report.alerts,
         findings: &report.sentences,
         groups: (!groups.is_empty()).then_some(Rows(&groups)),
-        baseline: tables.find(|table| table.name == BASELINE).map(Rows::new),
+        baseline: report
+            .tables
+            .iter()
+            .find(|table| table.name == BASELINE)
+            .map(Rows::new),
     };
     document(
         head,

@@ -1,4 +1,4 @@
-//! The text of a report of questions with choices: [`text()`].
+//! Terminal text of a report on multiple-choice questions: [`text()`].
 
 pub(super) mod findings;
 mod foot;
@@ -28,19 +28,19 @@ use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::Grid;
 use darkqa_score::subject::judged;
 
-/// Width of the column of intervals, in characters.
-const REACH: usize = 15;
+/// Width of the interval column, in characters.
+const INTERVAL_WIDTH: usize = 15;
 
-/// Width of a name in the table, in characters: no name is longer.
-const MAX_NAME: usize = 40;
+/// Maximum width of the name column, in characters.
+const MAX_NAME_WIDTH: usize = 40;
 
 /// Maximum number of rows of the table.
 const MAX_ROWS: usize = 24;
 
-/// Maximum number of levels side by side in the table: so many leave room for names.
+/// Maximum number of levels side by side in the table; more would leave too little room for names.
 const MAX_LEVELS: usize = 7;
 
-/// A report of questions with choices as text. `runs` are the runs with their folders.
+/// Renders a report on multiple-choice questions as text. `runs` are the manifests with the folders of their runs.
 #[must_use]
 pub(crate) fn text(
     report: &ChoiceReport<'_>,
@@ -57,7 +57,7 @@ pub(crate) fn text(
     );
     match length {
         ReportLength::Findings => return text,
-        ReportLength::Summary => text += &marked::table(&table(report)),
+        ReportLength::Summary => text += &marked::table(&accuracy_table(report)),
         ReportLength::Full => text += &render(&report.tables),
     }
     text += &open_question(report);
@@ -67,14 +67,14 @@ pub(crate) fn text(
     text
 }
 
-/// The open question of a single noise profile; empty without noise or with several readings.
+/// Note on the question that a single noise profile leaves open; empty without noise or with several noise profiles.
 fn open_question(report: &ChoiceReport<'_>) -> String {
-    let readings = NoiseProfiles::new(&report.findings.grid.subjects);
-    let open = readings.open_question();
-    open.map_or_else(String::new, |open| wrapped(" ", &open, " "))
+    NoiseProfiles::new(&report.findings.grid.subjects)
+        .open_question()
+        .map_or_else(String::new, |question| wrapped(" ", &question, " "))
 }
 
-/// The models of a grid, in its order.
+/// Models of a grid, in the order of its subjects.
 fn models<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
     let mut models: Vec<&str> = grid
         .subjects
@@ -85,33 +85,34 @@ fn models<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
     models
 }
 
-/// The model under test, or the number of them, and the people. References such as `random` count only if there is no other model.
+/// Name of the model under test or number of models, then the names of people. References such as `random` count only if no other
+/// model ran.
 pub(super) fn who_is_judged(grid: &Grid<'_>) -> String {
     let mut models = models(grid);
     let judged = judged(models.iter().copied());
     models.retain(|model| judged.contains(model));
-    who(grid, models)
+    models_and_people(grid, models)
 }
 
-/// The model, or the number of models, and the people.
-fn who(grid: &Grid<'_>, models: Vec<&str>) -> String {
+/// Name of the only model or number of models, then the names of people, separated by commas.
+fn models_and_people(grid: &Grid<'_>, models: Vec<&str>) -> String {
     let is_people = |model: &&str| grid.listing.is_people(model);
     let (people, models): (Vec<&str>, Vec<&str>) = models.into_iter().partition(is_people);
-    let who = match &models[..] {
+    let model = match &models[..] {
         [] => String::new(),
         [one] => (*one).to_owned(),
         several => counted(several.len(), "model"),
     };
     let people = people.into_iter().map(|name| format!("{name} (people)"));
-    let who: Vec<String> = Some(who)
-        .filter(|who| !who.is_empty())
+    let names: Vec<String> = Some(model)
+        .filter(|model| !model.is_empty())
         .into_iter()
         .chain(people)
         .collect();
-    who.join(", ")
+    names.join(", ")
 }
 
-/// Numbers of models, questions, frames, clusters and replies.
+/// Head line of the report: models, questions, frames, replies, failures, and the unit of the intervals.
 pub(super) fn head(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let grid = &findings.grid;
@@ -128,26 +129,27 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
     };
     format!(
         "{} · {} · {} · {replies}, {failed} failed · intervals by {}",
-        who(grid, models(grid)),
+        models_and_people(grid, models(grid)),
         counted(questions.len(), "question"),
         frames(grid),
         findings.unit
     )
 }
 
-/// A row of the table.
+/// Row of the accuracy table.
 #[derive(Clone)]
-struct TableLine<'a> {
-    /// Title of the block.
+struct AccuracyRow<'a> {
+    /// Title of the block that contains the row.
     block: String,
     name: String,
-    /// The group of its model; `None` without one, and with one model.
+    /// Group of the model; `None` if it has none or if the report has a single model.
     group: Option<&'a str>,
     cells: &'a SeriesByLevel<'a, AccuracyCell>,
 }
 
-/// Accuracies by level: a block for each light with a row for each model, or one block if there is one model.
-fn table(report: &ChoiceReport<'_>) -> String {
+/// Table of accuracies by level. With several models, it has one block per light condition and one row per model; with a single model,
+/// one block and one row per light condition.
+fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     let common = report.findings.common.as_ref();
     let summary = common.map_or(&report.findings.summary, |common| &common.summary);
     let cells = summary.family_cells(None, ReadingMode::Strict);
@@ -156,41 +158,50 @@ fn table(report: &ChoiceReport<'_>) -> String {
         .with_clean();
     let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
     models.dedup();
-    let mut rows: Vec<TableLine<'_>> = Vec::new();
-    let one = models.len() == 1;
+    let mut rows: Vec<AccuracyRow<'_>> = Vec::new();
+    let is_single = models.len() == 1;
     for (series, cells) in &ladder.series {
         let listing = &report.findings.grid.listing;
-        let (block, name) =
-            block_and_name(&ladder.light(series), &listing.label(series.model), one);
+        let (block, name) = block_and_name(
+            &ladder.light(series),
+            &listing.label(series.model),
+            is_single,
+        );
         let group = listing.group(series.model);
-        rows.push(TableLine {
+        rows.push(AccuracyRow {
             block,
             name,
-            group: group.filter(|_| !one),
+            group: group.filter(|_| !is_single),
             cells,
         });
     }
-    // The models of one light stand together.
+    // Sort by block, which makes the rows of a light condition adjacent.
     rows.sort_by(|a, b| a.block.cmp(&b.block));
     let hidden = rows.len().saturating_sub(MAX_ROWS);
     rows.truncate(MAX_ROWS);
     let levels: Vec<AxisLevel> = ladder.levels.iter().copied().collect();
-    let longest = rows.iter().map(|row| row.name.chars().count()).max();
-    let titles = rows.iter().map(|row| row.block.chars().count()).max();
-    let most = Axis::ALL.map(|axis| {
-        levels
-            .iter()
-            .filter(|level| level.is_shown_on(axis))
-            .count()
-    });
-    let most = most.into_iter().max().unwrap_or_default();
+    let longest_name = rows.iter().map(|row| row.name.chars().count()).max();
+    let longest_title = rows.iter().map(|row| row.block.chars().count()).max();
+    let most_levels = Axis::ALL
+        .map(|axis| {
+            levels
+                .iter()
+                .filter(|level| level.is_shown_on(axis))
+                .count()
+        })
+        .into_iter()
+        .max()
+        .unwrap_or_default();
     let room = WIDTH
-        .saturating_sub(1 + most.min(MAX_LEVELS) * LEVEL + REACH)
+        .saturating_sub(1 + most_levels.min(MAX_LEVELS) * LEVEL + INTERVAL_WIDTH)
         .max(12);
-    let name_width = longest.max(titles).unwrap_or(0).min(room.min(MAX_NAME));
+    let name_width = longest_name
+        .max(longest_title)
+        .unwrap_or(0)
+        .min(room.min(MAX_NAME_WIDTH));
     let texts = rows.iter().flat_map(|row| [&*row.block, &*row.name]);
     let names = NameColumn::new(texts, name_width);
-    let shared = common.map(|common| {
+    let shared_note = common.map(|common| {
         let questions = counted(common.shared_questions, "question");
         format!(" on the {questions} that all models with images answered")
     });
@@ -199,23 +210,29 @@ fn table(report: &ChoiceReport<'_>) -> String {
         .flat_map(|row| row.cells.values())
         .filter_map(|cell| Some(cell.accuracy?.n))
         .collect();
-    let counts = match (counts.first(), counts.last()) {
+    let count_note = match (counts.first(), counts.last()) {
         (Some(least), Some(most)) if least < most => format!("; n from {least} to {most}"),
         _ => String::new(),
     };
-    let mut text = format!(" accuracy in %{}{counts}\n", shared.unwrap_or_default());
+    let mut text = format!(
+        " accuracy in %{}{count_note}\n",
+        shared_note.unwrap_or_default()
+    );
     for block in rows.chunk_by(|a, b| a.block == b.block) {
         for axis in Axis::ALL {
-            let is_on = |level: &AxisLevel| level.is_shown_on(axis);
-            let has_level = |row: &&TableLine<'_>| {
+            let is_on_axis = |row: &&AccuracyRow<'_>| {
                 row.cells
                     .keys()
                     .find_map(|level| level.axis())
                     .unwrap_or(Axis::LIGHT)
                     == axis
             };
-            let block: Vec<TableLine<'_>> = block.iter().filter(has_level).cloned().collect();
-            let levels: Vec<AxisLevel> = levels.iter().copied().filter(is_on).collect();
+            let block: Vec<AccuracyRow<'_>> = block.iter().filter(is_on_axis).cloned().collect();
+            let levels: Vec<AxisLevel> = levels
+                .iter()
+                .copied()
+                .filter(|level| level.is_shown_on(axis))
+                .collect();
             for levels in levels.chunks(MAX_LEVELS) {
                 text += &block_lines(report, &block, levels, &names);
             }
@@ -228,35 +245,39 @@ fn table(report: &ChoiceReport<'_>) -> String {
     text + &foot::about_models(report, &ladder.models)
 }
 
-/// The rows of a block at some levels, below a line with its title and the levels; empty if no row has a cell there.
+/// Rows of a block at some levels, below a heading with its title and the levels; empty if no row has a cell at these levels.
 fn block_lines(
     report: &ChoiceReport<'_>,
-    block: &[TableLine<'_>],
+    block: &[AccuracyRow<'_>],
     levels: &[AxisLevel],
     names: &NameColumn,
 ) -> String {
     let mut text = String::new();
-    let mut above = None;
+    let mut last_group = None;
     for row in block {
-        let here = || levels.iter().map(|level| row.cells.get(level).copied());
-        if here().all(|cell| cell.is_none()) {
+        let cells = || levels.iter().map(|level| row.cells.get(level).copied());
+        if cells().all(|cell| cell.is_none()) {
             continue;
         }
         if text.is_empty() {
             let heads = levels.iter().map(|level| format!("{level} "));
             text += &names.line(&row.block, heads, "95 %");
         }
-        if row.group != above {
-            above = row.group;
-            let _ = writeln!(text, " — {}", above.unwrap_or_default());
+        if row.group != last_group {
+            last_group = row.group;
+            let _ = writeln!(text, " — {}", last_group.unwrap_or_default());
         }
-        let reach = reach_of(here().flatten().filter_map(|cell| cell.accuracy));
-        text += &names.line(&row.name, here().map(|cell| value(report, cell)), &reach);
+        let reach = reach_of(cells().flatten().filter_map(|cell| cell.accuracy));
+        text += &names.line(
+            &row.name,
+            cells().map(|cell| accuracy_text(report, cell)),
+            &reach,
+        );
     }
     text
 }
 
-/// The title of the block and the name of the row of a series.
+/// Block title and row name of a series.
 fn block_and_name(light: &str, model: &str, is_single: bool) -> (String, String) {
     if is_single {
         (model.to_owned(), light.to_owned())
@@ -265,8 +286,8 @@ fn block_and_name(light: &str, model: &str, is_single: bool) -> (String, String)
     }
 }
 
-/// An accuracy in percent, with a mark if it is below that without images.
-fn value(report: &ChoiceReport<'_>, cell: Option<&AccuracyCell>) -> String {
+/// Accuracy in percent, with a mark if it is below the accuracy without images.
+fn accuracy_text(report: &ChoiceReport<'_>, cell: Option<&AccuracyCell>) -> String {
     let Some(cell) = cell else {
         return String::new();
     };

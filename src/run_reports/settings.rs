@@ -1,4 +1,4 @@
-//! Settings in which the manifests of several runs differ: [`Setting`].
+//! Comparison of the settings in the manifests of several runs: [`differing`] returns each [`Setting`] that differs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,17 +8,17 @@ use crate::types::degradations::Kind;
 use crate::types::flags::spelled_setting;
 use crate::types::manifests::{JUDGES, RunManifest};
 
-/// Settings by flag, as text.
+/// Values of settings as text, by flag.
 pub(super) type Settings = BTreeMap<String, String>;
 
-/// The field of the manifest of people's answers that holds the identity of the run whose images they saw.
+/// Manifest field of human answers: the identity of the run whose images people saw.
 const ASKED_ABOUT: &str = "people asked about";
 
-/// Fields of an identity that decide the size and encoding of every image.
+/// Fields of a run's identity that determine the size and encoding of every image.
 pub(super) const ENCODING: [&str; 3] = ["--max-side", "--image-size", "--image"];
 
-/// Further fields of an identity that decide the pixels of images.
-const PIXELS: [&str; 6] = [
+/// Other fields of a run's identity that determine the pixels of images.
+const PIXEL_FIELDS: [&str; 6] = [
     "--num-frames",
     "--degrade",
     "--sensor",
@@ -27,34 +27,34 @@ const PIXELS: [&str; 6] = [
     "enhancement",
 ];
 
-/// Flags of the noise model, which are compared as the user wrote them.
-const NOISE: [&str; 9] = [
+/// Flags of the noise model, without `--`; compared as the user wrote them.
+const NOISE_FLAGS: [&str; 9] = [
     "profile", "amplify", "tone", "draws", "coupling", "camera", "gain", "ratio", "fixed",
 ];
 
-/// The column of the kinds that the paper does not have.
+/// Manifest column of the degradation kinds that are not in the paper.
 const VARIANT: &str = "variant";
 
-/// Stands between the flag of a setting and the value of a column for which it is set, as in `--llie of ruas`.
+/// Separator between a flag and the column value that it is set for, as in `--llie of ruas`.
 const OF: &str = " of ";
 
-/// The value of a setting that a run does not have.
+/// Value of a setting that a run does not have.
 const UNSET: &str = "unset";
 
-/// The longest value in a message, in letters; digests are shortened to their first eight.
-const LONGEST: usize = 60;
+/// Maximum length of a value in a message, in characters.
+const MAX_VALUE_CHARS: usize = 60;
 
-/// A setting that differs between runs.
+/// Setting that differs between runs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Setting {
-    /// The flag, or the field of the manifest that has no flag.
+    /// Flag, or name of a manifest field if the setting has no flag.
     pub(super) flag: String,
-    /// The value of each run that takes part, with the number of the run.
+    /// Index and value of each run that the setting applies to.
     pub(super) values: Vec<(usize, String)>,
 }
 
 impl Setting {
-    /// The setting in words: `--seed is 0 in a and 1 in b`; `names` are those of the runs.
+    /// Describes the difference: `--seed is 0 in a and 1 in b`. `names` are the names of all runs, by index.
     pub(super) fn words(&self, names: &[String]) -> String {
         let mut by_value: Vec<(&str, Vec<&str>)> = Vec::new();
         for (run, value) in &self.values {
@@ -72,7 +72,7 @@ impl Setting {
     }
 }
 
-/// Texts as a list in a sentence: `a`, `a and b`, `a, b and c`.
+/// Joins texts for a sentence: `a`, `a and b`, `a, b and c`.
 pub(super) fn listed<T: AsRef<str>>(texts: &[T]) -> String {
     let texts: Vec<&str> = texts.iter().map(AsRef::as_ref).collect();
     match &*texts {
@@ -82,8 +82,8 @@ pub(super) fn listed<T: AsRef<str>>(texts: &[T]) -> String {
     }
 }
 
-/// The settings that differ. A run without settings does not take part, nor does a run in the settings of a value that none of its
-/// columns has.
+/// Settings whose values differ between runs. Runs that are `None` are skipped. A setting of a column value is compared only between
+/// runs that have the value.
 pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
     let flags: BTreeSet<&String> = runs.iter().flatten().flat_map(BTreeMap::keys).collect();
     flags
@@ -96,7 +96,7 @@ pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
                 .filter_map(|(run, settings)| {
                     let settings = settings.as_ref()?;
                     let value = settings.get(flag).map(String::as_str);
-                    let unset = takes_part(settings, flag).then_some(UNSET);
+                    let unset = applies(settings, flag).then_some(UNSET);
                     Some((run, value.or(unset)?.to_owned()))
                 })
                 .collect(),
@@ -110,15 +110,15 @@ pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
         .collect()
 }
 
-/// Whether a run that does not have a setting could have it: if the setting is of a value of a column, the run has the value.
-fn takes_part(settings: &Settings, flag: &str) -> bool {
+/// True if a setting applies to a run: it belongs to no column value, or to one that the run has.
+fn applies(settings: &Settings, flag: &str) -> bool {
     flag.split_once(OF).is_none_or(|(_, value)| {
         let mut own = settings.keys().filter_map(|flag| flag.split_once(OF));
         own.any(|(_, own)| own == value)
     })
 }
 
-/// The identity of a run; that of people is the identity of the run whose images they saw.
+/// Identity of a run; for human answers, the identity of the run whose images people saw.
 pub(super) fn identity(run: &RunManifest) -> Settings {
     match run.identity.get(ASKED_ABOUT) {
         Some(Value::Object(asked)) => asked.iter().map(field).collect(),
@@ -126,69 +126,72 @@ pub(super) fn identity(run: &RunManifest) -> Settings {
     }
 }
 
-/// Whether the records of a run are answers of people about the images of another run.
+/// True if the records of a run are human answers about the images of another run.
 pub(crate) fn is_of_people(run: &RunManifest) -> bool {
     run.identity.contains_key(ASKED_ABOUT)
 }
 
-/// Some fields of an identity.
+/// Selected fields of a run's identity.
 pub(super) fn some(run: &RunManifest, fields: &[&str]) -> Settings {
     let mut settings = identity(run);
     settings.retain(|flag, _| fields.contains(&flag.as_str()));
     settings
 }
 
-/// Everything in a manifest that decides images besides their size and encoding, for a comparison of these runs.
+/// Settings of a run that determine its images, except size and encoding. Noise settings are included only if the noise profiles of
+/// `runs` differ.
 pub(super) fn light(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     let variants = column_settings(run, VARIANT);
     let parts = [pixels(run), noise(run, runs), variants, enhancers(run)];
     parts.into_iter().flatten().collect()
 }
 
-/// The settings of all degraded images.
+/// Settings that determine the pixels of all degraded images.
 pub(super) fn pixels(run: &RunManifest) -> Settings {
-    some(run, &PIXELS)
+    some(run, &PIXEL_FIELDS)
 }
 
-/// The noise model, if the noise profiles of the runs differ: the flags as the user wrote them, and the content of the readings
-/// that all runs have.
+/// Noise settings of a run: the flags as the user wrote them, and the content of its noise profiles. Empty if the noise profiles of
+/// `runs` are equal, or if this run has none.
 pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
-    let readings = |run: &RunManifest| run.columns.get("reading").cloned();
-    let own = readings(run);
-    let mut others = runs.iter().filter_map(|other| readings(other));
+    let profiles = |run: &RunManifest| run.columns.get("reading").cloned();
+    let own = profiles(run);
+    let mut others = runs.iter().filter_map(|other| profiles(other));
+    // Equal profiles are the same noise, even if only one run writes out a default.
     if own.is_none() || others.all(|other| Some(&other) == own.as_ref()) {
         return Settings::new();
     }
-    let written = NOISE.iter().filter_map(|flag| {
-        let value = run.images.get(*flag)?;
-        Some((format!("--{flag}"), text(value)))
-    });
-    let mut settings: Settings = written.collect();
-    // A default that is written out is another word for the same noise.
+    let mut settings: Settings = NOISE_FLAGS
+        .iter()
+        .filter_map(|flag| {
+            let value = run.images.get(*flag)?;
+            Some((format!("--{flag}"), text(value)))
+        })
+        .collect();
     settings.extend(column_settings(run, "reading"));
     settings
 }
 
-/// The content of the noise profiles, and of the kinds that the paper does not have.
+/// Settings of the noise profiles and of the degradation kinds that are not in the paper.
 pub(super) fn readings_and_variants(run: &RunManifest) -> Settings {
     let mut settings = column_settings(run, "reading");
     settings.extend(column_settings(run, VARIANT));
     settings
 }
 
-/// The content of the enhancers.
+/// Settings of the enhancers.
 pub(super) fn enhancers(run: &RunManifest) -> Settings {
     column_settings(run, "enhancer")
 }
 
-/// The settings of a kind that the paper does not have; empty for the others.
+/// Settings of a degradation kind that is not in the paper; empty for other kinds.
 pub(super) fn variant(run: &RunManifest, kind: Kind) -> Settings {
     let mut settings = column_settings(run, VARIANT);
     settings.retain(|flag, _| flag.ends_with(&format!("{OF}{kind}")));
     settings
 }
 
-/// The settings behind the values of a column of a run.
+/// Settings of all values in a manifest column, each as `FLAG of VALUE`.
 fn column_settings(run: &RunManifest, column: &str) -> Settings {
     let mut settings = Settings::new();
     for (name, content) in run.columns.get(column).into_iter().flatten() {
@@ -197,14 +200,17 @@ fn column_settings(run: &RunManifest, column: &str) -> Settings {
     settings
 }
 
-/// The settings of the noise that the words of the user already explain are left out.
+/// Removes the noise settings of column values if a noise flag differs, because the flag already explains them.
 pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
-    let is_written =
-        |setting: &Setting| NOISE.iter().any(|flag| setting.flag == format!("--{flag}"));
+    let is_written = |setting: &Setting| {
+        NOISE_FLAGS
+            .iter()
+            .any(|flag| setting.flag == format!("--{flag}"))
+    };
     if settings.iter().any(is_written) {
         let is_noise = |setting: &Setting| {
             let flag = setting.flag.split(OF).next().unwrap_or_default();
-            NOISE
+            NOISE_FLAGS
                 .iter()
                 .any(|written| flag.contains(&format!("--{written}")))
         };
@@ -213,10 +219,10 @@ pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
     settings
 }
 
-/// Settings that determine a model's replies besides question and images; `None` if the run does not have the model, or does not state them.
+/// Settings that determine a model's replies, except question and images. `None` if the manifest does not have the model.
 pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
     let content = run.columns.get("model")?.get(model)?;
-    // A model of this program answers by rules, and reads no prompt.
+    // A built-in model answers by rules and reads no prompt.
     let asked_by = if run.is_built_in(model) {
         "--rules"
     } else {
@@ -226,44 +232,43 @@ pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
     Some(decisive(content).into_iter().chain(shared).collect())
 }
 
-/// The settings of a model without its address and name.
+/// Settings of a model, without its base URL and name.
 pub(super) fn decisive(content: &Value) -> Settings {
-    let settings = leaves(content);
-    settings
+    leaves(content)
         .filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()))
         .collect()
 }
 
-/// The parameters of all models of a run that have flags: a flag with several values has all of them. `None` if no model has.
+/// Settings of all models of a run that have a base URL, without judges; different values of a flag are joined with "or". `None` if
+/// the run has no such model.
 pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
     let models = run.columns.get("model")?;
     let mut values = BTreeMap::<String, BTreeSet<String>>::new();
-    let mut remote = 0;
-    // A judge stands among the models, too, and has flags of its own.
+    let mut has_remote = false;
+    // Judges are listed among the models, but have flags of their own.
     let judges = run.columns.get(JUDGES);
-    let is_judge = |name: &String, content: &Value| {
-        judges.and_then(|judges| judges.get(name)) == Some(content)
-    };
-    let asked = models
-        .iter()
-        .filter(|(name, content)| !is_judge(name, content));
-    for content in asked
-        .map(|(_, content)| content)
-        .filter(|content| content.get("--base-url").is_some())
-    {
-        remote += 1;
+    for (name, content) in models {
+        let is_judge = judges.and_then(|judges| judges.get(name)) == Some(content);
+        if is_judge || content.get("--base-url").is_none() {
+            continue;
+        }
+        has_remote = true;
         for (flag, value) in decisive(content) {
             values.entry(flag).or_default().insert(value);
         }
     }
-    let joined = |values: BTreeSet<String>| values.into_iter().collect::<Vec<_>>().join(" or ");
-    let values = values
-        .into_iter()
-        .map(|(flag, values)| (flag, joined(values)));
-    (remote > 0).then(|| values.collect())
+    has_remote.then(|| {
+        values
+            .into_iter()
+            .map(|(flag, values)| {
+                let values: Vec<String> = values.into_iter().collect();
+                (flag, values.join(" or "))
+            })
+            .collect()
+    })
 }
 
-/// The address at which a run asks a model, without user, password and query.
+/// Base URL at which a run asks a model, without user, password and query.
 pub(super) fn address(run: &RunManifest, model: &str) -> Option<String> {
     let content = run.columns.get("model")?.get(model)?;
     content.get("--base-url").map(text)
@@ -273,13 +278,14 @@ fn field((name, value): (&String, &Value)) -> (String, String) {
     (name.clone(), text(value))
 }
 
-/// The values in an object, each with its flag; objects in it are opened, and nulls are left out.
+/// Values in an object with their flags, including the values of nested objects; nulls are omitted.
 fn leaves(content: &Value) -> impl Iterator<Item = (String, String)> {
     let mut found = Vec::new();
     add_leaves("", content, &mut found);
     found.into_iter()
 }
 
+/// Adds the values in `value` to `found`, under `flag` and the names of nested fields.
 fn add_leaves(flag: &str, value: &Value, found: &mut Vec<(String, String)>) {
     match value {
         Value::Null => {}
@@ -298,7 +304,7 @@ fn add_leaves(flag: &str, value: &Value, found: &mut Vec<(String, String)>) {
     }
 }
 
-/// A value as text.
+/// Converts a value to text, an array to a comma-separated list.
 fn text(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
@@ -307,18 +313,18 @@ fn text(value: &Value) -> String {
     }
 }
 
-/// A value for a message: a digest by its first eight digits, a long text by its start.
+/// Shortens a value for a message: a digest to its first eight digits, a long text to its start.
 pub(super) fn short(value: &str) -> String {
     if is_digest(value) {
         return format!("{}…", &value[..8]);
     }
-    match value.char_indices().nth(LONGEST) {
+    match value.char_indices().nth(MAX_VALUE_CHARS) {
         Some((end, _)) => format!("{}…", &value[..end]),
         None => value.to_owned(),
     }
 }
 
-/// Whether a text is a digest of 32 bytes.
+/// True if a text is a digest of 32 bytes in hexadecimal.
 pub(super) fn is_digest(text: &str) -> bool {
     text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
@@ -328,7 +334,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_setting_says_each_value_once() {
+    fn setting_lists_each_value_once() {
         let settings = |value: Option<&str>| {
             let pair = value.map(|value| ("--seed".to_owned(), value.to_owned()));
             Some(pair.into_iter().collect::<Settings>())
@@ -352,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn digests_are_shortened_and_objects_are_opened() {
+    fn digests_are_shortened_and_objects_flattened() {
         let content = serde_json::json!({"--llie": "ab".repeat(32), "--camera": {"name": "a7", "gain": null}});
         let found: Vec<_> = leaves(&content)
             .map(|(flag, value)| (flag, short(&value)))

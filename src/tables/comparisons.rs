@@ -1,4 +1,4 @@
-//! Tables of all differences with their tests, for each kind of comparison: all families together, and by family.
+//! Tables of paired differences and their tests. Each kind of comparison has a table over all families and one by family.
 
 use super::pooled::too_few_clusters;
 use super::sections::{ENHANCERS, REAL};
@@ -11,11 +11,12 @@ use darkqa_score::comparisons::{Comparison, ComparisonKind, MIN_PAIRS};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 
-/// Maximum number of rows of a kind in the terminal. The CSV file has all rows.
+/// Maximum number of rows that the terminal shows of one kind of comparison. The CSV file has all rows.
 const MAX_ROWS: usize = 40;
 
+/// Tables of the differences in accuracy. Files also have the rows with lenient parsing of replies.
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
-    let mut tables = tables_of(&findings.comparisons, findings.unit, titles);
+    let mut tables = tables_by_kind(&findings.comparisons, findings.unit, accuracy_titles);
     for kind in ComparisonKind::ALL {
         let all: Vec<&Comparison> = findings
             .comparisons
@@ -27,13 +28,13 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
     tables
 }
 
-/// The tables of comparisons of another measure, which the last column of the file names.
+/// Tables of the differences in another measure than accuracy. The file's last column is the name of the measure.
 pub(crate) fn comparisons_of(
     comparisons: &[Comparison],
     unit: ClusterUnit,
     measure: &'static str,
 ) -> Vec<Table> {
-    let mut tables = tables_of(comparisons, unit, titles_against_light);
+    let mut tables = tables_by_kind(comparisons, unit, agreement_titles);
     for table in &mut tables {
         let caption = format!(
             "{}, paired by question, in percentage points.",
@@ -46,13 +47,13 @@ pub(crate) fn comparisons_of(
         });
         for row in &mut table.rows {
             for cell in &mut row.cells {
-                // Another answer than at L0 need not be worse.
-                let words = match cell {
+                // An answer that differs from the one at L0 is not necessarily worse.
+                let verdict = match cell {
                     TableCell::Significance(Significance::Better) => "agrees more",
                     TableCell::Significance(Significance::Worse) => "agrees less",
                     _ => continue,
                 };
-                *cell = TableCell::Text(words.to_owned());
+                *cell = TableCell::Text(verdict.to_owned());
             }
             row.cells.push(measure.into());
         }
@@ -60,50 +61,52 @@ pub(crate) fn comparisons_of(
     tables
 }
 
-/// The tables of each kind of comparison; `titles` returns the caption on the page, and the heading in the terminal.
-fn tables_of(
+/// Two tables for each kind of comparison: over all families, and by family.
+///
+/// `titles` returns the caption on the page and the heading in the terminal.
+fn tables_by_kind(
     comparisons: &[Comparison],
     unit: ClusterUnit,
     titles: fn(ComparisonKind) -> (&'static str, Option<&'static str>),
 ) -> Vec<Table> {
     let mut tables = Vec::new();
     for kind in ComparisonKind::ALL {
-        let all = comparisons
+        let (overall, by_family): (Vec<&Comparison>, Vec<&Comparison>) = comparisons
             .iter()
-            .filter(|comparison| comparison.kind == kind);
-        let (whole, by_family): (Vec<&Comparison>, Vec<&Comparison>) =
-            all.partition(|comparison| comparison.family.is_none());
+            .filter(|comparison| comparison.kind == kind)
+            .partition(|comparison| comparison.family.is_none());
         let (caption, heading) = titles(kind);
-        let least = whole.iter();
-        let least =
-            least.map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
-        let note = too_few_clusters(least, &unit.to_string());
-        let mut total = table(kind, caption, &whole, ReadingMode::Strict);
-        total.is_folded = !matches!(
+        let least_p_values = overall
+            .iter()
+            .map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
+        let clusters_note = too_few_clusters(least_p_values, &unit.to_string());
+        let mut overall_table = table(kind, caption, &overall, ReadingMode::Strict);
+        overall_table.is_folded = !matches!(
             kind,
             ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced
         );
-        if !whole.is_empty() {
-            total.heading = heading.map(str::to_owned);
+        if !overall.is_empty() {
+            overall_table.heading = heading.map(str::to_owned);
             if kind == ComparisonKind::Enhancer {
                 let caption = "Enhanced against raw, paired by question, in percentage points.";
-                total.latex = Some(caption.to_owned());
+                overall_table.latex = Some(caption.to_owned());
             }
-            shorten(&mut total, kind, &whole);
-            total.notes.extend(note);
-            total.notes.extend(too_few(&whole));
+            hide_rows_in_terminal(&mut overall_table, kind, &overall);
+            overall_table.notes.extend(clusters_note);
+            overall_table.notes.extend(too_few_items(&overall));
         }
         let caption = format!("{caption}, by family");
-        let mut by_family = table(kind, &caption, &by_family, ReadingMode::Strict);
-        by_family.is_folded = true;
-        tables.extend([total, by_family]);
+        let mut family_table = table(kind, &caption, &by_family, ReadingMode::Strict);
+        family_table.is_folded = true;
+        tables.extend([overall_table, family_table]);
     }
     tables
 }
 
-/// The caption on the page, and the heading in the terminal. The kind `Level` has no heading, because the terminal shows
-/// accuracy by level anyway.
-fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
+/// Caption on the page and heading in the terminal for differences in accuracy.
+///
+/// The kind `Level` has no heading, because another table in the terminal shows accuracy by level.
+fn accuracy_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
     match kind {
         ComparisonKind::Level => ("Each dark level less L0, raw", None),
         ComparisonKind::Variant => (
@@ -137,8 +140,10 @@ fn titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
     }
 }
 
-/// The same for agreement with the answers at L0. The level L0 is that of the images asked again.
-fn titles_against_light(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
+/// Caption on the page and heading in the terminal for differences in agreement with the answers at L0.
+///
+/// The level L0 in these comparisons is a second request with the same images.
+fn agreement_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
     match kind {
         ComparisonKind::Level => (
             "Agreement at each dark level less that of L0 again, raw",
@@ -172,8 +177,8 @@ fn titles_against_light(kind: ComparisonKind) -> (&'static str, Option<&'static 
     }
 }
 
-/// A line about the rows whose sides share too few items for a verdict.
-fn too_few(comparisons: &[&Comparison]) -> Option<String> {
+/// Note with the number of rows whose sides share too few items for a verdict; `None` if all share enough.
+fn too_few_items(comparisons: &[&Comparison]) -> Option<String> {
     let count = comparisons
         .iter()
         .filter(|comparison| comparison.is_too_small())
@@ -186,28 +191,30 @@ fn too_few(comparisons: &[&Comparison]) -> Option<String> {
     })
 }
 
-/// Hides rows in the terminal: those beyond [`MAX_ROWS`] and, for blind models, those that reveal little.
-fn shorten(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison]) {
-    let mut printed: Vec<usize> = (0..comparisons.len()).collect();
+/// Hides rows beyond [`MAX_ROWS`] in the terminal, and adds notes about them.
+///
+/// For blind models, hides the enhanced conditions too, and all rows if images help in each condition.
+fn hide_rows_in_terminal(table: &mut Table, kind: ComparisonKind, comparisons: &[&Comparison]) {
+    let mut shown: Vec<usize> = (0..comparisons.len()).collect();
     if kind == ComparisonKind::Blind {
-        // The terminal compares blind models with raw images only; the file also has the enhanced ones.
-        printed.retain(|index| comparisons[*index].first.enhancer.is_none());
+        // The terminal compares blind models with raw images only. The file also has the enhanced images.
+        shown.retain(|index| comparisons[*index].first.enhancer.is_none());
         let is_better =
             |index: &usize| comparisons[*index].strict.significance == Significance::Better;
-        if !printed.is_empty() && printed.iter().all(is_better) {
-            let line = format!("better in all {} conditions", printed.len());
+        if !shown.is_empty() && shown.iter().all(is_better) {
+            let line = format!("better in all {} conditions", shown.len());
             table.notes.push(line);
-            printed.clear();
+            shown.clear();
         }
     }
-    if printed.len() > MAX_ROWS {
-        let more = printed.len() - MAX_ROWS;
-        let line = format!("{more} more rows are in comparisons.csv");
+    if shown.len() > MAX_ROWS {
+        let hidden = shown.len() - MAX_ROWS;
+        let line = format!("{hidden} more rows are in comparisons.csv");
         table.notes.push(line);
-        printed.truncate(MAX_ROWS);
+        shown.truncate(MAX_ROWS);
     }
     for (index, row) in table.rows.iter_mut().enumerate() {
-        if !printed.contains(&index) {
+        if !shown.contains(&index) {
             row.hidden_in.push(TableFormat::Terminal);
         }
     }
@@ -226,7 +233,7 @@ fn table(
     };
     let builder =
         TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
-    let builder = numbers(subjects(builder, kind), mode);
+    let builder = number_columns(subject_columns(builder, kind), mode);
     builder
         .column(
             ColumnKind::Significance,
@@ -237,7 +244,10 @@ fn table(
         .build()
 }
 
-fn subjects(builder: TableBuilder<&Comparison>, kind: ComparisonKind) -> TableBuilder<&Comparison> {
+fn subject_columns(
+    builder: TableBuilder<&Comparison>,
+    kind: ComparisonKind,
+) -> TableBuilder<&Comparison> {
     let builder = builder
         .column(Text, "csv kind", |comparison| comparison.kind.name())
         .column(Text, "csv model | latex Model", |comparison| {
@@ -264,10 +274,10 @@ fn subjects(builder: TableBuilder<&Comparison>, kind: ComparisonKind) -> TableBu
         | ComparisonKind::Light
         | ComparisonKind::RealSynthetic => {
             builder.column(Text, "terminal less | page less", |comparison| {
-                against(comparison)
+                second_side_label(comparison)
             })
         }
-        // The kind states what the first side is compared with.
+        // No column for the second side: the kind of comparison determines it.
         ComparisonKind::Level
         | ComparisonKind::Variant
         | ComparisonKind::Enhancer
@@ -276,7 +286,10 @@ fn subjects(builder: TableBuilder<&Comparison>, kind: ComparisonKind) -> TableBu
     builder.family(|comparison| comparison.family.as_ref())
 }
 
-fn numbers(builder: TableBuilder<&Comparison>, mode: ReadingMode) -> TableBuilder<&Comparison> {
+fn number_columns(
+    builder: TableBuilder<&Comparison>,
+    mode: ReadingMode,
+) -> TableBuilder<&Comparison> {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";
     builder
@@ -328,8 +341,8 @@ fn numbers(builder: TableBuilder<&Comparison>, mode: ReadingMode) -> TableBuilde
         )
 }
 
-/// The second side without what the first implies: another model, another condition, or both.
-fn against(comparison: &Comparison) -> String {
+/// Model or condition of the second side, or both, without what the first side shares.
+fn second_side_label(comparison: &Comparison) -> String {
     let (first, second) = (&comparison.first, &comparison.second);
     match (first.model != second.model, comparison.kind) {
         (true, ComparisonKind::Light) => name(second),

@@ -1,4 +1,4 @@
-//! Tables of darkness thresholds and areas: all families together, and by family.
+//! Tables of darkness thresholds and of areas under the accuracy curves, for all families together and by family.
 
 use std::collections::BTreeSet;
 
@@ -20,7 +20,7 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
             .iter()
             .filter(|curve| curve.axis() == axis)
             .collect();
-        // Only light has tables without a row: it is what a run is about.
+        // The light tables are kept even if empty: light is the main axis of a run.
         if !curves.is_empty() || axis == Axis::LIGHT {
             tables.extend(axis_tables(findings, axis, curves));
         }
@@ -28,76 +28,80 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     tables
 }
 
-/// The tables of the curves over one axis.
+/// Tables of the curves on one axis: all families together, by family, and both with lenient parsing (in files only).
 fn axis_tables(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 3] {
+    let titles = Titles::new(axis);
     let notes = notes(&curves);
-    let lenient = table(&Names::new(axis), "", &curves, ReadingMode::Lenient).in_files_only();
-    let (whole, by_family): (Vec<&Curve>, Vec<&Curve>) =
+    let lenient = table(&titles, "", &curves, ReadingMode::Lenient).in_files_only();
+    let (all_families, by_family): (Vec<&Curve>, Vec<&Curve>) =
         curves.into_iter().partition(|curve| curve.family.is_none());
-    let names = Names::new(axis);
     let heading = format!(
         "{} in {} (half-way from L0 to chance) and mean accuracy in %, with 95 % intervals by {}",
-        names.threshold, axis.unit, findings.unit
+        titles.quantity, axis.unit, findings.unit
     );
-    let mut whole = table(&names, names.caption, &whole, ReadingMode::Strict);
-    whole.heading = (!whole.rows.is_empty()).then_some(heading);
-    whole.notes = notes;
+    let mut all_families = table(&titles, titles.caption, &all_families, ReadingMode::Strict);
+    all_families.heading = (!all_families.rows.is_empty()).then_some(heading);
+    all_families.notes = notes;
     if axis == Axis::LIGHT {
-        whole.notes.extend(finer(findings));
+        all_families.notes.extend(finer_levels_note(findings));
     }
-    let caption = format!("{} by family", names.caption);
-    let mut by_family = table(&names, &caption, &by_family, ReadingMode::Strict);
+    let caption = format!("{} by family", titles.caption);
+    let mut by_family = table(&titles, &caption, &by_family, ReadingMode::Strict);
     by_family.is_folded = true;
-    [whole, by_family, lenient]
+    [all_families, by_family, lenient]
 }
 
-/// Names in the tables of an axis.
-struct Names {
-    /// The file.
+/// File name, caption and column heads of the tables of one axis.
+struct Titles {
+    /// File name without its extension.
     file: &'static str,
     caption: &'static str,
-    threshold: &'static str,
-    darkest: &'static str,
-    columns: &'static str,
-    range: &'static str,
+    /// Name of the threshold in the heading.
+    quantity: &'static str,
+    /// Heads of the column with the darkest level.
+    darkest_column: &'static str,
+    /// Heads of the columns with the threshold and its interval.
+    threshold_columns: &'static str,
+    /// Heads of the column with the range of levels.
+    range_column: &'static str,
 }
 
-impl Names {
+impl Titles {
     fn new(axis: Axis) -> Self {
         if axis == Axis::MOTION {
             return Self {
                 file: "blur_thresholds",
                 caption: "Thresholds and areas of motion blur",
-                threshold: "Exposure time of motion blur",
-                darkest: "csv longest_ms",
-                columns: "csv threshold_ms low high | terminal threshold, interval | page threshold in ms [95 %]",
-                range: "page ms",
+                quantity: "Exposure time of motion blur",
+                darkest_column: "csv longest_ms",
+                threshold_columns: "csv threshold_ms low high | terminal threshold, interval | page threshold in ms [95 %]",
+                range_column: "page ms",
             };
         }
         Self {
             file: "thresholds",
             caption: "Thresholds and areas",
-            threshold: "Darkness threshold",
-            darkest: "csv darkest_ev",
-            columns: "csv threshold_ev low high | terminal threshold, interval | page threshold in EV [95 %]",
-            range: "page EV",
+            quantity: "Darkness threshold",
+            darkest_column: "csv darkest_ev",
+            threshold_columns: "csv threshold_ev low high | terminal threshold, interval | page threshold in EV [95 %]",
+            range_column: "page EV",
         }
     }
 }
 
-/// A threshold is `inf` beyond the darkest level, and empty if it is not known.
-fn table(names: &Names, caption: &str, curves: &[&Curve], mode: ReadingMode) -> Table {
-    TableBuilder::new(names.file, curves)
+/// Builds the table of some curves. A threshold is `inf` beyond the darkest level, and empty if unknown.
+fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ReadingMode) -> Table {
+    TableBuilder::new(titles.file, curves)
         .page("thresholds", caption)
         .line(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
         .column(Text, "terminal light | page light", |curve| {
             light(&curve.variant, curve.enhancer.as_ref())
         })
         .family(|curve| curve.family.as_ref())
-        .column(Number, names.darkest, |curve| {
+        .column(Number, titles.darkest_column, |curve| {
             curve.parsed(mode).darkest.value()
         })
-        .column(Threshold, names.columns, |curve| {
+        .column(Threshold, titles.threshold_columns, |curve| {
             let darkest = curve.parsed(mode).darkest.value();
             match &curve.parsed(mode).threshold {
                 Ok(threshold) => TableCell::Threshold(*threshold, darkest),
@@ -109,23 +113,24 @@ fn table(names: &Names, caption: &str, curves: &[&Curve], mode: ReadingMode) -> 
             "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]",
             |curve| curve.parsed(mode).area,
         )
-        .column(Text, names.range, |curve| {
+        .column(Text, titles.range_column, |curve| {
             format!("0–{}", curve.parsed(mode).darkest.value())
         })
-        .column(Text, "csv reason", |curve| reason(curve.parsed(mode)))
+        .column(Text, "csv reason", |curve| csv_reason(curve.parsed(mode)))
         .column(Text, "csv mode", |_| mode.name())
         .build()
 }
 
-/// Why a threshold is not known.
+/// Reason why a curve has no threshold.
 pub(crate) fn why(reason: &NoThreshold) -> String {
     match reason {
         NoThreshold::NotAboveChance => "not clearly above chance at L0".to_owned(),
-        NoThreshold::Thin(level) => thin(level),
+        NoThreshold::Thin(level) => thin_level_text(level),
     }
 }
 
-fn thin(level: &ThinLevel) -> String {
+/// Replies and clusters at a level that has too few of them.
+fn thin_level_text(level: &ThinLevel) -> String {
     let replies = match level.replies {
         1 => "1 reply".to_owned(),
         replies => format!("{replies} replies"),
@@ -137,51 +142,51 @@ fn thin(level: &ThinLevel) -> String {
     )
 }
 
-/// Why the threshold of a curve is not known, or which levels are left out; empty if neither.
-fn reason(summary: &CurveSummary) -> String {
+/// Reason for a missing threshold, and the levels left out, separated by semicolons; empty if neither applies.
+fn csv_reason(summary: &CurveSummary) -> String {
     let left_out = summary
         .left_out
         .iter()
-        .map(|level| format!("left out: {}", thin(level)));
+        .map(|level| format!("left out: {}", thin_level_text(level)));
     let unknown = summary.threshold.as_ref().err().map(why);
     let reasons: Vec<String> = unknown.into_iter().chain(left_out).collect();
     reasons.join("; ")
 }
 
-/// The requirements of a threshold that is unknown for lack of them, and a line for each curve of all families together with the levels that are
-/// left out.
+/// Notes on the curves of all families together: the minimum data for a threshold if a curve lacks it, and the levels that each curve
+/// leaves out.
 fn notes(curves: &[&Curve]) -> Vec<String> {
     let curves = curves.iter().filter(|curve| curve.family.is_none());
-    let thinned = curves
+    let needs_data = curves
         .clone()
-        .filter(|curve| !curve.summary.left_out.is_empty());
-    let is_thin = |curve: &Curve| matches!(curve.summary.threshold, Err(NoThreshold::Thin(_)));
-    let is_needed = curves.clone().any(|curve| is_thin(curve));
-    let needed = is_needed.then(|| format!("a threshold needs {}", ThinLevel::needed()));
-    let left_out = thinned.map(|curve| {
-        let light = light(&curve.variant, curve.enhancer.as_ref());
-        let left_out: Vec<String> = curve.summary.left_out.iter().map(thin).collect();
-        format!(
-            "left out of {}, {light}: {}",
-            curve.model,
-            left_out.join(", ")
-        )
-    });
-    needed.into_iter().chain(left_out).collect()
+        .any(|curve| matches!(curve.summary.threshold, Err(NoThreshold::Thin(_))));
+    let requirement = needs_data.then(|| format!("a threshold needs {}", ThinLevel::needed()));
+    let left_out = curves
+        .filter(|curve| !curve.summary.left_out.is_empty())
+        .map(|curve| {
+            let light = light(&curve.variant, curve.enhancer.as_ref());
+            let levels: Vec<String> = curve.summary.left_out.iter().map(thin_level_text).collect();
+            format!(
+                "left out of {}, {light}: {}",
+                curve.model,
+                levels.join(", ")
+            )
+        });
+    requirement.into_iter().chain(left_out).collect()
 }
 
-/// Number of levels that [`finer`] proposes.
-const MORE_LEVELS: usize = 3;
+/// Number of levels to propose between two existing levels.
+const PROPOSED_LEVELS: usize = 3;
 
-/// The smallest step in EV that [`finer`] proposes: finer levels differ by less than the intervals of thresholds.
-const LEAST_STEP: f64 = 0.25;
+/// Minimum step between proposed levels, in EV; smaller steps are narrower than the intervals of thresholds.
+const MIN_STEP: f64 = 0.25;
 
-/// The levels to add where the thresholds of all raw curves lie, evenly spaced between the levels around them; `None` if the levels
-/// there are close already, a threshold lies beyond them, or none is known.
+/// Note that proposes levels around the light thresholds of all curves without enhancement. `None` if the existing levels are already
+/// close, a threshold is beyond the darkest level, or no threshold is known.
 ///
-/// All items and models are then asked there alike. A search that places levels by the answers of each model gains little, since the
-/// spread between items makes most of the error, and it would compare models at different levels.
-fn finer(findings: &Findings<'_>) -> Option<String> {
+/// The proposed levels are the same for all models and items. Choosing levels for each model by its answers would gain little, because
+/// the spread between items causes most of the error, and it would compare models at different levels.
+fn finer_levels_note(findings: &Findings<'_>) -> Option<String> {
     let intervals: Vec<[f64; 2]> = findings
         .curves
         .iter()
@@ -201,16 +206,19 @@ fn finer(findings: &Findings<'_>) -> Option<String> {
         .filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT))
         .collect();
     let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();
-    let more = levels_within(&intervals, &drops)?;
-    let more: Vec<String> = more.iter().map(ToString::to_string).collect();
+    let proposed: Vec<String> = levels_between(&intervals, &drops)?
+        .iter()
+        .map(ToString::to_string)
+        .collect();
     Some(format!(
         "for a finer threshold, add {} EV to --levels and ask again with --resume: all models, all items, these levels alone",
-        more.join(", ")
+        proposed.join(", ")
     ))
 }
 
-/// Exposure drops in EV, evenly spaced between the two of `drops` that enclose all intervals; `drops` is in ascending order.
-fn levels_within(intervals: &[[f64; 2]], drops: &[f64]) -> Option<Vec<f64>> {
+/// Proposed exposure drops in EV, evenly spaced between the two existing `drops` that enclose all `intervals`. `drops` is in ascending
+/// order. `None` if nothing encloses the intervals or the step is too small.
+fn levels_between(intervals: &[[f64; 2]], drops: &[f64]) -> Option<Vec<f64>> {
     let (low, high) = intervals
         .iter()
         .fold((f64::INFINITY, 0.0_f64), |(low, high), ends| {
@@ -218,13 +226,13 @@ fn levels_within(intervals: &[[f64; 2]], drops: &[f64]) -> Option<Vec<f64>> {
         });
     let below = drops.iter().rev().find(|drop| **drop <= low)?;
     let above = drops.iter().find(|drop| **drop >= high)?;
-    let step = (above - below) / (MORE_LEVELS + 1) as f64;
-    let new: Vec<f64> = (1..=MORE_LEVELS)
+    let step = (above - below) / (PROPOSED_LEVELS + 1) as f64;
+    let new: Vec<f64> = (1..=PROPOSED_LEVELS)
         .map(|index| below + step * index as f64)
         .map(|drop| (drop * 100.0).round() / 100.0)
         .filter(|drop| !drops.contains(drop))
         .collect();
-    (step >= LEAST_STEP && !new.is_empty()).then_some(new)
+    (step >= MIN_STEP && !new.is_empty()).then_some(new)
 }
 
 #[cfg(test)]
@@ -232,15 +240,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_are_added_around_the_thresholds_alone() {
+    fn proposed_levels_surround_the_thresholds() {
         let ladder = [0.0, 2.0, 4.0, 6.0, 7.5, 9.0];
-        let within = |intervals: &[[f64; 2]]| levels_within(intervals, &ladder);
-        assert_eq!(within(&[[2.2, 3.9]]), Some(vec![2.5, 3.0, 3.5]));
-        // The union spans two steps; the level between them was asked.
-        assert_eq!(within(&[[2.2, 3.0], [5.0, 5.5]]), Some(vec![3.0, 5.0]));
-        // Beyond the darkest level, or unknown at all.
-        assert_eq!(within(&[[8.0, f64::INFINITY]]), None);
-        assert_eq!(within(&[]), None);
-        assert_eq!(levels_within(&[[1.1, 1.3]], &[0.0, 1.0, 1.5, 2.0]), None);
+        let propose = |intervals: &[[f64; 2]]| levels_between(intervals, &ladder);
+        assert_eq!(propose(&[[2.2, 3.9]]), Some(vec![2.5, 3.0, 3.5]));
+        // The intervals span two steps; the level between the steps already exists.
+        assert_eq!(propose(&[[2.2, 3.0], [5.0, 5.5]]), Some(vec![3.0, 5.0]));
+        // No proposal: a threshold beyond the darkest level, no known threshold, and a step below the minimum.
+        assert_eq!(propose(&[[8.0, f64::INFINITY]]), None);
+        assert_eq!(propose(&[]), None);
+        assert_eq!(levels_between(&[[1.1, 1.3]], &[0.0, 1.0, 1.5, 2.0]), None);
     }
 }

@@ -1,61 +1,65 @@
-//! The remaining limits that a server reports in its headers: [`Allowance`].
+//! Rate limits that a server reports in its response headers: [`Allowance`].
 
 use std::time::{Duration, SystemTime};
 
 use jiff::{SignedDuration, Timestamp};
 use reqwest::header::HeaderMap;
 
-/// The rest of one limit, and the time until the limit is full again.
+/// One rate limit, in requests or in tokens.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Remainder {
+struct RateLimit {
+    /// Maximum per period; `None` if the server does not report it.
     limit: Option<f64>,
+    /// Amount left.
     remaining: f64,
+    /// Time until the limit is full again.
     reset: Duration,
 }
 
-/// The rest of the limits on requests and on tokens.
+/// Rate limits on requests and on tokens; `None` if the server does not report them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::ask) struct Allowance {
-    requests: Option<Remainder>,
-    tokens: Option<Remainder>,
+    requests: Option<RateLimit>,
+    tokens: Option<RateLimit>,
 }
 
-/// The advice that follows from an allowance.
+/// Advice for the next requests, from the rate limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Asks {
     Nothing,
-    /// Keep this spacing between requests.
+    /// Leave this much time between requests.
     Spacing(Duration),
     /// Send no request for this time.
     Pause(Duration),
 }
 
 impl Allowance {
-    /// Reads the headers of a reply: `x-ratelimit-{limit,remaining,reset}-{requests,tokens}` (OpenAI and similar servers), the
-    /// same without an ending (OpenRouter), and `anthropic-ratelimit-{requests,tokens}-{limit,remaining,reset}`. A limit
-    /// without `remaining` and `reset` is ignored.
+    /// Reads the response headers `x-ratelimit-{limit,remaining,reset}-{requests,tokens}` (OpenAI and compatible servers),
+    /// `x-ratelimit-{limit,remaining,reset}` (OpenRouter, for requests) and
+    /// `anthropic-ratelimit-{requests,tokens}-{limit,remaining,reset}`. A limit without `remaining` or `reset` is ignored.
     pub(in crate::ask) fn read(headers: &HeaderMap, now: SystemTime) -> Self {
         let text = |name: &str| headers.get(name)?.to_str().ok().map(str::trim);
-        let remainder = |name: &dyn Fn(&str) -> String| {
+        let rate_limit = |name: &dyn Fn(&str) -> String| {
             let number = |field| text(&name(field))?.parse::<f64>().ok();
             let remaining = number("remaining").filter(|n| n.is_finite())?;
-            Some(Remainder {
+            Some(RateLimit {
                 limit: number("limit").filter(|n| n.is_finite() && *n > 0.0),
                 remaining: remaining.max(0.0),
-                reset: duration(text(&name("reset"))?, now)?,
+                reset: time_until_reset(text(&name("reset"))?, now)?,
             })
         };
-        let of = |kind: &str| {
-            remainder(&|field| format!("x-ratelimit-{field}-{kind}"))
-                .or_else(|| remainder(&|field| format!("anthropic-ratelimit-{kind}-{field}")))
+        let limit_on = |kind: &str| {
+            rate_limit(&|field| format!("x-ratelimit-{field}-{kind}"))
+                .or_else(|| rate_limit(&|field| format!("anthropic-ratelimit-{kind}-{field}")))
         };
         Self {
-            requests: of("requests").or_else(|| remainder(&|field| format!("x-ratelimit-{field}"))),
-            tokens: of("tokens"),
+            requests: limit_on("requests")
+                .or_else(|| rate_limit(&|field| format!("x-ratelimit-{field}"))),
+            tokens: limit_on("tokens"),
         }
     }
 
-    /// The time until a limit of which nothing is left is full again; `None` if something is left of each.
+    /// Time until every exhausted limit has reset; `None` if no limit is exhausted.
     pub(in crate::ask) fn pause(&self) -> Option<Duration> {
         [self.requests, self.tokens]
             .into_iter()
@@ -65,14 +69,14 @@ impl Allowance {
             .max()
     }
 
-    /// The advice for requests of `tokens` tokens each.
+    /// Advice for requests of `tokens` tokens each; the stricter limit decides.
     pub(super) fn asks(&self, tokens: f64) -> Asks {
         let requests = self
             .requests
-            .map_or(Asks::Nothing, |remainder| remainder.asks(1.0));
+            .map_or(Asks::Nothing, |limit| limit.advice(1.0));
         let tokens = self
             .tokens
-            .map_or(Asks::Nothing, |remainder| remainder.asks(tokens));
+            .map_or(Asks::Nothing, |limit| limit.advice(tokens));
         match (requests, tokens) {
             (Asks::Pause(a), Asks::Pause(b)) => Asks::Pause(a.max(b)),
             (Asks::Spacing(a), Asks::Spacing(b)) => Asks::Spacing(a.max(b)),
@@ -83,38 +87,40 @@ impl Allowance {
     }
 }
 
-impl Remainder {
-    /// The advice for requests that use `each` of the limit. Above half of the limit there is none; below, the rest is spread
-    /// over the time until the limit is full again. If the limit refills continuously (OpenAI), this is the refill rate at
-    /// half and less below, so the rest settles at half. If it refills at the end of each minute, the rest lasts until then.
-    fn asks(self, each: f64) -> Asks {
+impl RateLimit {
+    /// Advice for requests that each use `cost` of the limit: none above half of the limit; below, the remaining amount is spread
+    /// evenly over the time until reset.
+    ///
+    /// If the limit refills continuously (OpenAI), requests at half of the limit match the refill rate, and slow down below, so the
+    /// remaining amount settles at half. If it refills at the end of each minute, the remaining amount lasts until then.
+    fn advice(self, cost: f64) -> Asks {
         if self.reset.is_zero() || self.limit.is_some_and(|limit| self.remaining > limit / 2.0) {
             return Asks::Nothing;
         }
-        if self.remaining < each {
+        if self.remaining < cost {
             return Asks::Pause(self.reset);
         }
-        let spacing = self.reset.as_secs_f64() * each / self.remaining;
+        let spacing = self.reset.as_secs_f64() * cost / self.remaining;
         Asks::Spacing(Duration::try_from_secs_f64(spacing).unwrap_or(Duration::MAX))
     }
 }
 
-/// The number of seconds from which a number is a date and not a duration.
-const DATES: f64 = 1e9;
+/// Smallest number that is a Unix timestamp in seconds; smaller numbers are durations in seconds.
+const MIN_TIMESTAMP: f64 = 1e9;
 
-/// A duration (`6m0s`, `17ms`, or seconds), or the time until a date (RFC 3339, or seconds or milliseconds since 1970).
-fn duration(text: &str, now: SystemTime) -> Option<Duration> {
+/// Time until a reset, from a duration (`6m0s`, `17ms` or seconds) or a date (RFC 3339, or a Unix timestamp in seconds or
+/// milliseconds); zero for a date in the past, `None` for any other text.
+fn time_until_reset(text: &str, now: SystemTime) -> Option<Duration> {
     let until = |date: SystemTime| date.duration_since(now).unwrap_or(Duration::ZERO);
     if let Ok(number) = text.parse::<f64>() {
-        let seconds = Duration::try_from_secs_f64(if number >= DATES * 1e3 {
+        let seconds = Duration::try_from_secs_f64(if number >= MIN_TIMESTAMP * 1e3 {
             number / 1e3
         } else {
             number
         })
         .ok()?;
-        let date = || SystemTime::UNIX_EPOCH.checked_add(seconds);
-        return if number >= DATES {
-            date().map(until)
+        return if number >= MIN_TIMESTAMP {
+            SystemTime::UNIX_EPOCH.checked_add(seconds).map(until)
         } else {
             Some(seconds)
         };
@@ -140,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn durations_of_every_form_are_read() {
+    fn reset_times_of_every_form_are_parsed() {
         let now = SystemTime::UNIX_EPOCH + Duration::from_secs(NOW);
         for (text, ms) in [
             ("6m0s", Some(360_000)),
@@ -160,12 +166,16 @@ mod tests {
             ("NaN", None),
             ("inf", None),
         ] {
-            assert_eq!(duration(text, now), ms.map(Duration::from_millis), "{text}");
+            assert_eq!(
+                time_until_reset(text, now),
+                ms.map(Duration::from_millis),
+                "{text}"
+            );
         }
     }
 
     #[test]
-    fn the_rest_is_spread_over_the_time_left() {
+    fn remaining_requests_are_spread_until_reset() {
         let openai = |remaining, reset| {
             read(&[
                 ("x-ratelimit-limit-requests", "500"),
@@ -175,7 +185,7 @@ mod tests {
             .asks(1000.0)
         };
         assert_eq!(openai("499", "120ms"), Asks::Nothing);
-        // Half of 500 a minute: the spacing is the refill rate, 120 ms.
+        // 250 left of 500 a minute: the spacing matches the refill rate, one request in 120 ms.
         assert_eq!(
             openai("250", "30s"),
             Asks::Spacing(Duration::from_millis(120))
@@ -185,6 +195,10 @@ mod tests {
             Asks::Spacing(Duration::from_millis(480))
         );
         assert_eq!(openai("0", "1m0s"), Asks::Pause(Duration::from_mins(1)));
+    }
+
+    #[test]
+    fn remaining_tokens_are_spread_until_reset() {
         let tokens = read(&[
             ("anthropic-ratelimit-tokens-limit", "40000"),
             ("anthropic-ratelimit-tokens-remaining", "10000"),
@@ -192,7 +206,10 @@ mod tests {
         ]);
         assert_eq!(tokens.asks(1000.0), Asks::Spacing(Duration::from_secs(3)));
         assert_eq!(tokens.asks(20_000.0), Asks::Pause(Duration::from_secs(30)));
-        // A rest without a reset time is ignored.
+    }
+
+    #[test]
+    fn limit_without_reset_is_ignored() {
         assert_eq!(
             read(&[
                 ("x-ratelimit-limit-requests", "500"),

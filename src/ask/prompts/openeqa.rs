@@ -1,41 +1,42 @@
-//! The prompts of OpenEQA for models and the judge, byte for byte those of `facebookresearch/open-eqa` at cfa3fce.
+//! Prompts of OpenEQA for models and for the judge, byte-identical to `facebookresearch/open-eqa` at cfa3fce.
 
 use std::sync::LazyLock;
 
 use regex::Regex;
 
-/// Upstream's templates (MIT, Meta Platforms). They are stripped before use, as upstream does.
+// Templates of upstream (MIT, Meta Platforms). Callers trim each template, as upstream does.
 const VISION: &str = include_str!("../../../prompts/openeqa/vision.txt");
 const BLIND: &str = include_str!("../../../prompts/openeqa/blind.txt");
 const MATCH: &str = include_str!("../../../prompts/openeqa/match.txt");
 const MATCH_EXTRA: &str = include_str!("../../../prompts/openeqa/match-extra.txt");
 
-/// The prompt for a model with images: the text before the images, and the text after them.
+/// Prompt for a model with images: the text before the images and the text after them.
 #[must_use]
 pub(crate) fn vision(question: &str) -> (String, String) {
     const QUERY: &str = "User Query:";
     let template = VISION.trim();
-    let (before, behind) = template.split_once(QUERY).unwrap_or((template, ""));
-    let behind = formatted(behind, &[("question", question)]);
-    (before.to_owned(), format!("{QUERY}{behind}"))
+    let (before, after) = template.split_once(QUERY).unwrap_or((template, ""));
+    let after = fill(after, &[("question", question)]);
+    (before.to_owned(), format!("{QUERY}{after}"))
 }
 
-/// The prompt for a model without images.
+/// Prompt for a model without images.
 #[must_use]
 pub(crate) fn blind(question: &str) -> String {
-    formatted(BLIND.trim(), &[("question", question)])
+    fill(BLIND.trim(), &[("question", question)])
 }
 
-/// The answer in a blind model's reply (`parse_output`): the line after the first "A:", without any further "A:". `None` if
-/// there is none, which is an error upstream.
+/// Extracts the answer from a blind model's reply, as upstream's `parse_output`: the rest of the line after the first "A:", without any
+/// further "A:". `None` for a reply without "A:", which is an error upstream.
 #[must_use]
 pub(crate) fn blind_answer(reply: &str) -> Option<String> {
-    let (_, behind) = reply.split_once("A:")?;
-    let line = behind.split('\n').next().unwrap_or(behind);
+    let (_, after) = reply.split_once("A:")?;
+    let line = after.split('\n').next().unwrap_or(after);
     Some(line.replace("A:", "").trim().to_owned())
 }
 
-/// The prompt for the judge about an answer. A list of extra answers selects another template, even if it is empty.
+/// Prompt that asks the judge to rate `prediction` against the reference `answer`. Extra answers, even an empty list, select another
+/// template.
 #[must_use]
 pub(crate) fn judge_prompt(
     question: &str,
@@ -49,43 +50,43 @@ pub(crate) fn judge_prompt(
         ("prediction", prediction),
     ];
     match extra {
-        None => formatted(MATCH.trim(), &values),
+        None => fill(MATCH.trim(), &values),
         Some(extra) => {
             let list = python_list(extra);
             let values = [values[0], values[1], values[2], ("extra_answers", &*list)];
-            formatted(MATCH_EXTRA.trim(), &values)
+            fill(MATCH_EXTRA.trim(), &values)
         }
     }
 }
 
-/// A template filled with values, as by Python's `str.format`: braces within a value are plain text.
-fn formatted(template: &str, values: &[(&str, &str)]) -> String {
+/// Fills the `{name}` fields of a template, as Python's `str.format`. Braces in a value are plain text, and unknown names are dropped.
+fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut text = String::new();
     let mut rest = template;
-    while let Some((before, behind)) = rest.split_once('{') {
+    while let Some((before, after)) = rest.split_once('{') {
         text += before;
-        let Some((name, behind)) = behind.split_once('}') else {
-            rest = behind;
+        let Some((name, after)) = after.split_once('}') else {
+            rest = after;
             break;
         };
         let value = values.iter().find(|(known, _)| *known == name);
         text += value.map_or("", |(_, value)| value);
-        rest = behind;
+        rest = after;
     }
     text + rest
 }
 
-/// A list of texts as Python prints it: `['a', "it's"]`.
+/// Formats a list of strings as Python prints it: `['a', "it's"]`.
 fn python_list(texts: &[String]) -> String {
     let texts: Vec<String> = texts.iter().map(|text| python_repr(text)).collect();
     format!("[{}]", texts.join(", "))
 }
 
-/// The characters that Python's `str.isprintable` rejects: the categories "Other" and "Separator" except the space.
+/// Matches one character that Python's `str.isprintable` rejects: the categories "Other" and "Separator", except the space.
 static UNPRINTABLE: LazyLock<Option<Regex>> =
     LazyLock::new(|| Regex::new(r"^[\p{C}\p{Z}--\x20]$").ok());
 
-/// A text as Python's `repr` prints it: in single quotes, or in double quotes if it has a single quote and no double quote.
+/// Formats a string as Python's `repr`: in single quotes, or in double quotes if it has a single quote and no double quote.
 fn python_repr(text: &str) -> String {
     let quote = if text.contains('\'') && !text.contains('"') {
         '"'
@@ -103,7 +104,7 @@ fn python_repr(text: &str) -> String {
                 printed.push('\\');
                 printed.push(c);
             }
-            _ if !unprintable(c) => printed.push(c),
+            _ if !is_unprintable(c) => printed.push(c),
             _ => printed += &escape(u32::from(c)),
         }
     }
@@ -111,7 +112,7 @@ fn python_repr(text: &str) -> String {
     printed
 }
 
-/// The escape of a character, with as few digits as Python uses.
+/// Escape sequence of a code point, in the shortest form: two, four or eight hexadecimal digits.
 fn escape(code: u32) -> String {
     match code {
         0..0x100 => format!("\\x{code:02x}"),
@@ -120,7 +121,7 @@ fn escape(code: u32) -> String {
     }
 }
 
-fn unprintable(c: char) -> bool {
+fn is_unprintable(c: char) -> bool {
     let mut buffer = [0; 4];
     let text: &str = c.encode_utf8(&mut buffer);
     !c.is_ascii_graphic()
@@ -134,8 +135,8 @@ mod tests {
     use super::*;
     use crate::types::Digest;
 
-    /// Texts and their `repr` in Python 3.11.7.
-    const GOLDEN: [(&str, &str); 20] = [
+    /// Strings and their `repr` in Python 3.11.7.
+    const PYTHON_REPRS: [(&str, &str); 20] = [
         ("", "''"),
         ("plain", "'plain'"),
         ("it's", "\u{22}it's\u{22}"),
@@ -162,8 +163,8 @@ mod tests {
     ];
 
     #[test]
-    fn templates_are_those_of_upstream() {
-        // Bytes of the files at cfa3fce, stripped.
+    fn template_lengths_match_upstream() {
+        // Sizes in bytes of the trimmed files at cfa3fce.
         for (template, bytes) in [
             (VISION, 321),
             (BLIND, 613),
@@ -177,16 +178,23 @@ mod tests {
                 Digest::from_bytes(template.as_bytes())
             );
         }
-        assert!(UNPRINTABLE.is_some());
     }
 
     #[test]
-    fn prompts_are_split_and_filled_as_upstream_does() {
-        let (before, behind) = vision("Where is {answer}?");
+    fn vision_prompt_splits_at_query() {
+        let (before, after) = vision("Where is {answer}?");
         assert!(before.ends_with("answer to the question asked by the user.\n"));
-        assert_eq!(behind, "User Query: Where is {answer}?");
+        assert_eq!(after, "User Query: Where is {answer}?");
+    }
+
+    #[test]
+    fn blind_prompt_ends_with_question() {
         let blind = blind("Is it?");
         assert!(blind.starts_with("You are an intelligent") && blind.ends_with("\n\nQ: Is it?"));
+    }
+
+    #[test]
+    fn blind_answer_follows_first_marker() {
         for (reply, answer) in [
             ("A: a bed \nExplanation: x", Some("a bed")),
             ("Q: Is it?\nA: A: a bed", Some("a bed")),
@@ -194,12 +202,20 @@ mod tests {
         ] {
             assert_eq!(blind_answer(reply).as_deref(), answer);
         }
+    }
+
+    #[test]
+    fn judge_prompt_keeps_braces_of_values() {
         let plain = judge_prompt("Q {prediction}", "it's", None, "{answer}");
         assert!(
             plain.ends_with(
                 "Your Turn:\nQuestion: Q {prediction}\nAnswer: it's\nResponse: {answer}"
             )
         );
+    }
+
+    #[test]
+    fn extra_answers_select_their_template() {
         let extra = ["Next to the stairs", "it's here", "\"both\" it's"].map(str::to_owned);
         let prompt = judge_prompt("Q", "A", Some(&extra), "P");
         let list = r#"Extra Answers: ['Next to the stairs', "it's here", '"both" it\'s']"#;
@@ -208,8 +224,9 @@ mod tests {
     }
 
     #[test]
-    fn texts_are_printed_as_python_prints_them() {
-        for (text, printed) in GOLDEN {
+    fn python_repr_matches_python() {
+        assert!(UNPRINTABLE.is_some());
+        for (text, printed) in PYTHON_REPRS {
             assert_eq!(python_repr(text), printed);
         }
     }

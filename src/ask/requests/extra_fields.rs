@@ -1,4 +1,4 @@
-//! Fields of a request that the user adds or leaves out: their flags ([`RequestArgs`]) and what they come to ([`ExtraFields`]).
+//! Request fields that the user adds or omits: the flags ([`RequestArgs`]) and the resolved fields ([`ExtraFields`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -31,9 +31,9 @@ pub(crate) struct RequestArgs {
     pub system_file: Option<PathBuf>,
 }
 
-/// Fields that the program sets, each with what sets it. The user cannot set them in another way: the manifest, the estimate of
-/// the cost and the keys of trials follow from the program's settings.
-const OWNED: [(&str, &str); 15] = [
+/// Fields set by the program, each with the flag or file that controls it. `--extra-body` cannot set them: the manifest, the cost
+/// estimate and the trial keys are computed from the program's settings.
+const PROGRAM_FIELDS: [(&str, &str); 15] = [
     ("model", "--model, or id in a file of models"),
     ("messages", "--system, or --prompts"),
     ("input", "--system, or --prompts"),
@@ -57,42 +57,42 @@ const OWNED: [(&str, &str); 15] = [
     ("top_logprobs", "--request probabilities"),
 ];
 
-/// Fields without which no request can be sent.
-const NEEDED: [&str; 4] = ["model", "messages", "input", "stream"];
+/// Fields that cannot be omitted, because no request works without them.
+const REQUIRED_FIELDS: [&str; 4] = ["model", "messages", "input", "stream"];
 
-/// Fields that carry the token limit of a reply.
+/// Fields that limit the tokens of a reply.
 const TOKEN_LIMITS: [&str; 3] = ["max_tokens", "max_completion_tokens", "max_output_tokens"];
 
-/// Fields that limit the tokens of thinking: DashScope's and Google's, Anthropic's, and that of llama.cpp.
+/// Fields that limit the thinking tokens. In order: DashScope and Google, Anthropic, llama.cpp.
 const THINKING_BUDGETS: [&str; 3] = ["thinking_budget", "budget_tokens", "reasoning_budget"];
 
-/// Fields that the user adds to every request body or leaves out, and the deployment that tells two models of one name apart.
+/// Additions to and omissions from every request, and the deployment of the model.
 ///
-/// The JSON form is part of the key of each trial. What is not set is not written, so that the keys of runs without it stay.
+/// The JSON form is part of the key of each trial. Unset fields are skipped, so that they do not change the keys of older runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ExtraFields {
-    /// A name that tells two deployments of one model apart, such as the vendor or the quantisation.
+    /// Name that distinguishes deployments of one model, such as the vendor or the quantisation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deployment: Option<String>,
-    /// The words of a system message before each question.
+    /// Text of the system message before each question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<String>,
-    /// Headers that decide replies, with their values.
+    /// HTTP headers that can change replies, with their values.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub reply_headers: BTreeMap<String, String>,
-    /// The fields that are merged into the body. As a text in the key: there a null, which removes a field, is kept.
+    /// Fields merged into the body. Serialised as JSON text, which keeps a null: a null removes a field.
     #[serde(
         rename = "extra_body",
         skip_serializing_if = "Map::is_empty",
         serialize_with = "as_text"
     )]
     pub body: Map<String, Value>,
-    /// The fields that are left out of the body, sorted.
+    /// Fields omitted from the body, sorted.
     #[serde(rename = "omit_field", skip_serializing_if = "Vec::is_empty")]
     pub omit: Vec<String>,
 }
 
-/// Writes a map as its compact JSON, keys sorted.
+/// Serialises a map as a string of compact JSON with sorted keys.
 fn as_text<S: serde::Serializer>(
     map: &Map<String, Value>,
     serializer: S,
@@ -102,18 +102,18 @@ fn as_text<S: serde::Serializer>(
 }
 
 impl RequestArgs {
-    /// The fields, with the files read.
+    /// Reads the files named by the flags and checks the fields.
     ///
     /// # Errors
-    /// If a file cannot be read, the JSON is no object, or a field is one that the program sets or looks like a secret, which the error
-    /// does not show.
+    /// If a file cannot be read, the system message is empty, a required field is omitted, the JSON is not an object, or a field is set
+    /// by the program or looks like a secret. The error does not show the secret.
     pub(crate) fn resolve(&self) -> Result<ExtraFields> {
         let system = match (&self.system, &self.system_file) {
-            (Some(words), _) => Some(words.clone()),
+            (Some(text), _) => Some(text.clone()),
             (None, Some(path)) => Some(reading::settings(path)?),
             (None, None) => None,
         };
-        let system = system.map(|words| words.trim().to_owned());
+        let system = system.map(|text| text.trim().to_owned());
         if system.as_deref() == Some("") {
             return Err(Error::usage(
                 "--system",
@@ -123,14 +123,14 @@ impl RequestArgs {
         let mut omit = self.omit_field.clone();
         for field in &mut omit {
             *field = field.trim().to_owned();
-            if field.is_empty() || NEEDED.contains(&&**field) {
+            if field.is_empty() || REQUIRED_FIELDS.contains(&&**field) {
                 let problem = format_args!("{field:?} cannot be left out of a request");
                 return Err(Error::usage("--request omit-field", problem));
             }
         }
         omit.sort();
         omit.dedup();
-        let body = self.extra_body.as_deref().map(body).transpose()?;
+        let body = self.extra_body.as_deref().map(parse_body).transpose()?;
         Ok(ExtraFields {
             deployment: None,
             reply_headers: BTreeMap::new(),
@@ -141,58 +141,67 @@ impl RequestArgs {
     }
 }
 
-/// Reads the fields of a body: JSON, or `@` with a file that holds it.
-fn body(value: &str) -> Result<Map<String, Value>> {
-    let wrong = |problem: String| Error::usage("--extra-body", problem);
-    let read = value
+/// Parses the value of `--extra-body`: JSON, or `@` and the path of a JSON file.
+fn parse_body(value: &str) -> Result<Map<String, Value>> {
+    let invalid = |problem: String| Error::usage("--extra-body", problem);
+    let file = value
         .strip_prefix('@')
-        .map(|path| reading::settings(Path::new(path)));
-    let read = read.transpose()?;
-    let json = read.as_deref().unwrap_or(value);
-    // The words of the error of serde_json name a line and column and none of the values.
+        .map(|path| reading::settings(Path::new(path)))
+        .transpose()?;
+    let json = file.as_deref().unwrap_or(value);
+    // Errors of serde_json have a line and a column but no values, so they cannot show a secret.
     let parsed = serde_json::from_str(json).map_err(|e| {
         let expected = "a JSON object expected, as {\"top_k\": 1}, or @FILE with one";
-        wrong(format!("{expected}: {e}"))
+        invalid(format!("{expected}: {e}"))
     })?;
     let Value::Object(fields) = parsed else {
-        return Err(wrong(
+        return Err(invalid(
             "a JSON object expected, as {\"top_k\": 1}".to_owned(),
         ));
     };
-    let mut owned = OWNED.iter();
-    if let Some((field, by)) = owned.find(|(field, _)| fields.contains_key(*field)) {
-        return Err(wrong(format!("{field} is set by the program: use {by}")));
+    let owned = PROGRAM_FIELDS
+        .iter()
+        .find(|(field, _)| fields.contains_key(*field));
+    if let Some((field, setter)) = owned {
+        return Err(invalid(format!(
+            "{field} is set by the program: use {setter}"
+        )));
     }
     refuse_secrets(&fields)?;
     Ok(fields)
 }
 
 impl ExtraFields {
-    /// Whether the user adds a field at the top of the body.
+    /// True if the user adds this top-level field.
     pub(in crate::ask) fn adds(&self, field: &str) -> bool {
         self.body.contains_key(field)
     }
 
-    /// Whether the user adds a field of an object at the top of the body.
+    /// True if the user adds this field to a top-level object.
     pub(in crate::ask) fn adds_below(&self, object: &str, field: &str) -> bool {
         let object = self.body.get(object).and_then(Value::as_object);
         object.is_some_and(|object| object.contains_key(field))
     }
 
-    /// Whether a field that carries the token limit is left out or removed.
+    /// True if a field that limits the tokens of a reply is omitted.
     pub(in crate::ask) fn omits_token_limit(&self) -> bool {
         self.omit
             .iter()
             .any(|field| TOKEN_LIMITS.contains(&&**field))
     }
 
-    /// The limit of thinking tokens that the user's fields state, at any depth; `None` if they state none.
+    /// Limit of thinking tokens in the added fields, at any depth; `None` without one.
     pub(in crate::ask) fn thinking_budget(&self) -> Option<ThinkingBudget> {
-        thinking_budget(&self.body)
+        find_thinking_budget(&self.body)
     }
 
-    /// A body, given as JSON without its messages, with the user's fields: the body is merged by JSON merge patch (RFC 7396), then
-    /// the omitted fields are removed. Unchanged to the byte if the user sets nothing; else keys are sorted.
+    /// Applies the user's fields to a request body, given as JSON without its messages.
+    ///
+    /// The added fields are merged as a JSON merge patch (RFC 7396), then the omitted fields are removed. With neither, the JSON is
+    /// returned byte for byte; otherwise its keys are sorted.
+    ///
+    /// # Errors
+    /// If the body is not a JSON object.
     pub(in crate::ask) fn apply(&self, json: String) -> Result<String, serde_json::Error> {
         if self.body.is_empty() && self.omit.is_empty() {
             return Ok(json);
@@ -206,18 +215,18 @@ impl ExtraFields {
     }
 }
 
-/// The limit of the tokens that a model may think.
+/// Limit on the tokens that a model may spend on thinking.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::ask) enum ThinkingBudget {
     Tokens(u64),
-    /// As many as the model likes: a negative number, by Google's convention.
+    /// No limit: a negative number, by Google's convention.
     Unlimited,
 }
 
-/// The budget in the first field for it.
-fn thinking_budget(fields: &Map<String, Value>) -> Option<ThinkingBudget> {
+/// Finds the first thinking budget, depth first.
+fn find_thinking_budget(fields: &Map<String, Value>) -> Option<ThinkingBudget> {
     fields.iter().find_map(|(name, value)| match value {
-        Value::Object(inner) => thinking_budget(inner),
+        Value::Object(inner) => find_thinking_budget(inner),
         Value::Number(tokens) if THINKING_BUDGETS.contains(&&**name) => {
             let budget = tokens.as_u64().map(ThinkingBudget::Tokens);
             Some(budget.unwrap_or(ThinkingBudget::Unlimited))
@@ -259,9 +268,9 @@ mod tests {
         value.as_object().unwrap().clone()
     }
 
-    /// The examples of RFC 7396, appendix A, that are objects.
+    /// Object examples of RFC 7396, appendix A.
     #[test]
-    fn fields_are_merged_as_a_merge_patch() {
+    fn merge_follows_rfc_7396() {
         for (original, patch, result) in [
             (json!({"a": "b"}), json!({"a": "c"}), json!({"a": "c"})),
             (
@@ -304,47 +313,55 @@ mod tests {
         }
     }
 
-    fn resolve(args: &RequestArgs) -> Result<ExtraFields> {
-        args.resolve()
-    }
-
     #[test]
-    fn fields_of_the_program_are_refused_with_what_sets_them() {
-        for (field, by) in OWNED {
+    fn program_fields_are_refused() {
+        for (field, setter) in PROGRAM_FIELDS {
             let extra_body = Some(json!({field: 1}).to_string());
             let args = RequestArgs {
                 extra_body,
                 ..RequestArgs::default()
             };
-            let error = resolve(&args).unwrap_err().to_string();
+            let error = args.resolve().unwrap_err().to_string();
             assert!(
-                error.starts_with("--extra-body: ") && error.contains(by),
+                error.starts_with("--extra-body: ") && error.contains(setter),
                 "{error}"
             );
         }
+    }
+
+    #[test]
+    fn invalid_extra_body_is_refused() {
         for wrong in ["", "{", "[1]", "3", "@/nowhere/at/all.json"] {
             let args = RequestArgs {
                 extra_body: Some(wrong.into()),
                 ..RequestArgs::default()
             };
-            assert!(resolve(&args).is_err(), "{wrong}");
+            assert!(args.resolve().is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn required_fields_cannot_be_omitted() {
         for wrong in ["model", "messages", " "] {
             let args = RequestArgs {
                 omit_field: vec![wrong.into()],
                 ..RequestArgs::default()
             };
-            assert!(resolve(&args).is_err(), "{wrong}");
+            assert!(args.resolve().is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn blank_system_message_is_refused() {
         let args = RequestArgs {
             system: Some("  ".into()),
             ..RequestArgs::default()
         };
-        assert!(resolve(&args).is_err());
+        assert!(args.resolve().is_err());
     }
 
     #[test]
-    fn thinking_budgets_are_found_at_any_depth() {
+    fn thinking_budget_is_found_when_nested() {
         let budget = |body: &Value| {
             let fields = ExtraFields {
                 body: object(body),
@@ -354,13 +371,13 @@ mod tests {
         };
         let google = json!({"google": {"thinking_config": {"thinking_budget": -1}}});
         assert_eq!(budget(&google), Some(ThinkingBudget::Unlimited));
-        let own = json!({"enable_thinking": true, "thinking_budget": 2048});
-        assert_eq!(budget(&own), Some(ThinkingBudget::Tokens(2048)));
+        let dashscope = json!({"enable_thinking": true, "thinking_budget": 2048});
+        assert_eq!(budget(&dashscope), Some(ThinkingBudget::Tokens(2048)));
         assert_eq!(budget(&json!({"top_k": -1})), None);
     }
 
     #[test]
-    fn only_what_is_set_is_written() {
+    fn unset_fields_are_not_serialised() {
         assert_eq!(json!(ExtraFields::default()), json!({}));
         let args = RequestArgs {
             extra_body: Some(r#"{"b": {"y": 1, "x": null}, "a": 2}"#.into()),
@@ -368,7 +385,7 @@ mod tests {
             system: Some(" Look.\n".into()),
             ..RequestArgs::default()
         };
-        let fields = resolve(&args).unwrap();
+        let fields = args.resolve().unwrap();
         let expected = json!({
             "system": "Look.", "extra_body": r#"{"a":2,"b":{"x":null,"y":1}}"#, "omit_field": ["temperature", "z"],
         });
@@ -376,9 +393,14 @@ mod tests {
     }
 
     #[test]
-    fn a_body_without_extra_fields_is_unchanged_and_omitting_comes_last() {
+    fn body_without_extra_fields_is_unchanged() {
         let body = r#"{"model":"m","temperature":0.0}"#.to_owned();
         assert_eq!(ExtraFields::default().apply(body.clone()).unwrap(), body);
+    }
+
+    #[test]
+    fn fields_are_omitted_after_merging() {
+        let body = r#"{"model":"m","temperature":0.0}"#.to_owned();
         let fields = ExtraFields {
             body: object(&json!({"top_k": 1, "cached": {"a": 1}})),
             omit: vec!["temperature".into(), "cached".into()],

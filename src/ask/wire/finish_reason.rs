@@ -1,4 +1,4 @@
-//! The reason why a model stopped, from a server's word: [`read`], by `finish_reasons.toml`.
+//! Parsing of the finish reason that a server sends: [`read`], with the known reasons in `finish_reasons.toml`.
 
 use std::sync::LazyLock;
 
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::ask::failures::Unreadable;
 use crate::types::{Finish, Usage};
 
-/// The words of servers, by their meaning.
+/// Finish reasons of servers, grouped by meaning; in lower case, with underscores.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Reasons {
@@ -19,24 +19,30 @@ struct Reasons {
     broken: Vec<String>,
 }
 
+/// The known reasons; a test parses the file.
 static REASONS: LazyLock<Reasons> =
     LazyLock::new(|| toml::from_str(include_str!("finish_reasons.toml")).unwrap_or_default());
 
-/// The reason in a server's word; none is [`Finish::Unknown`].
+/// Parses a server's finish reason; an empty one is [`Finish::Unknown`].
 ///
 /// # Errors
-/// If the word states that the generation did not come to its end, or if it is not known. `usage` is what it was charged.
+/// If the reason means that the reply is incomplete, or if the reason is unknown. The error includes `usage`, the tokens charged.
 pub(super) fn read(word: &str, usage: Option<Usage>) -> Result<Finish, Unreadable> {
     let name = word.trim().to_ascii_lowercase().replace('-', "_");
     let reasons = &*REASONS;
     let is_in = |list: &[String]| list.contains(&name);
-    match () {
-        () if name.is_empty() => Ok(Finish::Unknown),
-        () if is_in(&reasons.stop) => Ok(Finish::Stop),
-        () if is_in(&reasons.other) => Ok(Finish::Other(word.to_owned())),
-        () if is_in(&reasons.length) => Ok(Finish::Length),
-        () if is_in(&reasons.filter) => Ok(Finish::Filter),
-        () if is_in(&reasons.context) => Err(Unreadable {
+    if name.is_empty() {
+        Ok(Finish::Unknown)
+    } else if is_in(&reasons.stop) {
+        Ok(Finish::Stop)
+    } else if is_in(&reasons.other) {
+        Ok(Finish::Other(word.to_owned()))
+    } else if is_in(&reasons.length) {
+        Ok(Finish::Length)
+    } else if is_in(&reasons.filter) {
+        Ok(Finish::Filter)
+    } else if is_in(&reasons.context) {
+        Err(Unreadable {
             usage,
             is_final: true,
             finish: Some(word.to_owned()),
@@ -44,21 +50,23 @@ pub(super) fn read(word: &str, usage: Option<Usage>) -> Result<Finish, Unreadabl
                 "a reply that ended at the model's context length: its finish_reason is {word:?} (send smaller images: --image max-side=N, or a \
                  smaller --max-tokens)"
             ))
-        }),
-        () if is_in(&reasons.broken) => Err(Unreadable {
+        })
+    } else if is_in(&reasons.broken) {
+        Err(Unreadable {
             usage,
             finish: Some(word.to_owned()),
             ..Unreadable::new(format!(
                 "a reply that broke off: its finish_reason is {word:?}"
             ))
-        }),
-        () => Err(Unreadable {
+        })
+    } else {
+        Err(Unreadable {
             usage,
             finish: Some(word.to_owned()),
             ..Unreadable::new(format!(
                 "a reply whose finish_reason {word:?} is not known, so that it may have broken off"
             ))
-        }),
+        })
     }
 }
 
@@ -67,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_of_servers_have_one_meaning_each() {
+    fn each_reason_is_listed_once() {
         let Reasons {
             stop,
             other,
@@ -85,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_generation_that_was_given_up_is_no_reply() {
+    fn interrupted_generation_is_an_error() {
         for word in [
             "abort",
             "Cancelled",
@@ -99,13 +107,25 @@ mod tests {
                 "{word}"
             );
         }
+    }
+
+    #[test]
+    fn full_context_is_a_final_error() {
         assert!(
             read("model_context_window_exceeded", None)
                 .unwrap_err()
                 .is_final
         );
+    }
+
+    #[test]
+    fn unknown_reason_is_an_error() {
         let unknown = read("zeitgeist", None).unwrap_err();
         assert!(unknown.what.contains("\"zeitgeist\" is not known"));
+    }
+
+    #[test]
+    fn known_reasons_are_parsed_in_any_case() {
         assert_eq!(read("END_TURN", None), Ok(Finish::Stop));
         assert_eq!(
             read("tool_use", None),

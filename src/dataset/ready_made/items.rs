@@ -1,6 +1,6 @@
-//! The rows of a set as questions without their truth: [`items`].
+//! Conversion of a data set's rows to questions, without their correct answers: [`items`].
 
-use super::cells::{Row, Table, Turns};
+use super::cells::{Cell, Row, Table, Turns, list};
 use super::choices::{AllOffered, Lettered, Offered, Options, in_question};
 use super::columns::map::flag;
 use super::columns::names::{Role, without_endings};
@@ -12,22 +12,24 @@ use crate::types::text::excerpt;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The maximum length of a question or an option, in bytes.
-const LONGEST_TEXT: usize = 16 << 10;
+/// Maximum length of a question or an option, in bytes.
+const MAX_TEXT_BYTES: usize = 16 << 10;
 
-/// A row as a question. Its truth is not known yet.
+/// The question of a row. Its correct answer is not known yet.
 #[derive(Debug)]
 pub(super) struct Item {
+    /// Index of the row in the table.
     pub(super) row: usize,
+    /// The question without its options.
     pub(super) text: String,
-    /// The text with the options in it, if they were found there.
+    /// The question with its options, if they were found in its text.
     pub(super) whole: Option<String>,
-    /// The options; `None` if neither columns nor the question hold any.
+    /// The options; `None` if neither a column nor the question has options.
     pub(super) options: Option<Arc<Offered>>,
 }
 
 impl Item {
-    /// The question as it stands, without the options that were found in it.
+    /// The item as an open question. Options that were found in the question stay in its text.
     pub(super) fn without_options(self) -> Self {
         let text = self.whole.unwrap_or(self.text);
         Self {
@@ -39,161 +41,175 @@ impl Item {
     }
 }
 
-/// How often each instruction was cut from questions.
+/// Number of times that each instruction was cut from a question.
 pub(super) type Cut = BTreeMap<String, usize>;
 
-/// The instructions at the end of questions, with how often each was cut; `None` if they stay.
-struct Endings<'a>(Option<&'a mut Cut>);
+/// Cuts instructions from the end of questions and counts them; `None` keeps the instructions.
+struct InstructionCutter<'a>(Option<&'a mut Cut>);
 
-impl Endings<'_> {
+impl InstructionCutter<'_> {
     /// The text without the instructions at its end.
     fn cut(&mut self, text: &str) -> String {
-        let Some(cut) = &mut self.0 else {
+        let Some(counts) = &mut self.0 else {
             return text.to_owned();
         };
-        let (rest, endings) = without_endings(text);
-        for ending in endings {
-            *cut.entry(ending).or_default() += 1;
+        let (rest, instructions) = without_endings(text);
+        for instruction in instructions {
+            *counts.entry(instruction).or_default() += 1;
         }
         rest.to_owned()
     }
 }
 
-/// The rows as questions. Rows that cannot be asked are counted.
+/// Converts the rows to questions. Counts rows without a usable question in `left_out` and the instructions cut in `cut`.
 ///
 /// # Errors
-/// If two columns of options differ; the error shows the row and the two commands.
+/// If two columns have different options. The message contains the row and the two flags to choose from.
 pub(super) fn items(
     table: &Table,
     roles: &Roles,
     kind: ImagesAre,
     args: &SetArgs,
-    left: &mut LeftOut,
+    left_out: &mut LeftOut,
     cut: &mut Cut,
 ) -> Result<Vec<Item>, String> {
-    let mut endings = Endings((!args.keep_instructions).then_some(cut));
+    let mut cutter = InstructionCutter((!args.keep_instructions).then_some(cut));
     let (mut items, mut offered) = (Vec::new(), AllOffered::default());
-    for (at, row) in table.rows.iter().enumerate() {
-        let count = kind.in_row(row, roles).len();
-        let why = match (count, args.multi_image) {
+    for (index, row) in table.rows.iter().enumerate() {
+        let image_count = kind.in_row(row, roles).len();
+        let why = match (image_count, args.multi_image) {
             (0, _) => Some(Why::NoImage),
             (1, _) | (_, Some(SeveralImages::Send)) => None,
             (_, Some(SeveralImages::Skip) | None) => Some(Why::SeveralImages),
         };
         if let Some(why) = why {
-            left.add(why, || format!("{count} images"));
+            left_out.add(why, || format!("{image_count} images"));
             continue;
         }
-        match parts(row, roles, ImageMarks::new(count), &mut endings) {
-            Ok(Parts {
+        match question_parts(row, roles, ImageMarks::new(image_count), &mut cutter) {
+            Ok(QuestionParts {
                 text,
                 whole,
                 options,
             }) => items.push(Item {
-                row: at,
+                row: index,
                 text,
                 whole,
                 options: options.map(|options| offered.once(options)),
             }),
-            Err(NoParts::BadRow(problem)) => {
-                left.add(Why::Bad, || format!("{}: {problem}", table.place(at)));
+            Err(PartsError::Row(problem)) => {
+                left_out.add(Why::Bad, || format!("{}: {problem}", table.place(index)));
             }
-            Err(NoParts::BadSet(problem)) => return Err(format!("{}: {problem}", table.place(at))),
+            Err(PartsError::Set(problem)) => {
+                return Err(format!("{}: {problem}", table.place(index)));
+            }
         }
     }
     Ok(items)
 }
 
-/// The text and the options of a row.
-struct Parts {
+/// The question and the options of a row, as in [`Item`].
+struct QuestionParts {
     text: String,
     whole: Option<String>,
     options: Option<Offered>,
 }
 
-/// Why a row has no [`Parts`].
-enum NoParts {
-    /// The row is bad, in words.
-    BadRow(String),
-    /// The set cannot be read, in words.
-    BadSet(String),
+/// Error message for a row without [`QuestionParts`].
+enum PartsError {
+    /// The row has no usable question; other rows may have one.
+    Row(String),
+    /// The whole set cannot be read.
+    Set(String),
 }
 
-/// A bad row.
-fn bad(problem: impl Into<String>) -> NoParts {
-    NoParts::BadRow(problem.into())
-}
-
-/// The parts of a row.
-fn parts(
+/// Reads the question and the options of a row.
+fn question_parts(
     row: &Row,
     roles: &Roles,
     mut marks: ImageMarks,
-    endings: &mut Endings<'_>,
-) -> Result<Parts, NoParts> {
-    let [hint, text] = words(row, roles, &mut marks).map_err(NoParts::BadRow)?;
+    cutter: &mut InstructionCutter<'_>,
+) -> Result<QuestionParts, PartsError> {
+    let [hint, text] = hint_and_question(row, roles, &mut marks).map_err(PartsError::Row)?;
     let (text, whole, options) = match Options::from_row(row, roles) {
         Options::Found(mut options) => {
-            let texts = options.texts.iter().map(|option| marks.read_option(option));
-            options.texts = texts.collect::<Result<_, _>>().map_err(NoParts::BadRow)?;
-            (endings.cut(&text), None, Some(options))
+            options.texts = options
+                .texts
+                .iter()
+                .map(|option| marks.read_option(option))
+                .collect::<Result<_, _>>()
+                .map_err(PartsError::Row)?;
+            (cutter.cut(&text), None, Some(options))
         }
-        Options::None if roles.in_question == InQuestion::None => (endings.cut(&text), None, None),
+        Options::None if roles.in_question == InQuestion::None => (cutter.cut(&text), None, None),
         Options::None => {
-            let text = endings.cut(&text);
+            let text = cutter.cut(&text);
             match in_question(&text) {
                 Lettered::Found { question, options } => {
                     let options = Offered::lettered(&options);
-                    (endings.cut(&question), Some(text), Some(options))
+                    (cutter.cut(&question), Some(text), Some(options))
                 }
                 Lettered::None => (text, None, None),
-                Lettered::Unclear(problem) => return Err(NoParts::BadRow(problem)),
+                Lettered::Unclear(problem) => return Err(PartsError::Row(problem)),
             }
         }
         Options::Differ([one, other]) => {
-            return Err(NoParts::BadSet(format!(
+            return Err(PartsError::Set(format!(
                 "the options of {one:?} and {other:?} differ; {} or {} says which are meant",
                 flag(Role::Options, &one, None),
                 flag(Role::Options, &other, None)
             )));
         }
-        Options::Unread(problem) => return Err(NoParts::BadRow(problem)),
+        Options::Unread(problem) => return Err(PartsError::Row(problem)),
     };
     if text.is_empty() {
-        return Err(bad("nothing but options in the question"));
+        let problem = "nothing but options in the question";
+        return Err(PartsError::Row(problem.to_owned()));
     }
-    let below = |text: String| match &*hint {
+    let with_hint = |text: String| match &*hint {
         "" => text,
         hint => format!("{hint}\n{text}"),
     };
-    let (text, whole) = (below(text), whole.map(below));
-    let texts = options.iter().flat_map(|options| &*options.texts);
-    if texts.chain([&text]).any(|text| text.len() > LONGEST_TEXT) {
-        return Err(bad(format!(
+    let (text, whole) = (with_hint(text), whole.map(with_hint));
+    let is_too_long = options
+        .iter()
+        .flat_map(|options| &*options.texts)
+        .chain([&text])
+        .any(|text| text.len() > MAX_TEXT_BYTES);
+    if is_too_long {
+        return Err(PartsError::Row(format!(
             "a text of more than {} KB",
-            LONGEST_TEXT >> 10
+            MAX_TEXT_BYTES >> 10
         )));
     }
-    Ok(Parts {
+    Ok(QuestionParts {
         text,
         whole,
         options,
     })
 }
 
-/// The hint of a row, empty if it has none, and its question.
-fn words(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2], String> {
+/// The hint of a row (empty if it has none) and its question, in this order.
+///
+/// # Errors
+/// If the row has no question, the question is too long, or its image marks cannot be read.
+fn hint_and_question(
+    row: &Row,
+    roles: &Roles,
+    marks: &mut ImageMarks,
+) -> Result<[String; 2], String> {
     let text = match &roles.question {
         Asked::InImage => Asked::IN_IMAGE.to_owned(),
         Asked::Column(column) => {
-            // A list or struct in a text of JSON, as tables hold conversations, is no question either.
-            let text = column.text(row);
-            let text = text.filter(|_| column.cell(row).parsed().is_none());
-            text.ok_or_else(|| no_text(column, row))?
+            // A text with a JSON list or object, such as a conversation, is not a question.
+            column
+                .text(row)
+                .filter(|_| column.cell(row).parsed().is_none())
+                .ok_or_else(|| no_question_text(column, row))?
         }
     };
-    if text.len() > LONGEST_TEXT {
-        let longest = LONGEST_TEXT >> 10;
+    if text.len() > MAX_TEXT_BYTES {
+        let longest = MAX_TEXT_BYTES >> 10;
         return Err(format!("a question of more than {longest} KB"));
     }
     let hint = roles.hint.as_ref().and_then(|hint| hint.text(row));
@@ -201,40 +217,42 @@ fn words(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2]
     Ok([hint, marks.read(&text)?])
 }
 
-/// The problem of a cell of a question that holds no text.
-fn no_text(column: &Column, row: &Row) -> String {
+/// Error message for a cell without the text of a question.
+fn no_question_text(column: &Column, row: &Row) -> String {
     let (cell, name) = (column.cell(row), excerpt(&column.name, 60));
     if cell.is_absent() {
         return format!("the question is empty (column {name:?})");
     }
-    let inner = Turns::from_cell(&column.name, cell).map_or_else(String::new, |turns| {
-        format!(
-            "; {} reads its text",
-            flag(Role::Question, &turns.question, None)
-        )
-    });
+    let conversation_hint =
+        Turns::from_cell(&column.name, cell).map_or_else(String::new, |turns| {
+            format!(
+                "; {} reads its text",
+                flag(Role::Question, &turns.question, None)
+            )
+        });
     let kind = cell.parsed().map_or(cell.kind(), |parsed| parsed.kind());
     format!(
-        "the column {name:?} of the question holds a {kind}, not a text: {}{inner}",
+        "the column {name:?} of the question holds a {kind}, not a text: {}{conversation_hint}",
         cell.shown(60)
     )
 }
 
-/// The answer in a column of a row, as text; a list of one is that one.
+/// The answer in a cell, as text. A list with one item is that item.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum AnswerCell {
+    /// The cell has no text, is an empty list, or is `nan`.
     Absent,
     One(String),
+    /// A list with several items: an excerpt of the cell.
     Several(String),
 }
 
 impl AnswerCell {
     pub(super) fn from_row(row: &Row, column: &Column) -> Self {
-        use super::cells::Cell;
         let cell = column.cell(row);
         let items = match cell {
             Cell::List(cells) => cells.iter().map(Cell::text).collect(),
-            Cell::Text(text) => super::cells::list(text),
+            Cell::Text(text) => list(text),
             _ => None,
         };
         match (items.as_deref(), cell.text()) {

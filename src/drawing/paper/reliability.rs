@@ -1,4 +1,4 @@
-//! A reliability diagram at the width of a column: [`reliability`].
+//! Reliability diagrams for a paper, as wide as a column of text: [`reliability`].
 
 use super::axes::shares;
 use super::font::Font;
@@ -9,18 +9,18 @@ use super::title::Title;
 use crate::drawing::chart::INK;
 use crate::drawing::chart::reliability::{ReliabilityChart, ReliabilityPanel};
 
-/// Least width of a panel, in heights of letters.
-const LEAST: f64 = 14.0;
-/// Most panels in a row.
-const COLUMNS: usize = 3;
+/// Minimum width of a panel with its labels, in letter heights.
+const MIN_PANEL_WIDTH: f64 = 14.0;
+/// Maximum number of panels in a row.
+const MAX_COLUMNS: usize = 3;
 
-/// The chart as a sheet of square panels.
+/// Draws a reliability chart as rows of square panels, with the legend below them.
 pub(super) fn reliability(chart: &ReliabilityChart, look: &Look) -> Sheet {
-    let room = (look.width / (LEAST * look.letters)) as usize;
-    let columns = COLUMNS.min(room).min(chart.panels.len()).max(1);
+    let fitting = (look.width / (MIN_PANEL_WIDTH * look.letters)) as usize;
+    let columns = MAX_COLUMNS.min(fitting).min(chart.panels.len()).max(1);
     let left = Font::bundled().width("100", look.small()) + 1.9 * look.letters;
-    let step = look.width / columns as f64;
-    let side = (step - left - 0.6 * look.letters).min(22.0 * look.letters);
+    let column_width = look.width / columns as f64;
+    let side = (column_width - left - 0.6 * look.letters).min(22.0 * look.letters);
     let mut sheet = Sheet::default();
     let mut top = 0.0;
     for row in chart.panels.chunks(columns) {
@@ -30,9 +30,9 @@ pub(super) fn reliability(chart: &ReliabilityChart, look: &Look) -> Sheet {
             .collect();
         top += Title::highest(&titles, look) + 0.65 * look.letters;
         for (index, (panel, title)) in row.iter().zip(&titles).enumerate() {
-            let corner = [index as f64 * step + left, top];
+            let corner = [index as f64 * column_width + left, top];
             title.draw(&mut sheet, look, [corner[0], top - 0.6 * look.letters]);
-            draw(&mut sheet, look, panel, Square { corner, side });
+            draw_panel(&mut sheet, look, panel, Square { corner, side });
         }
         top += side + 1.5 * look.small() + 2.0 * look.letters;
     }
@@ -42,7 +42,7 @@ pub(super) fn reliability(chart: &ReliabilityChart, look: &Look) -> Sheet {
     sheet
 }
 
-/// The square between the axes of a panel: both go from 0 to 1.
+/// Plotting area of a panel: confidence to the right, accuracy upwards, both from 0 to 1.
 #[derive(Debug, Clone, Copy)]
 struct Square {
     corner: Place,
@@ -50,15 +50,19 @@ struct Square {
 }
 
 impl Square {
+    /// Position of a point on the sheet. Values outside 0 to 1 are clamped.
     fn place(self, confidence: f64, accuracy: f64) -> Place {
         let [left, top] = self.corner;
-        let part = |share: f64| self.side * share.clamp(0.0, 1.0);
-        [left + part(confidence), top + self.side - part(accuracy)]
+        let length = |share: f64| self.side * share.clamp(0.0, 1.0);
+        [
+            left + length(confidence),
+            top + self.side - length(accuracy),
+        ]
     }
 }
 
-fn draw(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: Square) {
-    axes(sheet, look, square);
+fn draw_panel(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: Square) {
+    draw_axes(sheet, look, square);
     sheet.line(
         &[square.place(0.0, 0.0), square.place(1.0, 1.0)],
         &look.dots(),
@@ -66,8 +70,9 @@ fn draw(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: Square
     for line in &panel.lines {
         let pen = look.pen(line.style);
         for (confidence, accuracy) in &line.bins {
-            let ends = [accuracy.low, accuracy.high].map(|share| square.place(*confidence, share));
-            sheet.line(&ends, &look.thin(pen.stroke.colour));
+            let interval =
+                [accuracy.low, accuracy.high].map(|share| square.place(*confidence, share));
+            sheet.line(&interval, &look.thin(pen.stroke.colour));
         }
         let places: Vec<Place> = line
             .bins
@@ -81,35 +86,35 @@ fn draw(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: Square
     }
 }
 
-fn axes(sheet: &mut Sheet, look: &Look, square: Square) {
+fn draw_axes(sheet: &mut Sheet, look: &Look, square: Square) {
     let small = look.small();
-    let ends = [square.place(0.0, 0.0), square.place(1.0, 0.0)];
-    shares(sheet, look, ends.map(|[x, _]| x), |share| {
+    let x_axis = [square.place(0.0, 0.0), square.place(1.0, 0.0)];
+    shares(sheet, look, x_axis.map(|[x, _]| x), |share| {
         square.place(0.0, share)[1]
     });
-    for step in 0..=5 {
-        let [x, bottom] = square.place(f64::from(step) / 5.0, 0.0);
+    for tick in 0..=5 {
+        let [x, bottom] = square.place(f64::from(tick) / 5.0, 0.0);
         sheet.line(&[[x, bottom], [x, bottom + 0.25 * small]], &look.thin(INK));
         let place = [x, bottom + 1.15 * small];
-        sheet.words(&(step * 20).to_string(), place, small, Anchor::Middle);
+        sheet.words(&(tick * 20).to_string(), place, small, Anchor::Middle);
     }
-    sheet.line(&ends, &look.thin(INK));
+    sheet.line(&x_axis, &look.thin(INK));
     let [middle, bottom] = square.place(0.5, 0.0);
-    let below = [middle, bottom + 1.3 * small + 0.95 * look.letters];
-    sheet.words("confidence in %", below, look.letters, Anchor::Middle);
+    let x_label = [middle, bottom + 1.3 * small + 0.95 * look.letters];
+    sheet.words("confidence in %", x_label, look.letters, Anchor::Middle);
     let [left, middle] = square.place(0.0, 0.5);
     let numbers = Font::bundled().width("100", small) + 0.9 * look.letters;
-    let beside = [left - numbers, middle];
+    let y_label = [left - numbers, middle];
     sheet.turned_words(
         "accuracy in %",
-        beside,
+        y_label,
         look.letters,
         Anchor::Middle,
         Turn::Up,
     );
 }
 
-/// An entry for each name of a line.
+/// Legend of the line names in all panels.
 fn legend<'a>(chart: &'a ReliabilityChart, look: &Look) -> Legend<'a> {
     let entries = chart
         .panels
@@ -133,7 +138,7 @@ mod tests {
     use darkqa_score::estimate::Estimate;
 
     #[test]
-    fn a_bin_lies_where_the_axes_say_and_its_interval_stands_beside() {
+    fn curves_and_intervals_share_one_scale() {
         let share = |value: f64| Estimate {
             value,
             low: value - 0.2,
@@ -147,11 +152,12 @@ mod tests {
                 name: name.to_owned(),
                 style: LineStyle(style),
                 bins: vec![(0.25, share(0.5)), (0.75, share(0.6)), (1.0, share(0.8))],
-            });
+            })
+            .collect();
         let chart = ReliabilityChart {
             panels: vec![ReliabilityPanel {
                 title: "a model".to_owned(),
-                lines: lines.collect(),
+                lines,
             }],
             note: String::new(),
         };
@@ -161,7 +167,7 @@ mod tests {
             palette: Palette::Colour,
         };
         let sheet = reliability(&chart, &look);
-        let drawn: Vec<&Vec<Place>> = sheet
+        let curves: Vec<&Vec<Place>> = sheet
             .marks
             .iter()
             .filter_map(|mark| match mark {
@@ -169,14 +175,14 @@ mod tests {
                 _ => None,
             })
             .collect();
-        // One curve a level. Distances along both axes are as the numbers: the square has one scale.
-        assert_eq!(drawn.len(), 2);
-        let [first, second, last] = [drawn[0][0], drawn[0][1], drawn[0][2]];
+        // One curve per level. Both axes have the same scale in points per unit.
+        assert_eq!(curves.len(), 2);
+        let [first, second, last] = [curves[0][0], curves[0][1], curves[0][2]];
         let scale = (second[0] - first[0]) / 0.5;
         assert!(((last[0] - second[0]) / 0.25 - scale).abs() < 1e-9);
         assert!(((first[1] - second[1]) / 0.1 - scale).abs() < 1e-9);
         assert!(((second[1] - last[1]) / 0.2 - scale).abs() < 1e-9);
-        let bar = sheet.marks.iter().find_map(|mark| match mark {
+        let interval = sheet.marks.iter().find_map(|mark| match mark {
             Mark::Line { places, .. }
                 if places.len() == 2
                     && places
@@ -187,8 +193,8 @@ mod tests {
             }
             _ => None,
         });
-        let bar = bar.expect("a bin has a bar");
-        assert!(((bar[0][1] - bar[1][1]) / 0.3 - scale).abs() < 1e-9);
+        let interval = interval.expect("the first bin has an interval");
+        assert!(((interval[0][1] - interval[1][1]) / 0.3 - scale).abs() < 1e-9);
         for name in ["L0", "L5", "a model"] {
             let is_written = |mark: &Mark| matches!(mark, Mark::Words(words) if words.text == name);
             assert_eq!(

@@ -1,4 +1,4 @@
-//! The last steps of a part: its replies are taken over, or its requests are freed.
+//! Final steps of a part of a batch run: import its replies, or give up its requests.
 
 use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader};
@@ -15,23 +15,23 @@ use crate::types::{Failure, FailureKind, TrialKey};
 use darkqa_score::answers::record::Detail;
 
 impl<'a, D: Detail> Driver<'a, D> {
-    /// Reads the replies of a part into the records of the run. What has no line may be asked again.
+    /// Imports the replies of a part whose batch has ended. Requests without a line in the output fail as timeouts and may be retried.
     pub(super) fn take_over(&mut self, part: usize) -> Result<Step> {
         let Stage::Fetched { state } = self.part(part).stage.clone() else {
             return Ok(Step::Waiting);
         };
-        let (counts, unread) = self.read_lines(part, Some(&state))?;
+        let (counts, unparsed) = self.import_files(part, Some(&state))?;
         let (answered, failed) = (counts.answered, counts.failed);
-        self.say_what_is_missing(part, unread)?;
+        self.warn_if_incomplete(part, unparsed)?;
         self.say(part, &format!("{state}: {answered} answered, {failed} not"));
         self.journal
             .record(part, Event::TakenOver { answered, failed })?;
         Ok(Step::Moved)
     }
 
-    /// Imports the replies of files that are not complete; the other requests wait for them.
+    /// Imports the replies that incomplete files already contain. Requests without a line keep waiting.
     pub(super) fn import_lines(&mut self, part: usize) -> Result<()> {
-        let (counts, _) = self.read_lines(part, None)?;
+        let (counts, _) = self.import_files(part, None)?;
         let (answered, failed) = (counts.answered, counts.failed);
         if answered + failed > 0 {
             let line = format!("{answered} answered, {failed} not, as far as its files go");
@@ -40,19 +40,20 @@ impl<'a, D: Detail> Driver<'a, D> {
         Ok(())
     }
 
-    /// Reads the lines of a part's files into the records. `ended` is the state in which the batch has ended for good: what has no line
-    /// has failed then. Returns the number of lines that cannot be read, too.
-    fn read_lines(&mut self, part: usize, ended: Option<&str>) -> Result<(ReplyCounts, usize)> {
+    /// Imports the replies in a part's files. Returns the counts of replies and the number of lines that cannot be parsed.
+    ///
+    /// `ended` is the final state of the batch, if it has ended: requests without a line fail then.
+    fn import_files(&mut self, part: usize, ended: Option<&str>) -> Result<(ReplyCounts, usize)> {
         let (paths, keys) = (self.fetched(part), self.keys(part)?);
         let models = self.models_of(part);
         let mut refused = BTreeSet::new();
-        let (mut is_adapted, mut unread) = (false, 0);
+        let (mut is_adapted, mut unparsed) = (false, 0);
         let server = self.servers.server(&self.part(part).facts)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
         for path in paths.iter().filter(|path| path.exists()) {
             for_each_line(path, |line| {
                 let Some(line) = server.line(line) else {
-                    unread += 1;
+                    unparsed += 1;
                     return Ok(());
                 };
                 let refusal = line.refusal.clone();
@@ -72,19 +73,20 @@ impl<'a, D: Detail> Driver<'a, D> {
         }
         if let Some(state) = ended {
             for key in keys.iter().flatten() {
-                replies.fail(*key, without_line(state))?;
+                replies.fail(*key, missing_line_failure(state))?;
             }
         }
         let counts = replies.finish()?;
         self.notes.charged.take();
-        // After a change of the requests all of them may succeed.
+        // Once a model adapts its requests, refused requests may succeed: do not record any as refused.
         if !is_adapted {
             self.refused.append(&mut refused);
         }
-        Ok((counts, unread))
+        Ok((counts, unparsed))
     }
 
-    /// The models that a part asks: several if one is asked with images and without. A model that has another name now is known by its id.
+    /// Models that a part asks: several if a model is asked both with images and without. If no name matches, because the model was
+    /// renamed, models match by their id at the endpoint.
     fn models_of(&self, part: usize) -> Vec<&'a Model> {
         let facts = &self.part(part).facts;
         let all = || self.models.iter().map(|one| (&*one.name, &*one.model));
@@ -101,12 +103,13 @@ impl<'a, D: Detail> Driver<'a, D> {
             .collect()
     }
 
-    fn say_what_is_missing(&self, part: usize, unread: usize) -> Result<()> {
+    /// Warns of output lines that cannot be parsed, and of an input file that is missing.
+    fn warn_if_incomplete(&self, part: usize, unparsed: usize) -> Result<()> {
         let name = &self.part(part).name;
         let is_file_gone = self.keys(part)?.is_none();
-        if unread > 0 {
+        if unparsed > 0 {
             tracing::warn!(
-                "{name}: lines of its output that are not those of a Batch API: {unread}; their requests are asked again"
+                "{name}: lines of its output that are not those of a Batch API: {unparsed}; their requests are asked again"
             );
         }
         if is_file_gone {
@@ -118,7 +121,7 @@ impl<'a, D: Detail> Driver<'a, D> {
         Ok(())
     }
 
-    /// Ends a part without a batch, and frees its requests.
+    /// Gives up a part: every request fails as a timeout with the message `why`, so that it may be retried.
     pub(super) fn give_up(&mut self, part: usize, why: String) -> Result<()> {
         let keys = self.keys(part)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
@@ -134,7 +137,7 @@ impl<'a, D: Detail> Driver<'a, D> {
         self.journal.record(part, Event::GaveUp { why })
     }
 
-    /// Ends a part whose batch was not made, because the user cancels it.
+    /// Gives up a part that the user cancels before its batch is created. Deletes its files at the server, unless the user keeps files.
     pub(super) async fn withdraw(&mut self, part: usize) -> Result<Step> {
         if !self.args.collect.keep_files {
             for id in self.files_at_server(part).await? {
@@ -148,7 +151,7 @@ impl<'a, D: Detail> Driver<'a, D> {
         Ok(Step::Moved)
     }
 
-    /// The trials of a part, from its file; `None` if the file is gone.
+    /// Trial keys of a part, read from its input file; `None` if the file is missing.
     pub(super) fn keys(&self, part: usize) -> Result<Option<Vec<TrialKey>>> {
         let path = self.journal.file(part);
         if !path.exists() {
@@ -163,8 +166,8 @@ impl<'a, D: Detail> Driver<'a, D> {
     }
 }
 
-/// The failure of a request without a line in the output of its batch.
-fn without_line(state: &str) -> Failure {
+/// Failure of a request that has no line in the output of its batch.
+fn missing_line_failure(state: &str) -> Failure {
     Failure {
         kind: FailureKind::Timeout,
         status: None,
@@ -172,13 +175,13 @@ fn without_line(state: &str) -> Failure {
     }
 }
 
-/// The key in a line of an input file. It stands at the beginning, so that the rest of the line is not read.
+/// Parses the trial key of a line of an input file. `custom_id` is the first field, so the rest of the line is not parsed.
 pub(super) fn key_of(line: &str) -> Option<TrialKey> {
     let (id, _) = line.strip_prefix("{\"custom_id\":\"")?.split_once('"')?;
     id.parse().ok()
 }
 
-/// Calls `take` with each line of a file that is not empty. Bytes that are not UTF-8 are replaced.
+/// Calls `take` with each non-blank line of a file. Invalid UTF-8 is replaced.
 pub(super) fn for_each_line(path: &Path, mut take: impl FnMut(&str) -> Result<()>) -> Result<()> {
     let unreadable = |e| Error::file(path, "read", e);
     let mut file = BufReader::new(reading::open(path).map_err(unreadable)?);

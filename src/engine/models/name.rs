@@ -1,4 +1,4 @@
-//! A model as flags and files name it: [`ModelName`].
+//! Names of models in flags and in models files: [`ModelName`].
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -9,34 +9,34 @@ use crate::error::{Error, Result};
 use crate::types::Control;
 use crate::types::text::near_name::is_nearly;
 
-/// A model as flags and files name it.
+/// A model that a flag or a models file names.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum ModelName {
-    /// Built-in model that guesses.
+    /// Built-in model that guesses at random.
     Random,
-    /// Built-in model that answers what can still be read from the pixels by one who knows the frame; or one of its controls.
+    /// Built-in model that knows the frame and answers only what the degraded pixels still show; or one of its controls.
     Observer(Option<Control>),
     /// Built-in network that answers from the pixels of the image alone.
     RoomNet,
-    /// Built-in model that answers from this file.
+    /// Built-in model that reads its replies from this file.
     Script(PathBuf),
-    /// Model of this name at the endpoint.
+    /// Model with this name at the endpoint.
     Remote(String),
 }
 
-/// The words that begin the names of built-in models.
+/// First words of the names of built-in models.
 const BUILT_IN: [&str; 4] = ["random", "observer", room_net::NAME, "script"];
 
 impl ModelName {
-    /// Whether an experiment makes it: built-in models that can only choose.
+    /// True for the built-in models that answer multiple-choice questions only.
     pub(super) fn is_of_experiment(&self) -> bool {
         matches!(self, Self::Random | Self::Observer(_) | Self::RoomNet)
     }
 
-    /// Checks that the model can answer an open question.
+    /// Checks that the model can answer open questions.
     ///
     /// # Errors
-    /// If it can only choose.
+    /// If the model answers multiple-choice questions only.
     pub(crate) fn require_open_answers(&self) -> Result<()> {
         let name = match self {
             Self::Random => "random",
@@ -48,28 +48,31 @@ impl ModelName {
         Err(Error::usage("--model", problem))
     }
 
-    /// Refuses the name of a remote model that is almost that of a built-in one, or a list of names: it would be sent to an endpoint,
-    /// with images.
+    /// Refuses a misspelt name of a built-in model, and a comma-separated list of names. Without this check, the images would be sent
+    /// to an endpoint.
     ///
     /// # Errors
-    /// If it is, and the table of prices has no model of this name.
+    /// If a remote model's name contains a comma, or is close to a built-in name and not in the built-in price table.
     pub(crate) fn refuse_near_miss(&self) -> Result<()> {
         let Self::Remote(name) = self else {
             return Ok(());
         };
-        let several: Vec<&str> = name.split(',').map(str::trim).collect();
-        if several.len() > 1 {
-            let flags: Vec<String> = several.iter().map(|one| format!("--model {one}")).collect();
+        let listed: Vec<&str> = name.split(',').map(str::trim).collect();
+        if listed.len() > 1 {
+            let flags: Vec<String> = listed
+                .iter()
+                .map(|model| format!("--model {model}"))
+                .collect();
             let problem = format_args!(
                 "{name}: several models are several flags: {}. To ask an endpoint for a model of this name: --models FILE, or --base-url",
                 flags.join(" ")
             );
             return Err(Error::usage("--model", problem));
         }
-        let word = name.split(':').next().unwrap_or(name).to_lowercase();
+        let first_word = name.split(':').next().unwrap_or(name).to_lowercase();
         let mut near = BUILT_IN
             .into_iter()
-            .filter(|built_in| is_nearly(&word, built_in));
+            .filter(|built_in| is_nearly(&first_word, built_in));
         match near.next() {
             Some(built_in) if Prices::built_in()?.find(name).is_none() => {
                 let hint = if built_in == "script" {
@@ -86,7 +89,7 @@ impl ModelName {
         }
     }
 
-    /// A short name for tables and folders.
+    /// Name of the model in tables and folder names.
     pub(crate) fn label(&self) -> String {
         match self {
             Self::Random => "random".to_owned(),
@@ -101,8 +104,8 @@ impl ModelName {
     }
 }
 
-/// The most bytes of a model's name. Chosen: the longest paths of published models have half of it.
-const LONGEST: usize = 200;
+/// Maximum length of a remote model's name, in bytes (chosen): twice the longest path of a published model.
+const MAX_NAME_BYTES: usize = 200;
 
 impl FromStr for ModelName {
     type Err = String;
@@ -120,9 +123,11 @@ impl FromStr for ModelName {
             "script" => Err("script:FILE expected, a file of replies".to_owned()),
             name => match name.strip_prefix("script:") {
                 Some(path) => Ok(Self::Script(path.into())),
-                None if name.len() > LONGEST || name.contains(char::is_control) => Err(format!(
-                    "the name of a model has at most {LONGEST} bytes and no control characters"
-                )),
+                None if name.len() > MAX_NAME_BYTES || name.contains(char::is_control) => {
+                    Err(format!(
+                        "the name of a model has at most {MAX_NAME_BYTES} bytes and no control characters"
+                    ))
+                }
                 None => Ok(Self::Remote(name.to_owned())),
             },
         }
@@ -135,7 +140,7 @@ mod tests {
 
     #[test]
     fn near_misses_of_built_in_names_are_refused() {
-        let near = |name: &str| name.parse::<ModelName>().unwrap().refuse_near_miss();
+        let check = |name: &str| name.parse::<ModelName>().unwrap().refuse_near_miss();
         for wrong in [
             "rndom",
             "Random",
@@ -145,20 +150,20 @@ mod tests {
             "scrip:a.jsonl",
             "Script:x",
         ] {
-            let error = near(wrong).unwrap_err().to_string();
+            let error = check(wrong).unwrap_err().to_string();
             assert!(error.contains("did you mean"), "{wrong}: {error}");
         }
-        let error = near("random,gpt-4o").unwrap_err().to_string();
+        let error = check("random,gpt-4o").unwrap_err().to_string();
         assert!(error.contains("--model random --model gpt-4o"), "{error}");
         for name in [
             "random", "observer", "script:a", "gpt-4o", "qwen:7b", "rando-vl", "o3",
         ] {
-            assert!(near(name).is_ok(), "{name}");
+            assert!(check(name).is_ok(), "{name}");
         }
     }
 
     #[test]
-    fn names_are_short_and_can_be_shown() {
+    fn long_or_unprintable_names_are_refused() {
         for name in ["m".repeat(200), "org/Qwen3-VL-8B é".to_owned()] {
             assert_eq!(name.parse(), Ok(ModelName::Remote(name.clone())));
         }

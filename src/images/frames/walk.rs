@@ -1,4 +1,4 @@
-//! Walks through houses: their folder (`WalkFolder`), and the flags that decide which frames are shown and how ([`Walk`]).
+//! Recorded walks through houses (OpenEQA): the reader of their folder ([`WalkFolder`]) and the flags for their frames ([`Walk`]).
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -48,7 +48,7 @@ pub(crate) enum DegradedAt {
     Resized,
 }
 
-/// The frames that share one state of the camera.
+/// Group of frames that share one camera state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum CameraOf {
@@ -58,10 +58,10 @@ pub(crate) enum CameraOf {
     Frame,
 }
 
-/// Longest side that a frame is scaled to, in pixels; chosen.
+/// Largest side that `--image-size` accepts, in pixels (chosen).
 const MAX_SIDE: usize = 65_536;
 
-/// Reads `512` or `native`.
+/// Parses `--image-size`: the longer side in pixels, such as `512`, or `native`.
 fn longer_side(text: &str) -> Result<Scaling, String> {
     match (text, text.parse()) {
         ("native", _) => Ok(Scaling::Never),
@@ -70,7 +70,7 @@ fn longer_side(text: &str) -> Result<Scaling, String> {
     }
 }
 
-/// A folder of walks, each a folder of frames. The name of a frame is `WALK/FRAME`.
+/// Folder of walks, each a folder of frames. A frame has the id `WALK/FRAME`, without the extension.
 #[derive(Debug)]
 pub(crate) struct WalkFolder {
     folder: PathBuf,
@@ -83,7 +83,7 @@ impl Frames for WalkFolder {
         ImageFile::open(&path, self.rule).map(Picture::Encoded)
     }
 
-    /// Folders of walks do not state it.
+    /// Returns `None`: folders of walks have no focal length.
     fn focal(&self, _: &FrameId) -> Option<f64> {
         None
     }
@@ -97,8 +97,8 @@ impl WalkFolder {
         }
     }
 
-    /// The sources of these walks. Every frame that is shown is read once. So a missing or broken one is found before anything is paid
-    /// for, and its content enters the keys of its trials. A walk with such a frame cannot be shown; the others can.
+    /// Reads every sampled frame once and returns one source per walk. Missing or broken frames are found here, before any paid request,
+    /// and the trial keys include the content of the frames. A walk with such a frame gets a problem; other walks are unaffected.
     pub(crate) fn inspect(
         &self,
         names: &[String],
@@ -119,27 +119,31 @@ impl WalkFolder {
             .collect()
     }
 
-    /// The source of a walk, with the frames that are shown.
+    /// Reads the sampled frames of a walk.
     ///
     /// # Errors
-    /// If its folder is missing or has no frame, or one of the frames is broken.
+    /// If the folder of the walk is missing or has no frame, or if a sampled frame is broken.
     pub(crate) fn source(&self, name: &str, settings: &Walk) -> Result<Source> {
         let paths = walk(&self.folder, name)?;
-        let shown = sampled(paths.len(), settings.frames.get());
+        let sample = sampled(paths.len(), settings.frames.get());
+        // A frame that is sampled twice is read once: `order` refers to it by its position.
         let mut positions = BTreeMap::new();
-        for index in &shown {
+        for index in &sample {
             let next = positions.len();
             positions.entry(*index).or_insert(next);
         }
-        let frames = positions.keys().map(|index| {
-            let stem = paths[*index].file_stem().unwrap_or_default();
-            let id = FrameId(format!("{name}/{}", stem.to_string_lossy()));
-            SourceFrame::inspect(self, &id)
-        });
+        let frames = positions
+            .keys()
+            .map(|index| {
+                let stem = paths[*index].file_stem().unwrap_or_default();
+                let id = FrameId(format!("{name}/{}", stem.to_string_lossy()));
+                SourceFrame::inspect(self, &id)
+            })
+            .collect::<Result<_>>()?;
         Ok(Source {
             name: FrameId(name.to_owned()),
-            frames: frames.collect::<Result<_>>()?,
-            order: shown.iter().map(|index| positions[index]).collect(),
+            frames,
+            order: sample.iter().map(|index| positions[index]).collect(),
             problem: None,
         })
     }

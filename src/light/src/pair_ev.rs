@@ -1,4 +1,4 @@
-//! How much darker a photograph is than another of the same scene: [`PairEv`].
+//! Exposure difference between two photographs of the same scene: [`PairEv`].
 
 use super::curve::GAMMA;
 use darkqa_ground::types::Rgb;
@@ -6,40 +6,45 @@ use darkqa_ground::types::Rgb;
 /// Weights of red, green and blue in the luminance of linear sRGB (ITU-R BT.709).
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// How much darker a photograph is than another of the same scene, in EV. The two need not be aligned, nor of one size.
+/// Exposure difference between two photographs of the same scene, in EV; positive if the second is darker. The photographs need not be
+/// aligned or of equal size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairEv {
-    /// log₂ of the ratio of the mean linear luminances.
+    /// log₂ of the ratio of the mean linear luminances, bright to dark.
     pub mean: f64,
-    /// Median over the pixels of log₂ of the ratio of their luminances, where neither is 0; of images of two sizes log₂ of the ratio
-    /// of their medians. `None` if that is not known.
+    /// Median of the per-pixel log₂ luminance ratios, without pixels that are black in either image. For images of different sizes, log₂
+    /// of the ratio of the median luminances. `None` if no ratio is defined.
     pub median: Option<f64>,
-    /// The drop with which [`expose`](super::expose) makes the bright image as dark: the mean, with light as the power 2.2 of codes.
+    /// Drop that makes the bright image as dark as the other one in [`expose`](super::expose): as `mean`, with light computed as
+    /// code^2.2.
     pub synthesis: f64,
 }
 
 impl PairEv {
-    /// Measures a pair, the bright image first; `None` if one of them is black, or both are.
+    /// Measures a pair, the bright image first; `None` if at least one image is black.
     ///
-    /// Luminance is that of linear sRGB (IEC 61966-2-1), so that the number is that of shutter and gain: exact to 0.03 EV up to 9 EV.
-    /// Noise that is clipped at black makes the dark image brighter than its exposure, so that above 6 EV the drop of a noisy
-    /// image comes out too small. The paper's synthesis takes the power 2.2 instead, which differs near black: in its light, a real
-    /// pair of LOL-v2 that is 3.59 EV apart is 4.08 EV apart.
+    /// Luminance is linear sRGB (IEC 61966-2-1), so that `mean` matches the change of shutter time and gain, within 0.03 EV up to 9 EV.
+    /// Noise that is clipped at black brightens the dark image: above 6 EV, `mean` is too small for noisy images. The paper's synthesis
+    /// uses the power 2.2 instead, which differs near black: for a real pair of LOL-v2, `mean` is 3.59 EV and `synthesis` 4.08 EV.
     #[must_use]
     pub fn measure(normal: &Rgb, low: &Rgb) -> Option<Self> {
-        let (bright, dark) = (luminance(normal, srgb), luminance(low, srgb));
+        let (bright, dark) = (
+            luminance(normal, srgb_to_linear),
+            luminance(low, srgb_to_linear),
+        );
         let ev = |bright: f64, dark: f64| {
             (bright > 0.0 && dark > 0.0).then(|| libm::log2(bright / dark))
         };
-        let is_of_one_size = (normal.height(), normal.width()) == (low.height(), low.width());
-        let power = |image| mean(&luminance(image, |code| libm::pow(code, GAMMA)));
+        let is_same_size = (normal.height(), normal.width()) == (low.height(), low.width());
+        let gamma_mean = |image| mean(&luminance(image, |code| libm::pow(code, GAMMA)));
         Some(Self {
             mean: ev(mean(&bright), mean(&dark))?,
-            synthesis: ev(power(normal), power(low))?,
-            median: if is_of_one_size {
-                let ratios = bright.iter().zip(&dark);
+            synthesis: ev(gamma_mean(normal), gamma_mean(low))?,
+            median: if is_same_size {
                 median(
-                    ratios
+                    bright
+                        .iter()
+                        .zip(&dark)
                         .filter_map(|(bright, dark)| ev(*bright, *dark))
                         .collect(),
                 )
@@ -52,14 +57,14 @@ impl PairEv {
     }
 }
 
-/// The mean linear luminance of an image, from 0 to 1; 0 for an image without pixels.
+/// Mean linear luminance of an image, from 0 to 1; 0 for an image without pixels.
 #[must_use]
 pub fn mean_luminance(image: &Rgb) -> f64 {
-    mean(&luminance(image, srgb))
+    mean(&luminance(image, srgb_to_linear))
 }
 
-/// The light of a code from 0 to 1, by the transfer function of sRGB (IEC 61966-2-1).
-fn srgb(code: f64) -> f64 {
+/// Converts an sRGB code to linear light, both from 0 to 1 (IEC 61966-2-1).
+fn srgb_to_linear(code: f64) -> f64 {
     if code <= 0.04045 {
         code / 12.92
     } else {
@@ -67,9 +72,9 @@ fn srgb(code: f64) -> f64 {
     }
 }
 
-/// The luminance of each pixel, with this light of codes from 0 to 1.
-fn luminance(image: &Rgb, light: impl Fn(f64) -> f64) -> Vec<f64> {
-    let linear: [f64; 256] = std::array::from_fn(|code| light(code as f64 / 255.0));
+/// Luminance of each pixel. `to_linear` converts a code to linear light, both from 0 to 1.
+fn luminance(image: &Rgb, to_linear: impl Fn(f64) -> f64) -> Vec<f64> {
+    let linear: [f64; 256] = std::array::from_fn(|code| to_linear(code as f64 / 255.0));
     image
         .samples()
         .chunks_exact(3)
@@ -83,12 +88,12 @@ fn luminance(image: &Rgb, light: impl Fn(f64) -> f64) -> Vec<f64> {
         .collect()
 }
 
-/// The mean; 0 without numbers.
+/// Mean; 0 for an empty slice.
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// The upper median; `None` without numbers.
+/// Upper median; `None` for an empty vector.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
@@ -99,17 +104,18 @@ mod tests {
     use super::*;
     use crate::expose_by;
 
+    /// Pseudo-random image without black pixels.
     fn scene() -> Rgb {
         let samples =
             (0..96 * 128 * 3_u32).map(|i| (40 + (i.wrapping_mul(2_654_435_761) >> 8) % 200) as u8);
         Rgb::new(96, 128, samples.collect()).unwrap()
     }
 
-    /// The image with `ev` EV less light, rounded to 8 bits with a dither, so that dark codes keep their mean.
+    /// Darkens an image by `ev` EV. A dither before rounding to 8 bits preserves the mean of dark codes.
     fn darker(image: &Rgb, ev: f64) -> Rgb {
         let mut dark = image.clone();
         for (place, code) in dark.samples_mut().iter_mut().enumerate() {
-            let light = srgb(f64::from(*code) / 255.0) * libm::exp2(-ev);
+            let light = srgb_to_linear(f64::from(*code) / 255.0) * libm::exp2(-ev);
             let exact = if light <= 0.003_130_8 {
                 255.0 * 12.92 * light
             } else {
@@ -123,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn the_drop_of_an_exposure_is_given_back() {
+    fn mean_recovers_exposure_drop() {
         for drop in [0.5, 2.0, 3.6, 6.0, 9.0] {
             let ev = PairEv::measure(&scene(), &darker(&scene(), drop)).unwrap();
             assert!((ev.mean - drop).abs() < 0.03, "{drop}: {ev:?}");
@@ -131,31 +137,34 @@ mod tests {
     }
 
     #[test]
-    fn synthesis_is_as_dark_by_its_own_drop() {
+    fn synthesis_recovers_synthetic_drop() {
         for drop in [0.5, 2.0, 3.6, 6.0] {
             let ev = PairEv::measure(&scene(), &expose_by(&scene(), drop)).unwrap();
             assert!((ev.synthesis - drop).abs() < 0.03, "{drop}: {ev:?}");
         }
-        // Near black the two laws differ.
+        // Near black, sRGB and the power 2.2 differ.
         let ev = PairEv::measure(&scene(), &expose_by(&scene(), 6.0)).unwrap();
         assert!(ev.mean < 5.5, "{ev:?}");
     }
 
     #[test]
-    fn the_same_image_has_none_and_swapped_ones_a_negative_one() {
-        let (normal, low) = (scene(), darker(&scene(), 3.0));
+    fn identical_images_differ_by_zero() {
         let same = PairEv {
             mean: 0.0,
             median: Some(0.0),
             synthesis: 0.0,
         };
-        assert_eq!(PairEv::measure(&normal, &normal), Some(same));
-        let swapped = PairEv::measure(&low, &normal).unwrap();
+        assert_eq!(PairEv::measure(&scene(), &scene()), Some(same));
+    }
+
+    #[test]
+    fn swapped_images_have_negative_drop() {
+        let swapped = PairEv::measure(&darker(&scene(), 3.0), &scene()).unwrap();
         assert!((swapped.mean + 3.0).abs() < 0.03, "{swapped:?}");
     }
 
     #[test]
-    fn another_tone_curve_shows_in_the_median() {
+    fn bright_spots_lower_only_mean() {
         let mut low = darker(&scene(), 3.0);
         for code in low.samples_mut().iter_mut().step_by(40) {
             *code = 255;
@@ -165,14 +174,19 @@ mod tests {
     }
 
     #[test]
-    fn sizes_may_differ_and_black_images_have_no_exposure() {
+    fn image_sizes_may_differ() {
         let small = Rgb::new(1, 2, vec![128; 6]).unwrap();
         let large = Rgb::new(4, 4, vec![64; 48]).unwrap();
         let ev = PairEv::measure(&small, &large).unwrap();
-        let exact = libm::log2(srgb(128.0 / 255.0) / srgb(64.0 / 255.0));
+        let exact = libm::log2(srgb_to_linear(128.0 / 255.0) / srgb_to_linear(64.0 / 255.0));
         assert!((ev.mean - exact).abs() < 1e-9 && (ev.median.unwrap() - exact).abs() < 1e-9);
+    }
+
+    #[test]
+    fn black_images_have_no_drop() {
+        let grey = Rgb::new(1, 2, vec![128; 6]).unwrap();
         let black = Rgb::black(2, 2);
-        assert_eq!(PairEv::measure(&small, &black), None);
-        assert_eq!(PairEv::measure(&black, &small), None);
+        assert_eq!(PairEv::measure(&grey, &black), None);
+        assert_eq!(PairEv::measure(&black, &grey), None);
     }
 }

@@ -1,4 +1,4 @@
-//! Report of a measured camera: [`table`], [`json`] and [`figure()`].
+//! Reports of a camera calibration: [`table`], [`json`] and [`figure()`].
 
 mod figure;
 
@@ -11,22 +11,21 @@ use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::counted;
 
-/// The numbers of a camera as JSON.
+/// The calibration of a camera as JSON, with the ADU range and the bias of each setting.
 ///
 /// # Errors
-/// If a number cannot be written.
+/// If the calibration cannot be serialized.
 pub(crate) fn json(camera: &CameraFit) -> Result<String> {
     let mut value = serde_json::to_value(camera).map_err(|e| Error::data("summary", e))?;
     value["adu_range"] = camera.adu_range().into();
-    for (setting, fit) in (0..).zip(&camera.settings) {
+    for (index, fit) in camera.settings.iter().enumerate() {
         let bias = serde_json::to_value(camera.bias(fit));
-        let setting: usize = setting;
-        value["settings"][setting]["bias"] = bias.map_err(|e| Error::data("summary", e))?;
+        value["settings"][index]["bias"] = bias.map_err(|e| Error::data("summary", e))?;
     }
     Ok(format!("{value:#}\n"))
 }
 
-/// The table of a camera: a row a setting, below it the two lines, and everything that is doubtful.
+/// The calibration of a camera as text: a table with one row per setting, the two fitted noise lines, and the warnings.
 #[must_use]
 pub(crate) fn table(camera: &CameraFit) -> String {
     let title = format!(
@@ -38,76 +37,85 @@ pub(crate) fn table(camera: &CameraFit) -> String {
         camera.black,
         camera.white
     );
-    let planes = format!("terminal bias {} ADU", camera.cfa.plane_names().join(" / "));
+    let bias_head = format!("terminal bias {} ADU", camera.cfa.plane_names().join(" / "));
     let layout = TableBuilder::new("calibration", &camera.settings)
         .column(Text, "terminal", |fit| fit.name.clone())
-        .column(Text, "terminal K ADU/e", |fit| text(fit.gain, 4))
-        .column(Text, "terminal σ_TL ADU", |fit| text(fit.read_scale, 4))
-        .column(Text, "terminal λ", |fit| text(fit.read_shape, 4))
-        .column(Text, "terminal λ by PPCC", |fit| number(fit.plot.shape, 4))
-        .column(Text, "terminal σ_row ADU", |fit| {
-            text(fit.row_deviation, 4)
+        .column(Text, "terminal K ADU/e", |fit| with_error(fit.gain, 4))
+        .column(Text, "terminal σ_TL ADU", |fit| {
+            with_error(fit.read_scale, 4)
         })
-        .column(Text, &*planes, |fit| bias(camera, fit));
+        .column(Text, "terminal λ", |fit| with_error(fit.read_shape, 4))
+        .column(Text, "terminal λ by PPCC", |fit| {
+            decimal(fit.plot.shape, 4)
+        })
+        .column(Text, "terminal σ_row ADU", |fit| {
+            with_error(fit.row_deviation, 4)
+        })
+        .column(Text, &*bias_head, |fit| bias_cell(camera, fit));
     let table = terminal::table(&[layout.build()]);
-    let lines = [
-        line("σ_TL", &camera.read_scale),
-        line("σ_row", &camera.row_deviation),
+    let noise_lines = [
+        noise_line("σ_TL", &camera.read_scale),
+        noise_line("σ_row", &camera.row_deviation),
     ];
     let checks = if camera.warnings.is_empty() {
         "checks: nothing to report\n".to_owned()
     } else {
-        let warnings = camera
+        let warnings: String = camera
             .warnings
             .iter()
-            .map(|warning| format!("  {warning}\n"));
-        format!("checks:\n{}", warnings.collect::<String>())
+            .map(|warning| format!("  {warning}\n"))
+            .collect();
+        format!("checks:\n{warnings}")
     };
-    let one_pair = camera
+    let lacks_error = camera
         .settings
         .iter()
         .any(|fit| fit.gain.error.is_none() || fit.read_scale.error.is_none());
-    let no_error = if one_pair {
+    let error_note = if lacks_error {
         "no ±: a standard error needs 2 pairs of frames or more (10 bias frames are recommended)\n"
     } else {
         ""
     };
-    format!("{title}\n{table}{}{no_error}{checks}", lines.concat())
+    format!(
+        "{title}\n{table}{}{error_note}{checks}",
+        noise_lines.concat()
+    )
 }
 
-/// Offsets of the planes with the largest standard error of them.
-fn bias(camera: &CameraFit, fit: &SettingFit) -> String {
-    let bias = camera.bias(fit);
-    let values = bias
+/// Bias of each colour plane, with the largest standard error of the planes.
+fn bias_cell(camera: &CameraFit, fit: &SettingFit) -> String {
+    let planes = camera.bias(fit);
+    let values = planes
         .iter()
-        .map(|bias| number(bias.value, 3))
+        .map(|bias| decimal(bias.value, 3))
         .collect::<Vec<_>>()
         .join(" / ");
-    let errors = bias.iter().filter_map(|bias| bias.error);
-    match errors.reduce(f64::max) {
+    let largest_error = planes.iter().filter_map(|bias| bias.error).reduce(f64::max);
+    match largest_error {
         Some(error) => format!("{values} ± {error:.3}"),
         None => values,
     }
 }
 
-fn number(value: f64, digits: usize) -> String {
+/// A number with this many decimals and the minus sign U+2212.
+fn decimal(value: f64, digits: usize) -> String {
     format!("{value:.digits$}").replace('-', "−")
 }
 
-/// A number with its standard error.
-fn text(number: Measured, digits: usize) -> String {
-    let value = self::number(number.value, digits);
-    match number.error {
+/// A measured value ± its standard error, if known.
+fn with_error(measured: Measured, digits: usize) -> String {
+    let value = decimal(measured.value, digits);
+    match measured.error {
         Some(error) => format!("{value} ± {error:.digits$}"),
         None => value,
     }
 }
 
-/// A line over K in words.
-fn line(name: &str, line: &NoiseLine) -> String {
+/// Equation of a fitted noise line, ln σ over ln K, with the deviation about it and the source of its slope.
+fn noise_line(name: &str, line: &NoiseLine) -> String {
     let formula = format!(
         "ln {name} = {} ln K {} {:.4}",
-        number(line.slope, 4),
+        decimal(line.slope, 4),
         if line.intercept < 0.0 { '−' } else { '+' },
         line.intercept.abs()
     );

@@ -1,4 +1,4 @@
-//! The leaderboard as HTML: [`index`].
+//! HTML page of the leaderboard: [`index`].
 
 use serde::Serialize;
 
@@ -9,22 +9,24 @@ use crate::error::Result;
 use crate::report::page::STYLE;
 use crate::report::template::filled;
 use crate::text::readable::readable;
+use crate::text::words::counted;
 
 const PAGE: &str = include_str!("index.html");
 const OWN_STYLE: &str = include_str!("site.css");
-/// The names and the theme that all pages share, and what sorts and filters the tables.
+/// Script of the page: the names and theme shared by all pages, then sorting and filtering of the tables.
 const SCRIPT: &str = concat!(
     include_str!("../page/script/base.js"),
     include_str!("site.js")
 );
 
-/// The reason why open questions are not ranked.
+/// Note on tables of open questions: their rows are not ranked.
 const NOT_RANKED: &str = "Scores are in %, over the answers that were marked. These rows are not ranked: scores of open answers have no test of one model against another here.";
 
+/// Values of the page template.
 #[derive(Serialize)]
 struct Page<'a> {
-    groups: Vec<PageGroup<'a>>,
-    others: Vec<PageOther>,
+    groups: Vec<PageTable<'a>>,
+    others: Vec<ExcludedRun>,
     downloads: &'a [String],
     data: &'static str,
     facts: String,
@@ -33,41 +35,43 @@ struct Page<'a> {
     script: &'static str,
 }
 
-/// A group as the template reads it.
+/// A table of comparable runs, as the template needs it.
 #[derive(Serialize)]
-struct PageGroup<'a> {
+struct PageTable<'a> {
     id: usize,
     kind: &'static str,
     title: String,
     ranking: &'a str,
-    /// The first letters of the digests of questions, light and prompts.
+    /// First characters of the digests of questions, light and prompts.
     digests: String,
-    /// The number of the other table and what differs; `None` for the first of its kind.
+    /// Number of the table compared with, and the differences; `None` for the first table of its kind.
     differs: Option<(usize, Vec<String>)>,
     shared: Vec<[String; 2]>,
     table: BoardTable,
 }
 
-/// A run that stands in no table.
+/// A run without a table, and the reason.
 #[derive(Serialize)]
-struct PageOther {
+struct ExcludedRun {
     name: String,
     link: String,
     why: String,
 }
 
-/// The page.
+/// Renders the leaderboard page.
 ///
 /// # Errors
-/// If the template cannot be filled.
+/// If the template cannot be rendered.
 pub(super) fn index(site: &Site, downloads: &[String]) -> Result<String> {
-    let groups = site.groups.iter().zip(1..);
-    let others = site.others.iter().map(|(run, why)| PageOther {
-        name: readable(&run.name),
-        link: run.path(),
-        why: readable(why),
-    });
-    let counted = |number: usize, noun: &str| crate::text::words::counted(number, noun);
+    let others = site
+        .others
+        .iter()
+        .map(|(run, why)| ExcludedRun {
+            name: readable(&run.name),
+            link: run.path(),
+            why: readable(why),
+        })
+        .collect();
     filled(
         PAGE,
         Page {
@@ -76,8 +80,13 @@ pub(super) fn index(site: &Site, downloads: &[String]) -> Result<String> {
                 counted(site.pages.len(), "run"),
                 counted(site.groups.len(), "table")
             ),
-            groups: groups.map(|(group, id)| page_group(group, id)).collect(),
-            others: others.collect(),
+            groups: site
+                .groups
+                .iter()
+                .zip(1..)
+                .map(|(group, id)| page_table(group, id))
+                .collect(),
+            others,
             downloads,
             data: DATA,
             version: env!("CARGO_PKG_VERSION"),
@@ -87,30 +96,31 @@ pub(super) fn index(site: &Site, downloads: &[String]) -> Result<String> {
     )
 }
 
-fn page_group(group: &SiteGroup, id: usize) -> PageGroup<'_> {
+fn page_table(group: &SiteGroup, id: usize) -> PageTable<'_> {
     let (kind, table, ranking) = match &group.rows {
         GroupRows::Choices(rows, ranking) => ("ranked", choices::board(rows), &*ranking.words),
         GroupRows::Open(rows) => ("unranked", open::board(rows), NOT_RANKED),
     };
-    let shared = group.shared.iter();
-    PageGroup {
+    PageTable {
         id,
         kind,
         title: readable(&group.title),
         ranking,
         digests: digests(group),
         differs: group.differs.as_ref().map(|differs| {
-            let lines = differs.lines.iter().map(|line| readable(line));
-            (differs.from, lines.collect())
+            let lines = differs.lines.iter().map(|line| readable(line)).collect();
+            (differs.from, lines)
         }),
-        shared: shared
+        shared: group
+            .shared
+            .iter()
             .map(|(name, value)| [readable(name), readable(value)])
             .collect(),
         table,
     }
 }
 
-/// The digests of a group in a line.
+/// First 8 characters of each digest of a group, on one line.
 fn digests(group: &SiteGroup) -> String {
     let digests = &group.digests;
     let named = [
@@ -122,8 +132,8 @@ fn digests(group: &SiteGroup) -> String {
         .iter()
         .filter(|(_, digest)| !digest.is_empty())
         .map(|(name, digest)| {
-            let first: String = digest.chars().take(8).collect();
-            format!("{name} {}", readable(&first))
+            let prefix: String = digest.chars().take(8).collect();
+            format!("{name} {}", readable(&prefix))
         })
         .collect::<Vec<_>>()
         .join(" · ")

@@ -1,4 +1,4 @@
-//! Removes secrets, and places that identify the machine, from a run: [`Redactor`].
+//! Removal of secrets and of paths that identify the machine from a run: [`Redactor`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,31 +9,31 @@ use serde_json::{Map, Value};
 
 use crate::error::{Error, Result};
 
-/// Least length of a key in a variable, in bytes (chosen): shorter values are words.
-const LEAST_KEY: usize = 8;
+/// Minimum length of a key in an environment variable, in bytes (chosen): shorter values may be ordinary words.
+const MIN_KEY_BYTES: usize = 8;
 
-/// The replacement of a key.
+/// Replacement for a key.
 const SECRET: &str = "[secret]";
 
-/// Begins an image within a text: its letters reveal nothing.
-const IMAGE: &str = "data:image/";
+/// Prefix of an image as a data URL. Such texts are not redacted: their base64 contains no path and no key.
+const IMAGE_PREFIX: &str = "data:image/";
 
-/// Endings of the names of variables that hold keys.
-const KEY_NAMES: [&str; 4] = ["_KEY", "_TOKEN", "_SECRET", "_PASSWORD"];
+/// Suffixes of environment variables whose value is a key.
+const KEY_VARIABLE_SUFFIXES: [&str; 4] = ["_KEY", "_TOKEN", "_SECRET", "_PASSWORD"];
 
-/// A part that was removed or replaced.
+/// The kind of a redacted part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Change {
-    /// A path on this machine, of which the last name stays.
+    /// A path on a machine; its last component is kept.
     Path,
-    /// A user, password or query in an address.
+    /// A user name, password, query or fragment in a URL.
     Address,
     /// A key.
     Key,
 }
 
 impl Change {
-    /// The change in words.
+    /// A sentence for the list of changes, with the number of times.
     pub(super) fn words(self, times: usize) -> String {
         let times = match times {
             1 => "once".to_owned(),
@@ -51,101 +51,109 @@ impl Change {
     }
 }
 
-/// Removes paths, addresses and secrets from texts.
+/// Removes private paths, private parts of URLs, and keys from texts.
 pub(super) struct Redactor {
-    /// Places on this machine or that of the run, the longest first.
-    places: Vec<String>,
-    /// Values of variables that hold keys.
+    /// Paths on this machine or on the machine of the run, longest first.
+    private_paths: Vec<String>,
+    /// Keys in environment variables.
     keys: Vec<String>,
     /// How often each change was made.
     pub(super) changes: BTreeMap<Change, usize>,
 }
 
-/// How a text is read.
+/// The paths to redact in a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Paths {
-    /// Any absolute path is one of a machine: texts of this program.
+    /// Every absolute path, in texts that this program wrote.
     Any,
-    /// Only places that are known: texts of data and models, where a slash may mean something else.
+    /// Only known private paths, in texts of data sets and models, where a slash may mean something else.
     Known,
 }
 
-/// An absolute path within a text, behind what may stand before it.
+/// An absolute path (group 2) after the start of the text or a delimiter (group 1).
 static PATH: LazyLock<Regex> = LazyLock::new(|| {
-    pattern(
+    compile(
         r#"(^|[\s"'=:,;(\[])((?:/[^\s"',;:()\[\]/]+){2,}/?|[A-Za-z]:\\[^\s"',;]+|\\\\[^\s"',;]+)"#,
     )
 });
-/// A user and password before a host.
+/// The user name and password before a host; group 1 is the URL scheme.
 static USER: LazyLock<Regex> =
-    LazyLock::new(|| pattern(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'@?#]+@"#));
-/// The query or fragment of an address.
-static QUERY: LazyLock<Regex> = LazyLock::new(|| pattern(r#"(https?://[^\s"'?#]+)[?#][^\s"']*"#));
-/// Forms of keys of known vendors.
+    LazyLock::new(|| compile(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'@?#]+@"#));
+/// A URL with a query or fragment; group 1 is the URL without them.
+static QUERY: LazyLock<Regex> = LazyLock::new(|| compile(r#"(https?://[^\s"'?#]+)[?#][^\s"']*"#));
+/// Key formats of known vendors.
 static KEY: LazyLock<Regex> = LazyLock::new(|| {
-    pattern(
+    compile(
         r"\b(?:sk-[A-Za-z0-9_-]{16,}|AIza[A-Za-z0-9_-]{30,}|(?:hf|gsk|ghp)_[A-Za-z0-9]{20,}|xai-[A-Za-z0-9]{20,}|Bearer\s+[A-Za-z0-9._~+/-]{12,}=*)",
     )
 });
 
-fn pattern(text: &str) -> Regex {
+fn compile(text: &str) -> Regex {
     Regex::new(text).unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
 }
 
 impl Redactor {
-    /// For the run in a folder: the places of this process, and the keys in its environment.
+    /// A redactor for a run's folder. It knows the home, working and run folders, and the keys in the environment.
     pub(super) fn new(folder: &Path) -> Self {
-        let home = ["HOME", "USERPROFILE"].map(|name| std::env::var_os(name).map(PathBuf::from));
-        let mut places: BTreeSet<PathBuf> = home.into_iter().flatten().collect();
-        places.extend(std::env::current_dir());
-        places.extend(std::path::absolute(folder));
-        let real = places.iter().filter_map(|place| place.canonicalize().ok());
-        places.extend(real.collect::<Vec<_>>());
-        let variables = std::env::vars_os().filter_map(|(name, value)| {
+        let mut paths: BTreeSet<PathBuf> = ["HOME", "USERPROFILE"]
+            .into_iter()
+            .filter_map(std::env::var_os)
+            .map(PathBuf::from)
+            .collect();
+        paths.extend(std::env::current_dir());
+        paths.extend(std::path::absolute(folder));
+        let real_paths: Vec<PathBuf> = paths
+            .iter()
+            .filter_map(|path| path.canonicalize().ok())
+            .collect();
+        paths.extend(real_paths);
+        let keys = std::env::vars_os().filter_map(|(name, value)| {
             let name = name.to_string_lossy().to_uppercase();
-            let is_key = KEY_NAMES.iter().any(|ending| name.ends_with(ending));
+            let is_key = KEY_VARIABLE_SUFFIXES
+                .iter()
+                .any(|suffix| name.ends_with(suffix));
             let value = value.into_string().ok()?;
-            (is_key && value.trim().len() >= LEAST_KEY).then(|| value.trim().to_owned())
+            (is_key && value.trim().len() >= MIN_KEY_BYTES).then(|| value.trim().to_owned())
         });
         let mut redactor = Self {
-            places: Vec::new(),
-            keys: variables.collect(),
+            private_paths: Vec::new(),
+            keys: keys.collect(),
             changes: BTreeMap::new(),
         };
-        for place in places {
-            redactor.learn(&place.to_string_lossy());
+        for path in paths {
+            redactor.add_private_path(&path.to_string_lossy());
         }
         redactor
     }
 
-    /// A place that is private from now on, wherever it stands. The root is none.
-    fn learn(&mut self, place: &str) {
-        let place = place.trim_end_matches(['/', '\\']);
-        let is_root = place.chars().filter(|c| !"/\\:".contains(*c)).count() < 2;
-        if is_root || self.places.iter().any(|known| known == place) {
+    /// Adds a path to redact in all later texts. Roots such as `/` and `C:\` are ignored.
+    fn add_private_path(&mut self, path: &str) {
+        let path = path.trim_end_matches(['/', '\\']);
+        let is_root = path.chars().filter(|c| !"/\\:".contains(*c)).count() < 2;
+        if is_root || self.private_paths.iter().any(|known| known == path) {
             return;
         }
-        self.places.push(place.to_owned());
-        self.places
-            .sort_by_key(|place| std::cmp::Reverse(place.len()));
+        self.private_paths.push(path.to_owned());
+        self.private_paths
+            .sort_by_key(|path| std::cmp::Reverse(path.len()));
     }
 
-    /// The first private thing in a text that was to hold none, in words.
+    /// Description of a known key or private path that a redacted text still contains; `None` if it contains neither.
     pub(super) fn leak(&self, text: &str) -> Option<&'static str> {
         if self.keys.iter().any(|key| text.contains(key)) {
             return Some("a key of the environment");
         }
-        let is_leaked = self
-            .places
+        let has_path = self
+            .private_paths
             .iter()
-            .any(|place| found(text, place).next().is_some());
-        is_leaked.then_some("a path of this machine")
+            .any(|path| whole_matches(text, path).next().is_some());
+        has_path.then_some("a path of this machine")
     }
 
-    /// A value with the texts and names in it as [`text`](Self::text) gives them.
+    /// The JSON value with its strings and field names redacted by [`text`](Self::text).
     ///
     /// # Errors
-    /// If two fields of an object would get one name.
+    /// If two fields of an object have the same name after redaction.
     pub(super) fn value(&mut self, value: Value, paths: Paths) -> Result<Value> {
         Ok(match value {
             Value::String(text) => Value::String(self.text(&text, paths)),
@@ -154,59 +162,61 @@ impl Redactor {
                 Value::Array(values.collect::<Result<_>>()?)
             }
             Value::Object(fields) => {
-                let mut named = Map::new();
+                let mut redacted = Map::new();
                 for (name, value) in fields {
                     let shown = self.text(&name, paths);
                     let value = self.value(value, paths)?;
-                    if named.insert(shown.clone(), value).is_some() {
+                    if redacted.insert(shown.clone(), value).is_some() {
                         let problem = format_args!(
                             "two things in it differ by their folders alone, and would both be {shown:?} without: give one another name (a model in a file of models) and report the run"
                         );
                         return Err(Error::data("manifest.json", problem));
                     }
                 }
-                Value::Object(named)
+                Value::Object(redacted)
             }
             other => other,
         })
     }
 
-    /// A text without places, users in addresses, and keys.
+    /// The text without private paths, keys, and user names and passwords in URLs. [`Paths::Any`] also removes queries and fragments.
     pub(super) fn text(&mut self, text: &str, paths: Paths) -> String {
-        if text.starts_with(IMAGE) {
+        if text.starts_with(IMAGE_PREFIX) {
             return text.to_owned();
         }
         let mut text = text.to_owned();
         if paths == Paths::Any {
-            // A path may hold spaces where it is the whole text.
+            // PATH ends at the first space, but a path that is the whole text may contain spaces.
             if is_absolute(&text) && !text.contains('\n') {
-                self.learn(&text);
+                self.add_private_path(&text);
             }
             for found in PATH.captures_iter(&text) {
-                self.learn(&found[2]);
+                self.add_private_path(&found[2]);
             }
-            text = self.replaced(&QUERY, &text, Change::Address, |found| found[1].to_owned());
+            text =
+                self.replace_matches(&QUERY, &text, Change::Address, |found| found[1].to_owned());
         }
-        text = self.replaced(&USER, &text, Change::Address, |found| found[1].to_owned());
+        text = self.replace_matches(&USER, &text, Change::Address, |found| found[1].to_owned());
         for key in &self.keys {
             if text.contains(key) {
                 *self.changes.entry(Change::Key).or_default() += 1;
                 text = text.replace(key, SECRET);
             }
         }
-        text = self.replaced(&KEY, &text, Change::Key, |_| SECRET.to_owned());
-        for place in &self.places {
-            let starts: Vec<usize> = found(&text, place).collect();
-            let name = place.rsplit(['/', '\\']).next().unwrap_or_default();
+        text = self.replace_matches(&KEY, &text, Change::Key, |_| SECRET.to_owned());
+        for path in &self.private_paths {
+            let starts: Vec<usize> = whole_matches(&text, path).collect();
+            let name = path.rsplit(['/', '\\']).next().unwrap_or_default();
             for start in starts.into_iter().rev() {
                 *self.changes.entry(Change::Path).or_default() += 1;
-                text.replace_range(start..start + place.len(), &format!("DIR/{name}"));
+                text.replace_range(start..start + path.len(), &format!("DIR/{name}"));
             }
         }
         text
     }
 
-    fn replaced(
+    /// Replaces every match of a pattern and counts the changes.
+    fn replace_matches(
         &mut self,
         pattern: &Regex,
         text: &str,
@@ -224,24 +234,25 @@ impl Redactor {
     }
 }
 
-/// Whether a text is an absolute path, of this or another system.
+/// True for an absolute path of any system: Unix, Windows drive, or UNC.
 fn is_absolute(text: &str) -> bool {
-    let drive = text
+    let starts_with_letter = text
         .chars()
         .next()
         .is_some_and(|letter| letter.is_ascii_alphabetic());
-    let is_drive = drive && (text[1..].starts_with(":\\") || text[1..].starts_with(":/"));
+    let is_drive =
+        starts_with_letter && (text[1..].starts_with(":\\") || text[1..].starts_with(":/"));
     text.len() > 1 && text.starts_with('/') && !text.starts_with("//")
         || text.starts_with("\\\\")
         || is_drive
 }
 
-/// Where a place stands in a text as a whole, not as a part of other names.
-fn found<'t>(text: &'t str, place: &'t str) -> impl Iterator<Item = usize> + 't {
+/// Start positions of a path in a text, in bytes, without matches inside a longer name or path.
+fn whole_matches<'t>(text: &'t str, path: &'t str) -> impl Iterator<Item = usize> + 't {
     let is_name = |c: char| c.is_alphanumeric() || "_-".contains(c);
-    text.match_indices(place).filter_map(move |(start, _)| {
+    text.match_indices(path).filter_map(move |(start, _)| {
         let before = text[..start].chars().next_back();
-        let after = text[start + place.len()..].chars().next();
+        let after = text[start + path.len()..].chars().next();
         let is_part = before.is_some_and(|c| is_name(c) || c == '/') || after.is_some_and(is_name);
         (!is_part).then_some(start)
     })
@@ -255,14 +266,14 @@ mod tests {
 
     fn redactor() -> Redactor {
         Redactor {
-            places: vec!["/home/ann".to_owned()],
+            private_paths: vec!["/home/ann".to_owned()],
             keys: vec!["a-key-of-mine".to_owned()],
             changes: BTreeMap::new(),
         }
     }
 
     #[test]
-    fn places_addresses_and_keys_are_taken_out() {
+    fn paths_addresses_and_keys_are_removed() {
         let mut redactor = redactor();
         let mut any = |text: &str| redactor.text(text, Paths::Any);
         for (text, expected) in [
@@ -281,7 +292,7 @@ mod tests {
         ] {
             assert_eq!(any(text), expected);
         }
-        // What is none of these stays.
+        // Other texts are unchanged.
         for plain in [
             "1/2",
             "and/or",
@@ -296,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn only_known_places_are_taken_out_of_replies() {
+    fn replies_lose_only_known_paths() {
         let mut redactor = redactor();
         let mut known = |text: &str| redactor.text(text, Paths::Known);
         assert_eq!(known("/left /or/right"), "/left /or/right");
@@ -314,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_would_become_one_are_refused() {
+    fn colliding_field_names_are_refused() {
         let mut redactor = redactor();
         let models = json!({"model": {"/a/b/m": 1, "/c/d/m": 2}});
         let error = redactor.value(models, Paths::Any).unwrap_err().to_string();

@@ -1,8 +1,8 @@
-//! Recognition of the frame that an image shows: [`Likenesses`].
+//! Matching of an image to the frame of a data set that it shows: [`Likenesses`].
 //!
-//! The linear light of an image is averaged over a coarse grid, which removes most of the sensor noise, and correlated
-//! with that of every frame. A correlation does not depend on the brightness of the image. So a frame is recognised at
-//! every level that still shows some of it.
+//! The linear light of the image is averaged over a coarse grid, which removes most of the sensor noise. The cell values are then
+//! correlated with those of every frame. The correlation does not depend on the brightness of the image, so a frame is recognised at
+//! every level at which some of it is visible.
 
 use std::sync::LazyLock;
 
@@ -13,11 +13,11 @@ use crate::error::Result;
 use crate::images::progress::Progress;
 use crate::types::{FrameId, Rgb};
 
-/// The number of grid cells, horizontally and vertically (chosen).
+/// Number of grid cells, horizontally and vertically (chosen).
 const GRID: [usize; 2] = [32, 24];
 
-/// The minimum correlation for an image to show a frame (chosen).
-const LEAST: f64 = 0.5;
+/// Minimum correlation at which an image is matched to a frame (chosen).
+const MIN_CORRELATION: f64 = 0.5;
 
 /// Linear light of each sRGB code, from 0 to 65,535 (IEC 61966-2-1).
 static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
@@ -32,20 +32,22 @@ static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
     })
 });
 
-/// Each frame with its cell values.
+/// Frames of a data set, each with its normalised cell values.
 pub(super) struct Likenesses(Vec<(FrameId, Vec<f64>)>);
 
 impl Likenesses {
-    /// The cell values of every frame of a data set.
+    /// Computes the cell values of every frame of a data set.
+    ///
+    /// # Errors
+    /// If an image cannot be read or decoded.
     pub(super) fn new(dataset: &Dataset, progress: &Progress) -> Result<Self> {
-        let names: Vec<&FrameId> = dataset.frames().collect();
-        let bar = progress.bar("looking at frames", names.len());
-        names
-            .into_par_iter()
-            .map(|name| {
-                let image = dataset.picture(name)?.decode()?;
+        let ids: Vec<&FrameId> = dataset.frames().collect();
+        let bar = progress.bar("looking at frames", ids.len());
+        ids.into_par_iter()
+            .map(|id| {
+                let image = dataset.picture(id)?.decode()?;
                 bar.inc();
-                Ok((name.clone(), likeness(&image)))
+                Ok((id.clone(), cell_values(&image)))
             })
             .collect::<Result<_>>()
             .map(Self)
@@ -56,22 +58,23 @@ impl Likenesses {
         self.0.len()
     }
 
-    /// The frame with the highest correlation to an image; `None` if it is below the minimum.
+    /// Frame with the highest correlation to an image; `None` if the highest correlation is below the minimum.
     pub(super) fn most_like(&self, image: &Rgb) -> Option<&FrameId> {
-        let own = likeness(image);
-        let correlation =
-            |other: &[f64]| -> f64 { own.iter().zip(other).map(|(a, b)| a * b).sum() };
-        let found = self
+        let own = cell_values(image);
+        let (highest, id) = self
             .0
             .iter()
-            .map(|(name, other)| (correlation(other), name));
-        let (highest, name) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (highest >= LEAST).then_some(name)
+            .map(|(id, other)| {
+                let correlation: f64 = own.iter().zip(other).map(|(a, b)| a * b).sum();
+                (correlation, id)
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (highest >= MIN_CORRELATION).then_some(id)
     }
 }
 
-/// The square root of the light of each cell, shifted to mean 0 and scaled so that the squares sum to 1.
-fn likeness(image: &Rgb) -> Vec<f64> {
+/// Square root of the mean linear light of each cell, normalised to mean 0 and Euclidean norm 1.
+fn cell_values(image: &Rgb) -> Vec<f64> {
     let (width, height) = (image.width(), image.height());
     let mut cells = vec![(0_u64, 0_u64); GRID[0] * GRID[1]];
     let (pixels, _) = image.samples().as_chunks::<3>();
@@ -90,14 +93,14 @@ fn likeness(image: &Rgb) -> Vec<f64> {
         .map(|(light, count)| (*light as f64 / (*count).max(1) as f64).sqrt())
         .collect();
     let mean = lights.iter().sum::<f64>() / lights.len() as f64;
-    let size = lights
+    let norm = lights
         .iter()
         .map(|light| (light - mean) * (light - mean))
         .sum::<f64>()
         .sqrt();
-    let size = if size > 0.0 { size } else { 1.0 };
+    let norm = if norm > 0.0 { norm } else { 1.0 };
     lights
         .into_iter()
-        .map(|light| (light - mean) / size)
+        .map(|light| (light - mean) / norm)
         .collect()
 }

@@ -1,4 +1,4 @@
-//! `show`: making the images of one item again, and checking by their digests that they are those that were sent.
+//! `show`: rebuilds the images of one question and compares their digests with those of the images sent.
 
 mod item;
 mod settings;
@@ -21,10 +21,11 @@ use crate::types::{Condition, Digest, FrameId};
 use item::{ShownAnswer, ShownItem, read};
 pub(crate) use settings::ShowArgs;
 
-/// Makes the images again, writes them, and prints for each whether it is the one that was sent; or draws one picture of them.
+/// Rebuilds and writes the images of a question, and reports for each whether it equals the image sent. With `--sheet`, draws them in
+/// one picture instead.
 ///
 /// # Errors
-/// If the run or the item is missing, or its data or enhancers are not found.
+/// If the run, the question, its data or an enhancer is missing, or an image cannot be written.
 pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     if let Some(path) = &args.sheet {
         return sheet::sheet(&args, path);
@@ -54,67 +55,73 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     };
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &folder, &conditions)?;
     let mut text = item.text.clone();
-    let mut all_same = true;
-    for source in sources(&item) {
+    let mut all_equal = true;
+    for source in shown_frames(&item) {
         let answers: Vec<&ShownAnswer> = item
             .answers
             .iter()
             .filter(|answer| answer.shown == source)
             .collect();
-        let asked = |condition: &&Condition| {
-            answers
-                .iter()
-                .any(|answer| answer.condition.as_ref() == Some(condition))
-        };
-        let conditions: Vec<Condition> = conditions.iter().filter(asked).cloned().collect();
+        let conditions: Vec<Condition> = conditions
+            .iter()
+            .filter(|condition| {
+                answers
+                    .iter()
+                    .any(|answer| answer.condition.as_ref() == Some(*condition))
+            })
+            .cloned()
+            .collect();
         if source != item.source && !conditions.is_empty() {
             let _ = writeln!(text, "with the image of {source}:");
         }
         let images = rebuilder.images(&source, &conditions)?;
         for (condition, images) in conditions.iter().zip(images) {
-            text += &written(&target, &source, condition, &images)?;
+            text += &write_images(&target, &source, condition, &images)?;
             let Some(digest) = Payload::joint_digest(&images) else {
                 continue;
             };
-            let sent = sent(&answers, condition);
+            let sent = sent_digests(&answers, condition);
             let comparison = if sent.is_empty() {
                 format!("the digest of what was sent is not stored; {digest} now")
             } else if sent.iter().all(|sent| *sent == digest) {
                 format!("the same bytes as were sent ({digest})")
             } else {
-                all_same = false;
+                all_equal = false;
                 format!("NOT the bytes that were sent: {digest} now")
             };
             let _ = writeln!(text, "{condition}: {comparison}");
-            text += &replies(&answers, Some(condition));
+            text += &reply_lines(&answers, Some(condition));
         }
     }
     let answers: Vec<&ShownAnswer> = item.answers.iter().collect();
-    text += &replies(&answers, None);
-    if !all_same {
+    text += &reply_lines(&answers, None);
+    if !all_equal {
         text += "the data, an enhancement model or this program has changed since the run\n";
     }
-    Ok(Outcome::text(Outcome::complete_if(all_same), text))
+    Ok(Outcome::text(Outcome::complete_if(all_equal), text))
 }
 
-/// Where the images go.
+/// Output folder of the images.
 struct Target {
-    /// The folder that the user names: that of the run, or `--out`. It may be a link.
+    /// Folder named by the user: the run or `--out`. It may be a symbolic link.
     trusted: PathBuf,
-    /// The folder of the images.
+    /// Folder of the images: `trusted` or a folder in it.
     out: PathBuf,
 }
 
 impl Target {
-    /// The path of an image. Names of frames have folders, and a run may come from a stranger.
+    /// Path of an image. Frame names can contain folders, and a run may come from a stranger.
     ///
     /// # Errors
-    /// If a folder on the way is a link, which may lead anywhere.
+    /// If a folder below the trusted one is a symbolic link, because a link may lead anywhere.
     fn path(&self, name: &str) -> Result<PathBuf> {
         let path = self.out.join(name);
-        let folders = path.ancestors().skip(1);
-        let mut inner = folders.take_while(|folder| *folder != self.trusted);
-        if let Some(link) = inner.find(|folder| folder.is_symlink()) {
+        let link = path
+            .ancestors()
+            .skip(1)
+            .take_while(|folder| *folder != self.trusted)
+            .find(|folder| folder.is_symlink());
+        if let Some(link) = link {
             let problem = "a link; the images would be written to where it leads. Delete the link, or name another --out";
             return Err(Error::data(link.display(), problem));
         }
@@ -122,8 +129,8 @@ impl Target {
     }
 }
 
-/// The frames that were shown with the item: its own first, then those that a control of the observer was shown.
-fn sources(item: &ShownItem) -> Vec<FrameId> {
+/// Frames shown with the question: its own first, then those shown in controls of the observer.
+fn shown_frames(item: &ShownItem) -> Vec<FrameId> {
     let others: BTreeSet<&FrameId> = item
         .answers
         .iter()
@@ -137,21 +144,25 @@ fn sources(item: &ShownItem) -> Vec<FrameId> {
         .collect()
 }
 
-/// Writes the images of a source in a condition; the lines with their paths.
-fn written(
+/// Writes the images of a frame in a condition. Returns their paths, one per line.
+fn write_images(
     target: &Target,
     source: &FrameId,
     condition: &Condition,
     images: &[Arc<Payload>],
 ) -> Result<String> {
     let mut text = String::new();
-    for (place, image) in images.iter().enumerate() {
-        let place = if images.len() > 1 {
-            format!("_{place:03}")
+    for (index, image) in images.iter().enumerate() {
+        let suffix = if images.len() > 1 {
+            format!("_{index:03}")
         } else {
             String::new()
         };
-        let name = format!("{}_{condition}{place}.{}", stem(source)?, image.extension());
+        let name = format!(
+            "{}_{condition}{suffix}.{}",
+            stem(source)?,
+            image.extension()
+        );
         let path = target.path(&name)?;
         write(&path, image.file())?;
         let _ = writeln!(text, "{condition}: {}", path.display());
@@ -159,7 +170,10 @@ fn written(
     Ok(text)
 }
 
-/// The conditions of the item, limited to those of `--condition`.
+/// Conditions of the question, limited to those of `--condition`.
+///
+/// # Errors
+/// If the question was only asked without images, or not in a condition of `--condition`.
 fn conditions(answers: &[ShownAnswer], args: &ShowArgs) -> Result<Vec<Condition>> {
     let wanted = &args.condition;
     let asked: BTreeSet<Condition> = answers
@@ -186,8 +200,8 @@ fn conditions(answers: &[ShownAnswer], args: &ShowArgs) -> Result<Vec<Condition>
     Ok(wanted.clone())
 }
 
-/// The digests of the images that were sent in a condition.
-fn sent(answers: &[&ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
+/// Digests of the images sent in a condition.
+fn sent_digests(answers: &[&ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
     answers
         .iter()
         .filter(|answer| answer.condition.as_ref() == Some(condition))
@@ -195,11 +209,11 @@ fn sent(answers: &[&ShownAnswer], condition: &Condition) -> BTreeSet<Digest> {
         .collect()
 }
 
-/// The reply of each model in a condition, or without an image. Replies are escaped, so that they cannot send control
-/// characters to the terminal.
-fn replies(answers: &[&ShownAnswer], condition: Option<&Condition>) -> String {
+/// Replies in a condition, one line per answer; `None` selects the answers without an image. Replies are escaped, so that they
+/// cannot send control characters to the terminal.
+fn reply_lines(answers: &[&ShownAnswer], condition: Option<&Condition>) -> String {
     let mut text = String::new();
-    let without = if condition.is_none() {
+    let note = if condition.is_none() {
         " without an image"
     } else {
         ""
@@ -214,7 +228,7 @@ fn replies(answers: &[&ShownAnswer], condition: Option<&Condition>) -> String {
             reply,
             ..
         } = answer;
-        let _ = writeln!(text, "  {model}{without}: {outcome}: {reply:?}");
+        let _ = writeln!(text, "  {model}{note}: {outcome}: {reply:?}");
     }
     text
 }

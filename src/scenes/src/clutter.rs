@@ -1,4 +1,4 @@
-//! The small things that lie about: on furniture, on the floor and on walls.
+//! Clutter: small things on furniture, on the floor and on walls.
 
 use glam::{Vec3, vec2, vec3};
 
@@ -8,9 +8,9 @@ use super::plan::{FloorArea, FloorPlan};
 use super::scene::{Piece, Pose};
 use super::shell::WALLS;
 
-/// Furniture that things lie on: its word, the place of the table of parts whose things lie there, the height of the surface in
-/// metres (0 for its top), and the share of the depth from which on it is free.
-const TOPS: [(&str, &str, f32, f32); 15] = [
+/// Furniture that carries clutter: its word, the place name of its clutter in the parts table, the height of the surface in metres (0
+/// for the top of the furniture), and the share of the depth, from the back, that remains empty.
+const SURFACES: [(&str, &str, f32, f32); 15] = [
     ("desk", "desk", 0.0, 0.0),
     ("coffee table", "living", 0.0, 0.0),
     ("side table", "living", 0.0, 0.0),
@@ -28,24 +28,25 @@ const TOPS: [(&str, &str, f32, f32); 15] = [
     ("sofa", "sofa", 0.46, 0.3),
 ];
 
-/// The number of things per square metre of a surface (chosen), before the factor of a room.
+/// Number of things per square metre of a surface (chosen), before scaling by the mess of the room. Three placements are tried for each.
 const DENSITY: f32 = 9.0;
-/// The gap in metres between things that lie next to each other.
+/// Minimum gap between adjacent things, in metres.
 const GAP: f32 = 0.006;
 
-fn meet([low, high]: &[Vec3; 2], [other_low, other_high]: &[Vec3; 2]) -> bool {
+/// True if two bounding boxes overlap or are closer than [`GAP`].
+fn boxes_overlap([low, high]: &[Vec3; 2], [other_low, other_high]: &[Vec3; 2]) -> bool {
     low.cmplt(*other_high + GAP).all() && other_low.cmplt(*high + GAP).all()
 }
 
 impl FloorPlan {
-    /// Adds small things to a furnished room; `floor` is the place of the table of parts whose things stand on its floor.
+    /// Adds small things to a furnished room; `floor` is the place name of the floor things in the parts table.
     pub(super) fn clutter(&mut self, floor: &str) {
         let mess = self.dice.between(0.4, 1.6);
         for thing in 0..self.scene.things.len() {
             let word = self.scene.things[thing].kind.word;
-            let top = TOPS.iter().find(|(known, ..)| *known == word);
+            let top = SURFACES.iter().find(|(known, ..)| *known == word);
             if let Some((_, place, height, from)) = top {
-                self.fill(thing, place, [*height, *from], mess);
+                self.add_on_top(thing, place, [*height, *from], mess);
             }
         }
         for _ in 0..(3.5 * mess) as usize {
@@ -59,8 +60,9 @@ impl FloorPlan {
         }
     }
 
-    /// Adds things on top of a thing.
-    fn fill(&mut self, thing: usize, place: &str, [height, from]: [f32; 2], mess: f32) {
+    /// Adds clutter to the surface of a thing. `place` is a place name in the parts table, `height` the height of the surface in metres (0
+    /// for the top), `from` the empty share of its depth.
+    fn add_on_top(&mut self, thing: usize, place: &str, [height, from]: [f32; 2], mess: f32) {
         let pose = self.scene.things[thing].pose;
         let corners = self
             .scene
@@ -74,7 +76,7 @@ impl FloorPlan {
         for corner in corners.map(|at| pose.to_piece(at)) {
             (low, high) = (low.min(corner), high.max(corner));
         }
-        // Things on high furniture are not seen from below.
+        // Things on high furniture are invisible from below.
         let top = if height > 0.0 { height } else { high.y };
         if top > 1.7 {
             return;
@@ -94,15 +96,18 @@ impl FloorPlan {
             let [x, z] = [0, 2].map(|axis| self.dice.between(low[axis], high[axis]));
             let angle = pose.angle + self.dice.between(-0.5, 0.5);
             let foot = at(pose.to_room(vec3(x, top + 0.001, z)), angle);
-            let corners = base(&piece).map(|corner| foot.to_room(corner));
-            if corners.iter().all(|corner| self.is_above(thing, *corner)) {
+            let corners = lower_corners(&piece).map(|corner| foot.to_room(corner));
+            if corners
+                .iter()
+                .all(|corner| self.is_on_surface(thing, *corner))
+            {
                 self.add_if_free(piece, foot, Some(thing));
             }
         }
     }
 
-    /// Whether a point is just above an upper side of a thing.
-    fn is_above(&self, thing: usize, place: Vec3) -> bool {
+    /// True if a point is over or under a horizontal triangle of a thing, within 12 mm in height.
+    fn is_on_surface(&self, thing: usize, point: Vec3) -> bool {
         let flat = |v: Vec3| vec2(v.x, v.z);
         self.scene
             .mesh
@@ -114,19 +119,20 @@ impl FloorPlan {
                 if *owner != thing
                     || !corners
                         .into_iter()
-                        .all(|corner| (place.y - corner.y).abs() < 0.012)
+                        .all(|corner| (point.y - corner.y).abs() < 0.012)
                 {
                     return false;
                 }
-                let [a, b, c] = corners.map(|corner| flat(corner) - flat(place));
+                let [a, b, c] = corners.map(|corner| flat(corner) - flat(point));
                 let turns = [a.perp_dot(b), b.perp_dot(c), c.perp_dot(a)];
                 turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
             })
     }
 
-    /// Adds a piece unless it would meet another thing than the one that it lies on.
+    /// Adds a piece and returns true, unless it would leave the room or overlap a thing other than `below`. Things lower than 2 cm, such as
+    /// rugs, do not block it.
     fn add_if_free(&mut self, piece: Piece, pose: Pose, below: Option<usize>) -> bool {
-        let space = piece
+        let bounding_box = piece
             .mesh
             .faces
             .iter()
@@ -135,12 +141,15 @@ impl FloorPlan {
             .fold([Vec3::MAX, Vec3::MIN], |[low, high], at| {
                 [low.min(at), high.max(at)]
             });
-        let blocked = self.boxes.iter().enumerate().any(|(thing, other)| {
+        let is_blocked = self.boxes.iter().enumerate().any(|(thing, other)| {
             let is_flat = other[1].y - other[0].y < 0.02;
-            Some(thing) != below && !is_flat && meet(&space, other)
+            Some(thing) != below && !is_flat && boxes_overlap(&bounding_box, other)
         });
-        let inside = space[0].x > 0.0 && space[0].z > 0.0;
-        if blocked || !inside || space[1].x > self.size.x || space[1].z > self.size.z {
+        let is_inside = bounding_box[0].x > 0.0
+            && bounding_box[0].z > 0.0
+            && bounding_box[1].x <= self.size.x
+            && bounding_box[1].z <= self.size.z;
+        if is_blocked || !is_inside {
             return false;
         }
         self.add(piece, pose);
@@ -169,8 +178,8 @@ impl FloorPlan {
     }
 }
 
-/// The corners of the lower side of the bounding box of a piece.
-fn base(piece: &Piece) -> [Vec3; 4] {
+/// Lower corners of the bounding box of a piece, projected to height 0.
+fn lower_corners(piece: &Piece) -> [Vec3; 4] {
     let [low, high] = bounds(&piece.mesh.faces);
     [
         (low.x, low.z),

@@ -1,9 +1,9 @@
 //! The built-in rooms: images of furnished rooms with exact ground truth, generated from a seed.
 //!
-//! Each scene is one room of one of six kinds. Rules and random draws furnish it with parametric pieces (`furniture`); windows
-//! and lamps light it. Two frames show it: from the eye height of a person, and from that of a small robot. Frames are ray
-//! traced, so image, depth, classes and segments agree in every pixel. Seed, number and size decide a frame: the bytes are
-//! the same on every machine and for every number of threads. No model was trained on these rooms.
+//! Each scene is one room of one of six kinds. Rules and random draws furnish the room with parametric pieces (`furniture`); windows
+//! and lamps light it. Each scene has two frames: one from the eye height of a person, one from the camera height of a small robot.
+//! Frames are ray traced, so image, depth, classes and segments agree in every pixel. Seed, frame index and image size determine a
+//! frame: its bytes are the same on every machine and for any number of threads. No model was trained on these rooms.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -49,17 +49,17 @@ use darkqa_ground::labels;
 use darkqa_ground::types::values::Recent;
 use darkqa_ground::types::{Digest, Frame, FrameId, Labels, Light, Pixels, Rgb, SegmentName};
 
-/// The version of the generator. Any change of a pixel or a name needs another version.
+/// Version of the generator. Any change of a pixel or a name needs a new version.
 pub const VERSION: u32 = 2;
 
-/// The label space of the semantic maps.
-const SPACE: &str = "mpcat40";
+/// Name of the label space of the semantic maps.
+const LABEL_SPACE: &str = "mpcat40";
 
-/// The maximum size of the frame cache in bytes: the 48 frames of the default data set, which are drawn once for their questions and
-/// their images.
+/// Maximum size of the frame cache, in bytes. The 48 frames of the default data set fit in, so each is drawn only once for its
+/// questions and its image.
 const CACHE_BYTES: usize = 104 << 20;
 
-/// The number of frames of a size that fit into the cache; at least one.
+/// Number of frames of a size, in pixels, that fit in the cache; at least one.
 fn cached_frames([width, height]: [usize; 2], light: RoomLight) -> usize {
     let bytes = match light {
         RoomLight::Display => DrawnRoom::BYTES_PER_PIXEL,
@@ -68,7 +68,7 @@ fn cached_frames([width, height]: [usize; 2], light: RoomLight) -> usize {
     (CACHE_BYTES / (width * height * bytes).max(1)).max(1)
 }
 
-/// One frame of the rooms, by its index; drawn only when needed.
+/// One frame of a set of rooms, drawn only when needed.
 #[derive(Debug, Clone)]
 pub struct Room {
     rooms: Rooms,
@@ -76,40 +76,40 @@ pub struct Room {
     cache: Arc<Recent<usize, Arc<DrawnRoom>>>,
 }
 
-/// The ground truth of a frame, for checking questions.
+/// Ground truth of a frame, for checking questions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoomTruth {
-    /// The kind of the room, as `living room`.
+    /// Kind of the room, such as `living room`.
     pub room: &'static str,
-    /// Everything in the room, in the order of the segment numbers, which start at 1.
+    /// All things in the room, in order of their segment numbers, which start at 1.
     pub things: Vec<ThingTruth>,
 }
 
-/// The maximum distance in metres between neighbouring points at which the surface of a thing is sampled (chosen).
-const SPACING: f32 = 0.06;
+/// Maximum distance between neighbouring sample points on the surface of a thing, in metres (chosen).
+const SAMPLE_SPACING: f32 = 0.06;
 
-/// The ground truth of one thing in the room.
+/// Ground truth of one thing in the room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThingTruth {
-    /// The name of the thing, as `coffee table`.
+    /// Name of the thing, such as `coffee table`.
     pub word: &'static str,
-    /// The class of the thing in mpcat40.
+    /// Class of the thing in mpcat40.
     pub class: &'static str,
-    /// The name of its main colour; empty if people would not agree on one.
+    /// Name of the main colour; empty if people would not agree on one.
     pub color: &'static str,
-    /// The distance in metres from the camera to the nearest point of the thing within the view, hidden or not. The error is
-    /// a few centimetres. `f32::MAX` if no point is within the view.
+    /// Distance from the camera to the nearest point of the thing in the field of view, even if that point is hidden, in metres. It is
+    /// accurate to a few centimetres. `f32::MAX` if no point is in the field of view.
     pub near: f32,
 }
 
 impl Rooms {
-    /// The name of the data set. It depends on the seed only.
+    /// Name of the data set; it depends only on the seed.
     #[must_use]
     pub fn title(&self) -> String {
         format!("rooms-{}", self.seed)
     }
 
-    /// The frames with their ids. Nothing is drawn yet.
+    /// All frames with their ids, without drawing them.
     pub fn all(self) -> impl Iterator<Item = (FrameId, Room)> {
         let cache = Arc::new(Recent::new(cached_frames(self.size, self.light)));
         (0..self.frames).map(move |index| {
@@ -123,10 +123,10 @@ impl Rooms {
     }
 }
 
-/// The labels of the semantic maps.
+/// Labels of the semantic maps.
 #[must_use]
 pub fn labels() -> Labels {
-    labels::space(SPACE).unwrap_or_default()
+    labels::space(LABEL_SPACE).unwrap_or_default()
 }
 
 impl Room {
@@ -142,14 +142,14 @@ impl Room {
         }
     }
 
-    /// The name of the scene, as `living-room-0003`.
+    /// Name of the scene, such as `living-room-0003`.
     #[must_use]
     pub fn scene(&self) -> String {
         let number = self.index / 2 / RoomKind::ALL.len();
         format!("{}-{number:04}", self.kind().name().replace(' ', "-"))
     }
 
-    /// The name of the frame within its scene: the height of the camera, `eye` or `robot`.
+    /// Name of the frame within its scene, after the camera height: `eye` or `robot`.
     #[must_use]
     pub fn view(&self) -> &'static str {
         self.height().name()
@@ -159,7 +159,7 @@ impl Room {
         FrameId(format!("{}/{}", self.scene(), self.view()))
     }
 
-    /// The digest of everything that decides the pixels of the frame.
+    /// Digest of everything that determines the pixels of the frame.
     #[must_use]
     pub fn digest(&self) -> Digest {
         let [width, height] = self.rooms.size.map(|side| (side as u64).to_le_bytes());
@@ -180,13 +180,13 @@ impl Room {
         Digest::from_parts(parts.into_iter().chain(light))
     }
 
-    /// Width and height in pixels.
+    /// Image width and height in pixels.
     #[must_use]
     pub fn size(&self) -> [usize; 2] {
         self.rooms.size
     }
 
-    /// The focal length in pixels.
+    /// Focal length in pixels.
     #[must_use]
     pub fn focal(&self) -> f64 {
         f64::from(camera::focal(self.rooms.size))
@@ -204,14 +204,14 @@ impl Room {
         viewpoint::camera(plan, tree, self.height(), self.rooms.size, &mut dice)
     }
 
-    /// The ground truth of the frame.
+    /// Ground truth of the frame.
     #[must_use]
     pub fn truth(&self) -> RoomTruth {
         let (plan, camera) = (self.plan(), self.drawn().camera);
         let mut near = vec![f32::MAX; plan.scene.things.len()];
         for (face, owner) in plan.scene.mesh.faces.iter().zip(&plan.scene.owners) {
             let nearest = face
-                .points(SPACING)
+                .points(SAMPLE_SPACING)
                 .filter(|point| camera.sees(*point))
                 .map(|point| point.distance(camera.at));
             near[*owner] = nearest.fold(near[*owner], f32::min);
@@ -230,24 +230,24 @@ impl Room {
         }
     }
 
-    /// The frame with its maps, from the cache or drawn.
+    /// The frame with its image and maps, drawn unless it is in the cache.
     ///
     /// # Errors
-    /// If a map has another size than the image, which cannot happen.
+    /// If the image and a map differ in size, which cannot happen.
     pub fn frame(&self) -> Result<Frame> {
         let drawn = self.drawn();
         drawn.frame(Rgb::clone(&drawn.rgb))
     }
 
-    /// The frame with its maps and another image of its size.
+    /// The frame with its maps and a given image in place of its own.
     ///
     /// # Errors
-    /// If the image has another size.
+    /// If the image and the maps differ in size.
     pub fn frame_with(&self, rgb: Rgb) -> Result<Frame> {
         self.drawn().frame(rgb)
     }
 
-    /// The pixels of the frame: linear light if it is drawn, else codes of a display.
+    /// Pixels of the frame: linear light if the rooms are drawn in linear light, else 8-bit display codes.
     #[must_use]
     pub fn pixels(&self) -> Pixels {
         let drawn = self.drawn();
@@ -257,18 +257,19 @@ impl Room {
         }
     }
 
-    /// The linear light of the frame; `None` if only codes of a display are drawn.
+    /// Linear light of the frame; `None` if the rooms are drawn in display codes only.
     #[must_use]
     pub fn light(&self) -> Option<Arc<Light>> {
         self.drawn().light.clone()
     }
 
-    /// Whether the pixels of the frame are linear light.
+    /// True if the pixels of the frame are linear light.
     #[must_use]
     pub fn is_light(&self) -> bool {
         self.rooms.light == RoomLight::Linear
     }
 
+    /// The drawn frame, from the cache if possible.
     fn drawn(&self) -> Arc<DrawnRoom> {
         let Ok(drawn) = self
             .cache
@@ -282,7 +283,7 @@ impl Room {
         let camera = self.camera(&plan, &tree);
         let view = render::render(&plan.scene, &tree, &camera, self.rooms.light);
         let things = &plan.scene.things;
-        let classes = things.iter().map(|thing| number(thing.kind.class));
+        let classes = things.iter().map(|thing| class_number(thing.kind.class));
         let names = things.iter().zip(1..).map(|(thing, number)| {
             let name = SegmentName {
                 name: thing.kind.word.to_owned(),
@@ -308,15 +309,15 @@ impl Room {
         }
     }
 
-    /// The camera pose in metres: a matrix from the camera (x right, y up, z backwards) to the room, row by row.
+    /// Camera pose in metres: the row-major matrix from camera coordinates (x right, y up, z backwards) to room coordinates.
     #[must_use]
     pub fn pose(&self) -> [f32; 16] {
         self.drawn().camera.pose()
     }
 }
 
-/// The number of a class in the label space.
-fn number(class: &str) -> u16 {
+/// Number of a class in the label space; 0 if the class is unknown.
+fn class_number(class: &str) -> u16 {
     static NUMBERS: LazyLock<BTreeMap<String, u16>> = LazyLock::new(|| {
         let labels = labels().labels;
         labels
@@ -333,7 +334,7 @@ mod tests {
     use darkqa_ground::labels::names::{Meaning, meaning};
 
     #[test]
-    fn words_have_the_classes_that_they_have_in_other_data_sets() {
+    fn words_have_the_classes_of_other_data_sets() {
         let rooms = Rooms {
             frames: 120,
             seed: 1,
@@ -348,10 +349,10 @@ mod tests {
         }
         assert!(kinds.len() > 40, "{kinds:?}");
         for (word, class) in kinds {
-            assert_ne!(number(class), 0, "{class} is no class");
+            assert_ne!(class_number(class), 0, "{class} is no class");
             match meaning(word) {
                 Meaning::Class(known) => assert_eq!(class, known, "{word}"),
-                // Words that no data set has may have any class, but they are listed here.
+                // A word that no data set uses may have any class, but this list must name it.
                 Meaning::Nothing | Meaning::Unlisted => {
                     assert!(
                         ["desk lamp", "bowl of fruit", "mug", "wall", "tv"].contains(&word),
@@ -363,23 +364,22 @@ mod tests {
     }
 
     #[test]
-    fn the_trees_of_rooms_are_not_too_deep() {
+    fn room_trees_stay_below_maximum_depth() {
         let rooms = Rooms {
             frames: 120,
             ..Rooms::default()
         };
         let deepest = rooms
             .all()
-            .map(|(_, room)| room.plan().scene.tree())
             .step_by(2)
-            .map(|tree| tree.depth())
+            .map(|(_, room)| room.plan().scene.tree().depth())
             .max()
             .unwrap();
         assert!((5..Bvh::MAX_DEPTH - 4).contains(&deepest), "{deepest}");
     }
 
     #[test]
-    fn the_default_rooms_are_drawn_once() {
+    fn default_rooms_fit_in_the_cache() {
         let rooms = Rooms {
             frames: 2,
             seed: 1,
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn a_room_alone_is_the_room_in_a_row() {
+    fn drawing_order_does_not_change_frames() {
         for light in [RoomLight::Display, RoomLight::Linear] {
             let rooms = Rooms {
                 frames: 40,
@@ -413,8 +413,8 @@ mod tests {
                 let light = room.light().map(|light| light.samples().to_vec());
                 (frame.id, frame.rgb, maps, frame.names, light)
             };
-            // The views of room 17, drawn before any other, and after those of the rooms before it.
-            let some = |first, count| {
+            // Both frames of scene 17, drawn first, and drawn after the frames of scenes 15 and 16.
+            let draw_frames = |first, count| {
                 let rooms: Vec<Room> = rooms
                     .all()
                     .map(|(_, room)| room)
@@ -423,8 +423,8 @@ mod tests {
                     .collect();
                 rooms.iter().map(drawn).collect::<Vec<_>>()
             };
-            let (alone, row) = (some(34, 2), some(30, 6));
-            assert!(alone == row[4..]);
+            let (alone, in_a_row) = (draw_frames(34, 2), draw_frames(30, 6));
+            assert!(alone == in_a_row[4..]);
             assert!(alone[0] != alone[1]);
         }
     }

@@ -1,4 +1,4 @@
-//! The floor plan of a room: four walls, and the places of everything that stands and hangs ([`FloorPlan`]).
+//! Floor plan of a room: four walls, and the occupied areas of floor and walls ([`FloorPlan`]).
 
 use glam::{Vec3, vec3};
 
@@ -10,18 +10,19 @@ use super::scene::{Piece, Pose, Scene, kind};
 use super::shell::{Flooring, Shell, THICK, WALLS, Wall, flooring};
 use super::surface::Surface;
 
-/// A rectangle of the floor in metres: minimum x and z, maximum x and z.
+/// Rectangle of the floor in metres: minimum x and z, then maximum x and z.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FloorArea(pub(super) [f32; 4]);
 
 impl FloorArea {
-    fn meets(&self, other: &Self, margin: f32) -> bool {
+    /// True if the rectangles overlap after one of them is enlarged by `margin` metres on every side.
+    fn overlaps(&self, other: &Self, margin: f32) -> bool {
         let [a, b] = [self.0, other.0];
         a[0] < b[2] + margin && b[0] < a[2] + margin && a[1] < b[3] + margin && b[1] < a[3] + margin
     }
 }
 
-/// A rectangle of a wall in metres: its bounds along the wall, and its bounds in height.
+/// Rectangle of a wall in metres: its bounds along the wall and in height.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WallPatch {
     wall: Wall,
@@ -30,33 +31,35 @@ pub(super) struct WallPatch {
 }
 
 impl WallPatch {
-    /// The rectangle that reaches equally far to both sides of a position along the wall.
+    /// Rectangle that extends by `reach` metres to both sides of a position along the wall.
     pub(super) fn around(wall: Wall, along: f32, reach: f32, up: [f32; 2]) -> Self {
         let along = [along - reach, along + reach];
         Self { wall, along, up }
     }
 }
 
-/// A room while it is furnished.
+/// A room being furnished.
 pub(super) struct FloorPlan {
     pub(super) scene: Scene,
     /// Width (x), height (y) and depth (z) in metres.
     pub(super) size: Vec3,
     pub(super) dice: Dice,
-    /// The indices of things that the camera should look at.
+    /// Indices of the things that the camera should look at.
     pub(super) focus_things: Vec<usize>,
-    /// The bounding box of each thing: its lowest and its highest corner.
+    /// Bounding box of each thing: its lowest and its highest corner.
     pub(super) boxes: Vec<[Vec3; 2]>,
     pub(super) shell: Shell,
+    /// Parts of the floor that are occupied or reserved.
     areas: Vec<FloorArea>,
+    /// Parts of the walls that are occupied or reserved.
     patches: Vec<WallPatch>,
 }
 
-/// The number of places that are tried for a piece before it is left out (chosen).
+/// Number of random places tried for a piece before it is left out (chosen).
 const TRIES: usize = 60;
 
 impl FloorPlan {
-    /// An empty room of a size, with floor and ceiling. Its walls are added when all doors are known.
+    /// Creates an empty room with floor and ceiling. [`FloorPlan::walls`] adds the walls once all doorways are known.
     pub(super) fn new(size: Vec3, ground: Flooring, tiled: bool, mut dice: Dice) -> Self {
         let shell = Shell::new(tiled, &mut dice);
         let mut plan = Self {
@@ -73,7 +76,6 @@ impl FloorPlan {
         plan
     }
 
-    /// Adds the floor and the ceiling.
     pub(super) fn floor_and_ceiling(&mut self, ground: Flooring) {
         let size = self.size;
         let surface = flooring(ground, &mut self.dice);
@@ -89,39 +91,39 @@ impl FloorPlan {
         self.add(ceiling, at(Vec3::ZERO, 0.0));
     }
 
-    /// Adds the four walls, with their doorways.
+    /// Adds the four walls, cut out at the doorways.
     pub(super) fn walls(&mut self) {
         for (i, wall) in WALLS.into_iter().enumerate() {
             let width = self.width(wall);
-            let mut holes: Vec<([f32; 2], f32)> = self
+            let mut openings: Vec<([f32; 2], f32)> = self
                 .shell
                 .doorways
                 .iter()
-                .filter(|(of, ..)| *of == wall)
+                .filter(|(doorway_wall, ..)| *doorway_wall == wall)
                 .map(|(_, along, top)| (along.map(|x| x - width / 2.0), *top))
                 .collect();
-            holes.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
+            openings.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
             let [left, right] = [-width / 2.0 - THICK, width / 2.0 + THICK];
-            let (mut mesh, mut from) = (Mesh::default(), left);
-            for ([start, end], top) in holes {
-                self.panel(&mut mesh, i, [from, start], 0.0);
-                self.panel(&mut mesh, i, [start, end], top);
-                from = end;
+            let (mut mesh, mut built_to) = (Mesh::default(), left);
+            for ([start, end], top) in openings {
+                self.add_panel(&mut mesh, i, [built_to, start], 0.0);
+                self.add_panel(&mut mesh, i, [start, end], top);
+                built_to = end;
             }
-            self.panel(&mut mesh, i, [from, right], 0.0);
+            self.add_panel(&mut mesh, i, [built_to, right], 0.0);
             let pose = self.wall_pose(wall, width / 2.0, 0.0);
             self.add(Piece::new(kind("wall", "wall"), mesh, ""), pose);
         }
     }
 
-    /// Adds a part of a wall above a height to its mesh.
-    fn panel(&self, mesh: &mut Mesh, wall: usize, [left, right]: [f32; 2], from: f32) {
+    /// Adds the part of a wall between `left` and `right` to its mesh, from the height `bottom` up to the ceiling. Metres.
+    fn add_panel(&self, mesh: &mut Mesh, wall: usize, [left, right]: [f32; 2], bottom: f32) {
         let shell = &self.shell;
-        let high = vec3(right, self.size.y, 0.0);
-        mesh.block(vec3(left, from, -THICK), high, &shell.walls[wall]);
-        let mut layer = |surface: &Surface, top: f32, out: f32| {
-            if top > from {
-                mesh.block(vec3(left, from, 0.0), vec3(right, top, out), surface);
+        let corner = vec3(right, self.size.y, 0.0);
+        mesh.block(vec3(left, bottom, -THICK), corner, &shell.walls[wall]);
+        let mut layer = |surface: &Surface, top: f32, depth: f32| {
+            if top > bottom {
+                mesh.block(vec3(left, bottom, 0.0), vec3(right, top, depth), surface);
             }
         };
         match &shell.lower {
@@ -133,7 +135,7 @@ impl FloorPlan {
         }
     }
 
-    /// The length of a wall in metres.
+    /// Length of a wall in metres.
     pub(super) fn width(&self, wall: Wall) -> f32 {
         match wall {
             Wall::North | Wall::South => self.size.x,
@@ -141,7 +143,7 @@ impl FloorPlan {
         }
     }
 
-    /// The pose of a piece with its back at a wall, `along` metres from its left end and `up` metres high.
+    /// Pose of a piece with its back at a wall, `along` metres from the left end of the wall and `up` metres above the floor.
     pub(super) fn wall_pose(&self, wall: Wall, along: f32, up: f32) -> Pose {
         let place = match wall {
             Wall::North => vec3(along, up, 0.0),
@@ -152,7 +154,7 @@ impl FloorPlan {
         at(place, wall.angle())
     }
 
-    /// Adds a piece without a check for free space, and returns its index.
+    /// Adds a piece without checking for free space. Returns its index.
     #[expect(clippy::needless_pass_by_value, reason = "a piece is added once")]
     pub(super) fn add(&mut self, piece: Piece, pose: Pose) -> usize {
         let faces = self.scene.mesh.faces.len();
@@ -161,7 +163,7 @@ impl FloorPlan {
         self.scene.things.len() - 1
     }
 
-    /// Adds a piece on or next to another one, at a place in the coordinates of that one. Returns its index.
+    /// Adds a piece on or next to another one, whose pose is `base`; `place` is in the coordinates of `base`. Returns its index.
     pub(super) fn add_relative(
         &mut self,
         base: &Pose,
@@ -172,6 +174,7 @@ impl FloorPlan {
         self.add(piece, at(base.to_room(place), base.angle + angle))
     }
 
+    /// Adds a set without checking for free space. Returns the index of its first piece.
     pub(super) fn add_set(&mut self, set: FurnitureSet, pose: &Pose) -> usize {
         let first = self.scene.things.len();
         for (piece, relative) in set.pieces {
@@ -180,7 +183,8 @@ impl FloorPlan {
         first
     }
 
-    fn area(pose: &Pose, size: Vec3, from: f32) -> FloorArea {
+    /// Floor area of a box of this size. Its back is `from` metres in front of the pose; the angle must be a multiple of 90°.
+    fn footprint(pose: &Pose, size: Vec3, from: f32) -> FloorArea {
         let corners = [
             vec3(-size.x / 2.0, 0.0, from),
             vec3(size.x / 2.0, 0.0, from + size.z),
@@ -190,15 +194,17 @@ impl FloorPlan {
         FloorArea([low.x, low.z, high.x, high.z])
     }
 
+    /// True if an area is inside the room and at least 4 cm from every occupied area.
     pub(super) fn is_free(&self, area: &FloorArea) -> bool {
         let FloorArea([left, back, right, front]) = *area;
         left > 0.0
             && back > 0.0
             && right < self.size.x
             && front < self.size.z
-            && !self.areas.iter().any(|other| other.meets(area, 0.04))
+            && !self.areas.iter().any(|other| other.overlaps(area, 0.04))
     }
 
+    /// True if a patch overlaps no occupied patch of its wall.
     pub(super) fn is_free_on_wall(&self, patch: &WallPatch) -> bool {
         !self.patches.iter().any(|other| {
             other.wall == patch.wall
@@ -209,11 +215,11 @@ impl FloorPlan {
         })
     }
 
-    /// Places a set at a wall, `along` metres from its left end. Returns its pose; `None` if something is in the way.
+    /// Places a set with its middle `along` metres from the left end of a wall. Returns its pose; `None` if something is in the way.
     pub(super) fn stand_at(&mut self, set: FurnitureSet, wall: Wall, along: f32) -> Option<Pose> {
         let pose = self.wall_pose(wall, along, 0.0);
         let pose = at(pose.to_room(vec3(0.0, 0.0, 0.016)), pose.angle);
-        let area = Self::area(&pose, set.size, 0.0);
+        let area = Self::footprint(&pose, set.size, 0.0);
         let half = set.size.x / 2.0;
         let patch = WallPatch::around(wall, along, half, [0.0, set.size.y + 0.02]);
         if !self.is_free(&area) || !self.is_free_on_wall(&patch) {
@@ -225,7 +231,7 @@ impl FloorPlan {
         Some(pose)
     }
 
-    /// Places a set at a random place of one of these walls; `None` if there is no space.
+    /// Places a set at a random place of one of these walls. Returns its pose; `None` without free space.
     pub(super) fn stand(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
             let wall = self.dice.pick(choices);
@@ -235,7 +241,7 @@ impl FloorPlan {
         })
     }
 
-    /// Places a set at an end of one of these walls, in the corner; `None` if there is no space.
+    /// Places a set in a random corner, with its back to one of these walls. Returns its pose; `None` without free space.
     pub(super) fn corner(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
             let wall = self.dice.pick(choices);
@@ -249,7 +255,7 @@ impl FloorPlan {
         })
     }
 
-    /// Places a set away from walls, with its middle at a place. Returns its pose; `None` if something is in the way.
+    /// Places a set away from walls, centred on a place. Returns its pose; `None` if something is in the way.
     pub(super) fn stand_free(
         &mut self,
         set: FurnitureSet,
@@ -258,7 +264,7 @@ impl FloorPlan {
     ) -> Option<Pose> {
         let back = at(place, angle).to_room(vec3(0.0, 0.0, -set.size.z / 2.0));
         let pose = at(back, angle);
-        let area = Self::area(&pose, set.size, 0.0);
+        let area = Self::footprint(&pose, set.size, 0.0);
         if !self.is_free(&area) {
             return None;
         }
@@ -267,18 +273,18 @@ impl FloorPlan {
         Some(pose)
     }
 
-    /// Reserves a part of a wall, so that nothing is hung there.
+    /// Reserves a part of a wall: nothing is hung or placed there.
     pub(super) fn keep_wall_free(&mut self, patch: WallPatch) {
         self.patches.push(patch);
     }
 
-    /// Reserves a part of the floor in front of a pose, so that later sets stay out of it.
+    /// Reserves a part of the floor, from `from` metres in front of a pose. Later sets are kept out of it.
     pub(super) fn keep_free(&mut self, pose: &Pose, size: Vec3, from: f32) {
-        let area = Self::area(pose, size, from);
+        let area = Self::footprint(pose, size, from);
         self.areas.push(area);
     }
 
-    /// Hangs a piece on one of these walls at height `up`; `None` if there is no free place.
+    /// Hangs a piece on one of these walls, `up` metres high. Returns its pose; `None` without free space.
     pub(super) fn hang(&mut self, piece: &Piece, choices: &[Wall], up: f32) -> Option<Pose> {
         let [low, high] = bounds(&piece.mesh.faces);
         let half = high.x.max(-low.x) + 0.06;
@@ -296,7 +302,7 @@ impl FloorPlan {
         })
     }
 
-    /// Hangs a piece above a pose at a wall, without a check for free space. Returns its index.
+    /// Hangs a piece `up` metres above a pose at a wall without checking for free space. Returns its index.
     pub(super) fn hang_above(&mut self, pose: &Pose, piece: Piece, up: f32) -> usize {
         let [low, high] = bounds(&piece.mesh.faces);
         let wall = WALLS
@@ -318,12 +324,12 @@ impl FloorPlan {
         self.add_relative(pose, piece, vec3(0.0, up, 0.0), 0.0)
     }
 
-    /// Whether a camera can be at a place of the floor, with `margin` metres to walls and furniture.
+    /// True if a place of the floor is at least `margin` metres from walls and furniture, so that a camera fits.
     pub(super) fn walkable(&self, place: Vec3, margin: f32) -> bool {
         let point = FloorArea([place.x, place.z, place.x, place.z]);
         let inside = |value: f32, end: f32| (margin..=end - margin).contains(&value);
         inside(place.x, self.size.x)
             && inside(place.z, self.size.z)
-            && !self.areas.iter().any(|area| area.meets(&point, margin))
+            && !self.areas.iter().any(|area| area.overlaps(&point, margin))
     }
 }

@@ -1,4 +1,4 @@
-//! The point where a ray hits a thing: [`Spot`].
+//! Point where a ray hits a thing of the scene: [`Spot`].
 
 use glam::Vec3;
 
@@ -6,9 +6,10 @@ use super::bvh::{Bvh, Hit, Ray};
 use super::scene::Scene;
 use super::surface::SurfaceFinish;
 
-/// The point where a ray hits a thing, with the properties of the surface there.
+/// Point where a ray hits a thing of the scene, with the properties of the surface there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spot {
+    /// Position in the scene, in metres.
     pub(super) at: Vec3,
     /// The surface normal, on the side that the ray came from.
     pub(super) normal: Vec3,
@@ -16,34 +17,38 @@ pub(super) struct Spot {
     pub(super) color: Vec3,
     /// The light that the surface emits, by channel.
     pub(super) glow: Vec3,
-    /// The index of the first thing that the ray hits.
+    /// Index of the first thing that the ray hits; a mirror counts.
     pub(super) thing: usize,
-    /// The index of the thing whose colour is seen; another one if the first is a mirror.
+    /// Index of the thing whose surface is visible: the reflected thing if `thing` is a mirror, otherwise `thing`.
     pub(super) seen_thing: usize,
-    /// The distance to the first thing along the ray, in metres.
+    /// Distance along the ray to `thing`, in metres.
     pub(super) distance: f32,
     /// Whether the surface has a highlight.
     pub(super) glossy: Gloss,
 }
 
-/// Whether a face has a highlight.
+/// Whether a surface has a highlight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Gloss {
     Dull,
     Shiny,
 }
 
-/// A distance in metres beyond the length of any room.
+/// Longest distance that a ray travels, in metres; larger than any room.
 pub(super) const FAR: f32 = 100.0;
 
+/// Share of light that a mirror reflects.
+const MIRROR_REFLECTANCE: f32 = 0.92;
+
 impl Spot {
-    /// The first point that a ray hits; a mirror counts as a thing.
+    /// The first point that a ray hits; mirrors are ordinary surfaces. `None` if the ray hits nothing.
     pub(super) fn first(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;
         Some(Self::new(scene, ray, hit))
     }
 
-    /// The first point that a ray hits; a mirror takes the colour of its reflection.
+    /// The first point that a ray hits. If it is on a mirror, the point that the mirror reflects, with the `thing` and `distance` of the
+    /// mirror; a second mirror is an ordinary surface. `None` if the ray or its reflection hits nothing.
     pub(super) fn through_mirror(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;
         let spot = Self::new(scene, ray, hit);
@@ -51,10 +56,11 @@ impl Spot {
             return Some(spot);
         }
         let direction = reflected(ray.direction, spot.normal);
-        let back = Ray::new(spot.at + spot.normal * 1e-3, direction).wide(ray.spread);
-        let mirrored = Self::first(scene, tree, &back)?;
+        // The reflected ray starts 1 mm above the mirror, so that it does not hit the mirror again.
+        let reflection = Ray::new(spot.at + spot.normal * 1e-3, direction).wide(ray.spread);
+        let mirrored = Self::first(scene, tree, &reflection)?;
         Some(Self {
-            color: mirrored.color * 0.92,
+            color: mirrored.color * MIRROR_REFLECTANCE,
             thing: spot.thing,
             distance: spot.distance,
             glossy: Gloss::Dull,
@@ -62,6 +68,7 @@ impl Spot {
         })
     }
 
+    /// Interpolates the normal at a hit and evaluates the surface there.
     fn new(scene: &Scene, ray: &Ray, hit: Hit) -> Self {
         let face = &scene.mesh.faces[hit.face];
         let thing = scene.owners[hit.face];
@@ -75,14 +82,13 @@ impl Spot {
         let at = ray.from + ray.direction * hit.distance;
         let pose = &scene.things[thing].pose;
         let slant = normal.dot(ray.direction).abs().max(0.1);
-        let pixel = hit.distance * ray.spread / slant.sqrt();
-        let turned = pose.direction_to_piece(normal);
-        let color = surface.color_at(pose.to_piece(at), turned, pixel);
-        let (color, glow) = match surface.finish {
-            SurfaceFinish::Glow(strength) => (color, color * strength),
-            SurfaceFinish::Matte | SurfaceFinish::Glossy | SurfaceFinish::Mirror => {
-                (color, Vec3::ZERO)
-            }
+        // Geometric mean width of the ray on the surface, in metres: a slanted surface widens it in one direction.
+        let footprint = hit.distance * ray.spread / slant.sqrt();
+        let local_normal = pose.direction_to_piece(normal);
+        let color = surface.color_at(pose.to_piece(at), local_normal, footprint);
+        let glow = match surface.finish {
+            SurfaceFinish::Glow(strength) => color * strength,
+            SurfaceFinish::Matte | SurfaceFinish::Glossy | SurfaceFinish::Mirror => Vec3::ZERO,
         };
         Self {
             at,
@@ -101,7 +107,7 @@ impl Spot {
     }
 }
 
-/// A direction after reflection by a surface.
+/// Reflects a direction by a surface with a unit normal.
 pub(super) fn reflected(direction: Vec3, normal: Vec3) -> Vec3 {
     direction - normal * (2.0 * direction.dot(normal))
 }

@@ -1,4 +1,4 @@
-//! The tests that the sentences of a report rest on, corrected together: [`Findings::correct_sentences`].
+//! Multiple-testing correction of the tests behind the sentences of a report: [`Findings::correct_sentences`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,54 +15,56 @@ use super::subject::{ModelInCondition, judged};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Variant};
 
-/// A test, by its place in the findings.
+/// A test, with the index of its finding where several exist.
 #[derive(Debug, Clone, Copy)]
 enum Test {
+    /// One level, pooled over models.
     Pooled(usize),
-    /// Several levels of a set together.
+    /// Mean of several levels, pooled over models.
     Averaged(usize),
     Comparison(usize),
-    /// The leader in the dark is the best.
+    /// The leading model in the dark is the best.
     Best,
     /// The order of two models changes with the level.
     Crossing,
+    /// Answer collapse.
     Collapse(usize),
-    /// Confidence above accuracy.
+    /// Confidence exceeds accuracy.
     Overconfident(usize),
-    /// Further above than at L0.
-    Grown(usize),
-    /// PSNR tells right from wrong answers.
+    /// Overconfidence is larger than at L0.
+    Growth(usize),
+    /// PSNR separates right from wrong answers.
     Fidelity,
 }
 
-/// Weight of the main questions: the cost of darkness, the effect of each enhancer, the best model, and photographs in the dark.
+/// Weight of each main question: the cost of darkness, the effect of each enhancer, the best model, and photographs in the dark.
 const MAIN: f64 = 1.0;
 
-/// Weight of noise beside the exposure drop.
+/// Weight of the noise tests, if the run has noise as well as the exposure drop.
 const NOISE: f64 = 0.5;
 
-/// Weight of all other questions together; they concern how accuracy is lost, not how much.
+/// Weight of all other questions together. They concern the way in which accuracy is lost, not the amount.
 const FURTHER: f64 = 0.5;
 
-/// Weight of a variant that sentences name only if it differs from the main one, beside the main one.
+/// Weight of a secondary variant relative to a main one (1). Sentences name it only if its result differs from that of the main one.
 const OTHER_VARIANT: f64 = 0.25;
 
 type Tests = TestTree<Test>;
 
-/// Contents of a run that decide how the level is shared.
+/// Contents of a run that decide how the significance level is divided between its tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AskedSets {
     pub models: usize,
     pub enhancers: usize,
-    /// Number of variants of the last kind of degradation: of noise profiles, if noise is asked.
+    /// Number of variants of the last degradation kind: the noise profiles, if the run has noise.
     pub lights: usize,
-    /// Whether noise is asked beside the exposure drop.
+    /// True if the run has noise as well as the exposure drop.
     pub has_noise: bool,
 }
 
 impl AskedSets {
-    /// The level at which a report first tests what an enhancer does to the darker levels of a light; without enhancers, what darkness
-    /// costs. Later tests of the same questions have the same level or a larger one.
+    /// Significance level of the first test of an enhancer at the darker levels of one variant; without enhancers, of the first test of
+    /// the cost of darkness. Later tests of the same question have this level or a larger one.
     #[must_use]
     pub fn first_level(self) -> f64 {
         let rank = u32::from(self.models > 1);
@@ -79,23 +81,23 @@ impl AskedSets {
 }
 
 impl Findings<'_> {
-    /// Corrects all tests that sentences rest on, in each parsing for itself.
+    /// Corrects the p-values of all tests behind sentences, separately for each parsing of the replies.
     pub(super) fn correct_sentences(&mut self) {
-        let tests = tests(self);
+        let tree = report_tests(self);
         for mode in ReadingMode::ALL {
-            for (test, p) in adjusted(&tests, |test| test.p(self, mode)) {
-                test.set(self, mode, p);
+            for (test, p) in adjusted(&tree, |test| test.p(self, mode)) {
+                test.set_p_report(self, mode, p);
             }
         }
-        self.tests = tests.count();
+        self.tests = tree.count();
     }
 }
 
-/// The tests of a report. They depend on the questions asked, never on the answers.
-fn tests(findings: &Findings<'_>) -> Tests {
-    let sets = pooled(findings);
-    let of_kind = |is_of: &dyn Fn(PooledKind) -> bool| {
-        let sets = sets.iter().filter(|set| is_of(set.kind));
+/// Tree of all tests of a report. It depends on the questions asked, never on the answers.
+fn report_tests(findings: &Findings<'_>) -> Tests {
+    let sets = pooled_sets(findings);
+    let of_kind = |kind: PooledKind| {
+        let sets = sets.iter().filter(|set| set.kind == kind);
         TestTree::group(sets.map(|set| set.tests(findings)))
     };
     let names: BTreeSet<&EnhancerName> = sets.iter().filter_map(|set| set.enhancer).collect();
@@ -108,29 +110,31 @@ fn tests(findings: &Findings<'_>) -> Tests {
         .as_ref()
         .filter(|best| best.is_possible())
         .map(|_| [Test::Best, Test::Crossing].map(TestTree::leaf));
-    let fidelity = findings.fidelity.as_ref();
-    let fidelity = fidelity.filter(|found| found.within[0].is_some());
+    let fidelity = findings
+        .fidelity
+        .as_ref()
+        .filter(|fidelity| fidelity.within[0].is_some());
     let further = [
-        of_kind(&|kind| kind == PooledKind::Blind),
+        of_kind(PooledKind::Blind),
         below_blind(findings),
-        of_kind(&|kind| kind == PooledKind::Hallucination(FalseAnswer::No)),
-        of_kind(&|kind| kind == PooledKind::Hallucination(FalseAnswer::Yes)),
+        of_kind(PooledKind::Hallucination(FalseAnswer::No)),
+        of_kind(PooledKind::Hallucination(FalseAnswer::Yes)),
         collapses(findings),
         confidence(findings),
         TestTree::group(fidelity.map(|_| TestTree::leaf(Test::Fidelity))),
     ];
-    let main = [of_kind(&|kind| kind == PooledKind::Darkness)]
+    let main = [of_kind(PooledKind::Darkness)]
         .into_iter()
         .chain(enhancers)
         .chain([TestTree::group(best.into_iter().flatten())])
         .chain(photographs(findings));
-    let noise = of_kind(&|kind| kind == PooledKind::Noise).weighing(NOISE);
+    let noise = of_kind(PooledKind::Noise).weighing(NOISE);
     let branches = main.map(|branch| branch.weighing(MAIN));
     TestTree::group(branches.chain([noise, TestTree::group(further).weighing(FURTHER)]))
 }
 
-/// Whether sentences are about raw or enhanced images of a variant: those of the last kind of each root. The others have sentences about
-/// darkness alone.
+/// True for a main variant: it has the last degradation kind of its root, or no kind. Sentences about all other variants are limited to
+/// the cost of darkness.
 fn is_main(grid: &Grid<'_>, variant: &Variant) -> bool {
     let root = variant.kind.map(Kind::root);
     let last = grid
@@ -142,17 +146,18 @@ fn is_main(grid: &Grid<'_>, variant: &Variant) -> bool {
     variant.kind.is_none() || last == Some(variant.kind)
 }
 
-/// A set of pooled findings, by their places in ascending order of levels.
-struct PooledTests<'f> {
+/// Pooled findings of one kind, variant and enhancer.
+struct PooledSet<'f> {
     kind: PooledKind,
     variant: &'f Variant,
     enhancer: Option<&'f EnhancerName>,
+    /// Finding of each level with its index, in ascending order of levels.
     levels: Vec<(usize, &'f PooledFinding)>,
 }
 
-/// The sets in which a verdict is possible and that sentences are about.
-fn pooled<'f>(findings: &'f Findings<'_>) -> Vec<PooledTests<'f>> {
-    let mut sets: Vec<PooledTests<'f>> = Vec::new();
+/// Sets of pooled findings that sentences report, if a verdict is possible at one of their levels.
+fn pooled_sets<'f>(findings: &'f Findings<'_>) -> Vec<PooledSet<'f>> {
+    let mut sets: Vec<PooledSet<'f>> = Vec::new();
     for (index, finding) in findings.pooled.iter().enumerate() {
         if finding.family.as_ref() != finding.kind.only_family() {
             continue;
@@ -163,7 +168,7 @@ fn pooled<'f>(findings: &'f Findings<'_>) -> Vec<PooledTests<'f>> {
             .find(|set| (set.kind, set.variant, set.enhancer) == (kind, variant, enhancer));
         match known {
             Some(set) => set.levels.push((index, finding)),
-            None => sets.push(PooledTests {
+            None => sets.push(PooledSet {
                 kind,
                 variant,
                 enhancer,
@@ -179,8 +184,9 @@ fn pooled<'f>(findings: &'f Findings<'_>) -> Vec<PooledTests<'f>> {
     sets
 }
 
-impl PooledTests<'_> {
-    /// The tests of the set. The single levels of a tested mean follow it, from the outermost one on.
+impl PooledSet<'_> {
+    /// Tree of the tests of the set. Single levels come after their mean: the severe ones from the darkest level, the mild ones from the
+    /// brightest. If the effect grows with the level, all levels come after the means, from the darkest one.
     fn tests(&self, findings: &Findings<'_>) -> Tests {
         let weight = if is_main(&findings.grid, self.variant) {
             1.0
@@ -197,7 +203,7 @@ impl PooledTests<'_> {
                     && mean.enhancer.as_ref() == self.enhancer
             })
             .collect();
-        let tests = |levels: &[(usize, &PooledFinding)]| -> Vec<Test> {
+        let level_tests = |levels: &[(usize, &PooledFinding)]| -> Vec<Test> {
             levels
                 .iter()
                 .map(|(index, _)| Test::Pooled(*index))
@@ -205,7 +211,7 @@ impl PooledTests<'_> {
         };
         if self.kind.grows_with_the_level() {
             let means = averaged.iter().map(|(index, _)| Test::Averaged(*index));
-            let mut levels = tests(&self.levels);
+            let mut levels = level_tests(&self.levels);
             levels.reverse();
             let chain: Vec<Test> = means.chain(levels).collect();
             return TestTree::chain(chain.into_iter()).weighing(weight);
@@ -215,11 +221,10 @@ impl PooledTests<'_> {
         let mean = |is_severe: bool| {
             averaged
                 .iter()
-                .filter(|(_, mean)| mean.is_severe() == is_severe)
+                .find(|(_, mean)| mean.is_severe() == is_severe)
                 .map(|(index, _)| Test::Averaged(*index))
-                .next()
         };
-        let mut severe_tests = tests(&severe);
+        let mut severe_tests = level_tests(&severe);
         severe_tests.reverse();
         let branch = |mean: Option<Test>, levels: Vec<Test>| match mean {
             Some(mean) => TestTree::chain(
@@ -233,13 +238,13 @@ impl PooledTests<'_> {
         };
         TestTree::group([
             branch(mean(true), severe_tests),
-            branch(mean(false), tests(&mild)),
+            branch(mean(false), level_tests(&mild)),
         ])
         .weighing(weight)
     }
 }
 
-/// Each family of each model against the words alone, from the darkest level on.
+/// Comparisons of each family and model with the blind baseline, in order from the darkest level.
 fn below_blind(findings: &Findings<'_>) -> Tests {
     let mut chains = BTreeMap::<_, Vec<Test>>::new();
     for (index, comparison) in findings.comparisons.iter().enumerate() {
@@ -252,16 +257,13 @@ fn below_blind(findings: &Findings<'_>) -> Tests {
             && findings.models_of(&first.variant).contains(&&*first.model)
             && comparison.strict.significance.is_possible()
         {
-            let chain = (
+            let key = (
                 &first.model,
                 &second.model,
                 &comparison.family,
                 &first.variant,
             );
-            chains
-                .entry(chain)
-                .or_default()
-                .push(Test::Comparison(index));
+            chains.entry(key).or_default().push(Test::Comparison(index));
         }
     }
     TestTree::group(
@@ -271,7 +273,7 @@ fn below_blind(findings: &Findings<'_>) -> Tests {
     )
 }
 
-/// Tests about photographs in the dark: their cost, whether synthetic images can replace them, and the effect of enhancers.
+/// Tests on dark photographs: the cost of darkness, the difference from synthetic images, and the effect of enhancers.
 fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
     let models = judged(findings.grid.subjects.iter().map(|subject| &*subject.model));
     let kinds = [
@@ -299,7 +301,7 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
         .into()
 }
 
-/// The subjects of raw images at the darkest level of each main variant, of the models over which findings are pooled.
+/// Subjects with raw images at the darkest level of each main variant, limited to the models that findings are pooled over.
 fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
     let grid = &findings.grid;
     let raw: Vec<&ModelInCondition> = grid
@@ -314,7 +316,7 @@ fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
                     .contains(&&*subject.model)
         })
         .collect();
-    let level = |variant: &Variant| -> Option<AxisLevel> {
+    let darkest_level = |variant: &Variant| -> Option<AxisLevel> {
         raw.iter()
             .filter(|subject| subject.variant == *variant)
             .filter_map(|subject| subject.level)
@@ -322,11 +324,11 @@ fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
     };
     raw.iter()
         .copied()
-        .filter(|subject| subject.level == level(&subject.variant))
+        .filter(|subject| subject.level == darkest_level(&subject.variant))
         .collect()
 }
 
-/// Answer collapse of each model in each family.
+/// Tests of answer collapse, one per model and family.
 fn collapses(findings: &Findings<'_>) -> Tests {
     let darkest = darkest(findings);
     let tested = findings
@@ -339,12 +341,12 @@ fn collapses(findings: &Findings<'_>) -> Tests {
     TestTree::group(tested.map(|(index, _)| TestTree::leaf(Test::Collapse(index))))
 }
 
-/// The commonest answer of a subject against that at L0.
+/// Comparison of a subject's most common answer with L0, if one was computed.
 fn against_clean(confusion: &Confusion) -> Option<&AgainstClean> {
     confusion.collapse.as_ref()?.clean.as_ref()
 }
 
-/// The confidence of each model: above its accuracy, then further above than at L0.
+/// Tests of each model's confidence: overconfidence, then its growth since L0.
 fn confidence(findings: &Findings<'_>) -> Tests {
     if findings.grid.clusters < MIN_SCENES {
         return TestTree::group([]);
@@ -354,13 +356,13 @@ fn confidence(findings: &Findings<'_>) -> Tests {
         row.replies >= LEAST_CONFIDENT_REPLIES && darkest.contains(&&row.subject)
     });
     TestTree::group(tested.map(|(index, row)| {
-        let grown = row.growth.map(|_| TestTree::leaf(Test::Grown(index)));
+        let grown = row.growth.map(|_| TestTree::leaf(Test::Growth(index)));
         TestTree::before(Test::Overconfident(index), grown.into_iter().collect())
     }))
 }
 
 impl Test {
-    /// p-value before correction, in a parsing. Confidence and fidelity are computed in the strict one alone.
+    /// p-value before correction in a parsing; 1 if the test was not computed. Confidence and fidelity exist only in strict parsing.
     fn p(self, findings: &Findings<'_>, mode: ReadingMode) -> f64 {
         let best = match mode {
             ReadingMode::Strict => findings.best.as_ref(),
@@ -376,7 +378,7 @@ impl Test {
                 against_clean(&findings.confusions[index]).map(|clean| clean.p(mode))
             }
             Self::Overconfident(index) => Some(findings.calibrations[index].overconfidence.p),
-            Self::Grown(index) => findings.calibrations[index].growth.map(|growth| growth.p),
+            Self::Growth(index) => findings.calibrations[index].growth.map(|growth| growth.p),
             Self::Fidelity => findings
                 .fidelity
                 .as_ref()
@@ -385,8 +387,8 @@ impl Test {
         found.unwrap_or(1.0)
     }
 
-    /// Stores the p-value after correction.
-    fn set(self, findings: &mut Findings<'_>, mode: ReadingMode, p: f64) {
+    /// Stores the corrected p-value.
+    fn set_p_report(self, findings: &mut Findings<'_>, mode: ReadingMode, p: f64) {
         let p = Some(p);
         let best = match mode {
             ReadingMode::Strict => findings.best.as_mut(),
@@ -418,11 +420,11 @@ impl Test {
                     clean.p_report[mode as usize] = p;
                 }
             }
-            // The same in both parsings.
-            Self::Overconfident(_) | Self::Grown(_) | Self::Fidelity
+            // Confidence and fidelity have one p-value, from strict parsing.
+            Self::Overconfident(_) | Self::Growth(_) | Self::Fidelity
                 if mode == ReadingMode::Lenient => {}
             Self::Overconfident(index) => findings.calibrations[index].overconfidence.p_report = p,
-            Self::Grown(index) => {
+            Self::Growth(index) => {
                 if let Some(growth) = findings.calibrations[index].growth.as_mut() {
                     growth.p_report = p;
                 }

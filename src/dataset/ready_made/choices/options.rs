@@ -1,4 +1,4 @@
-//! The options of a row: [`Options`].
+//! The answer options in the columns of a row: [`Options`].
 
 use std::sync::Arc;
 
@@ -10,49 +10,50 @@ use crate::types::questions::letter;
 use crate::types::shell_word;
 use crate::types::text::excerpt;
 
-/// The options in the columns of a row.
+/// The answer options in the columns of a row.
 #[derive(Debug, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) enum Options {
-    /// No column has any.
+    /// No column has options.
     None,
+    /// The options; if several columns have options, all have the same texts.
     Found(Offered),
-    /// Two columns differ.
+    /// Two columns have different options: the names of both.
     Differ([String; 2]),
-    /// A cell that is no list of options, in words.
+    /// A cell cannot be read as options: the error message.
     Unread(String),
 }
 
 impl Options {
-    /// The options of a row in its columns.
+    /// Reads the options of a row from the columns that have this role.
     pub(in crate::dataset::ready_made) fn from_row(row: &Row, roles: &Roles) -> Self {
         let mut found: Vec<(String, Offered)> = Vec::new();
-        let cells = roles
+        let (texts, positions): (Vec<String>, Vec<usize>) = roles
             .cells
             .iter()
             .enumerate()
-            .filter_map(|(place, cell)| Some((option(cell.cell(row))?, place)));
-        let (texts, places): (Vec<String>, Vec<usize>) = cells.unzip();
+            .filter_map(|(position, column)| Some((single_option(column.cell(row))?, position)))
+            .unzip();
         if !texts.is_empty() {
-            let offered = Offered::placed(&without_letters(texts), places);
-            found.push((cell_names(&roles.cells), offered));
+            let offered = Offered::placed(&without_letters(texts), positions);
+            found.push((joined_names(&roles.cells), offered));
         }
         for column in &roles.options {
             let cell = column.cell(row);
             if cell.is_absent() {
                 continue;
             }
-            let split = roles.split_options.as_deref();
-            let offered = match by_letter(cell).filter(|_| split.is_none()) {
-                Some(fields) => options_in_fields(&fields).map_err(|problem| {
+            let separator = roles.split_options.as_deref();
+            let offered = match object_fields(cell).filter(|_| separator.is_none()) {
+                Some(fields) => lettered_options(&fields).map_err(|problem| {
                     let shown = cell.shown(60);
                     format!(
                         "the options in the column {:?} {problem}: {shown}",
                         column.name
                     )
                 }),
-                None => options(cell, split)
+                None => listed_options(cell, separator)
                     .map(|texts| Offered::listed(&without_letters(texts)))
-                    .ok_or_else(|| no_list(column, cell)),
+                    .ok_or_else(|| not_a_list(column, cell)),
             };
             match offered {
                 Ok(offered) if offered.texts.is_empty() => {}
@@ -71,7 +72,8 @@ impl Options {
     }
 }
 
-fn no_list(column: &Column, cell: &Cell) -> String {
+/// Error message for a cell that is not a list of options.
+fn not_a_list(column: &Column, cell: &Cell) -> String {
     let split = format!("{}:split(|)", column.name);
     format!(
         "the column {:?} holds no list of options: {}; --map options={} names the signs between them",
@@ -81,30 +83,31 @@ fn no_list(column: &Column, cell: &Cell) -> String {
     )
 }
 
-/// The fields of a cell that is an object, or the text of one in JSON or in Python's notation.
-fn by_letter(cell: &Cell) -> Option<Fields> {
+/// The fields of a cell that is an object, or a text with an object in JSON or a dictionary in Python's notation.
+fn object_fields(cell: &Cell) -> Option<Fields> {
     match cell {
         Cell::Fields(fields) => Some(fields.clone()),
-        Cell::Text(text) => {
-            let pairs = dict(text)?.into_iter();
-            Some(
-                pairs
-                    .map(|(name, text)| (name.into(), text.map_or(Cell::Absent, Cell::Text)))
-                    .collect(),
-            )
-        }
+        Cell::Text(text) => Some(
+            dict(text)?
+                .into_iter()
+                .map(|(name, text)| (name.into(), text.map_or(Cell::Absent, Cell::Text)))
+                .collect(),
+        ),
         _ => None,
     }
 }
 
-/// The options of an object whose fields are the letters from A on, of either case.
-fn options_in_fields(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
+/// The options of an object with the field names A, B, C and so on, in upper or lower case.
+///
+/// # Errors
+/// If a name is not the next letter, or a value is not a text. The message continues a sentence about the options.
+fn lettered_options(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
     let mut sorted: Vec<(char, &Cell)> = Vec::with_capacity(fields.len());
     for (name, cell) in fields {
         let mut chars = name.trim().chars();
         match (chars.next(), chars.next()) {
-            (Some(name), None) if name.is_ascii_alphabetic() => {
-                sorted.push((name.to_ascii_uppercase(), cell));
+            (Some(key), None) if key.is_ascii_alphabetic() => {
+                sorted.push((key.to_ascii_uppercase(), cell));
             }
             _ => {
                 return Err(format!(
@@ -114,48 +117,51 @@ fn options_in_fields(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
             }
         }
     }
-    sorted.sort_by_key(|(name, _)| *name);
-    for (place, (name, _)) in sorted.iter().enumerate() {
-        let expected = letter(place);
-        if *name != expected {
-            return Err(format!("have {name} where {expected} is expected"));
+    sorted.sort_by_key(|(key, _)| *key);
+    for (position, (key, _)) in sorted.iter().enumerate() {
+        let expected = letter(position);
+        if *key != expected {
+            return Err(format!("have {key} where {expected} is expected"));
         }
     }
-    let (mut texts, mut places) = (Vec::new(), Vec::new());
-    for (place, (name, cell)) in sorted.into_iter().enumerate() {
-        match option(cell) {
+    let (mut texts, mut positions) = (Vec::new(), Vec::new());
+    for (position, (key, cell)) in sorted.into_iter().enumerate() {
+        match single_option(cell) {
             Some(text) => {
                 texts.push(text);
-                places.push(place);
+                positions.push(position);
             }
             None if cell.is_absent() => {}
-            None => return Err(format!("hold no text at {name}")),
+            None => return Err(format!("hold no text at {key}")),
         }
     }
-    Ok(Offered::placed(&without_letters(texts), places))
+    Ok(Offered::placed(&without_letters(texts), positions))
 }
 
-/// The names of the columns of options as `--map` takes them.
-fn cell_names(cells: &[Column]) -> String {
-    let names: Vec<&str> = cells.iter().map(|cell| cell.name.as_str()).collect();
+/// The names of columns with commas between them, as in the value of `--map`.
+fn joined_names(columns: &[Column]) -> String {
+    let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
     names.join(",")
 }
 
-/// The option in a cell of its own. `None` is a word that a choice may be, so it is none only where nothing stands at all.
-fn option(cell: &Cell) -> Option<String> {
+/// The option in a cell with one option; `None` if the cell has no text or its text is `nan` or `n/a`.
+///
+/// The word `none` is kept, because it can be an option.
+fn single_option(cell: &Cell) -> Option<String> {
     let text = cell.text()?;
-    let is_nothing = matches!(&*text.trim().to_ascii_lowercase(), "nan" | "n/a");
-    (!is_nothing).then_some(text)
+    let is_missing = matches!(&*text.trim().to_ascii_lowercase(), "nan" | "n/a");
+    (!is_missing).then_some(text)
 }
 
-/// The options in a cell.
-fn options(cell: &Cell, split: Option<&str>) -> Option<Vec<String>> {
-    match (cell, split) {
+/// The options of a cell that lists them, as a list or as text, split at `separator` if given; `None` if it lists no options.
+fn listed_options(cell: &Cell, separator: Option<&str>) -> Option<Vec<String>> {
+    match (cell, separator) {
         (Cell::List(cells), _) => cells.iter().map(Cell::text).collect(),
-        (Cell::Text(text), Some(signs)) => {
-            let parts = text.split(signs).map(|part| part.trim().to_owned());
-            Some(parts.collect())
-        }
+        (Cell::Text(text), Some(separator)) => Some(
+            text.split(separator)
+                .map(|part| part.trim().to_owned())
+                .collect(),
+        ),
         (Cell::Text(text), None) => list(text).or_else(|| in_cell(text)),
         _ => None,
     }

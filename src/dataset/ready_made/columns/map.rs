@@ -1,4 +1,4 @@
-//! Which column is which, as the user states: [`Map`].
+//! Column mapping given by the user with `--map`: [`Map`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,20 +7,20 @@ use super::names::Role;
 use crate::dataset::ready_made::choices::Reading;
 use crate::types::shell_word;
 
-/// The value of `--map`: roles and their columns.
+/// Value of `--map`: roles and their columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Map {
     text: String,
     pub(in crate::dataset::ready_made) entries: Vec<Entry>,
 }
 
-/// One role of a map.
+/// One `role=column` entry of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) struct Entry {
     pub(super) role: Role,
-    /// A column, several (cells of options, images) or a template with `{Column}`; none turns the role off.
+    /// One column, several (for options or images) or a template with `{Column}`; empty turns the role off.
     pub(in crate::dataset::ready_made) columns: Vec<String>,
-    /// The same names as one, which holds commas if there are several: a column of that name goes first.
+    /// Text of `columns` before it was split at commas. A column with exactly this name takes precedence.
     pub(super) whole: String,
     pub(in crate::dataset::ready_made) how: How,
 }
@@ -28,34 +28,34 @@ pub(in crate::dataset::ready_made) struct Entry {
 /// How the cells of a column are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) enum How {
-    /// By rule.
+    /// By the default rules: no reading was given.
     ByRule,
-    /// Options in one text, between these signs.
+    /// As options in one cell, separated by this text.
     Split(String),
-    /// Answers by this reading.
+    /// As answers, in this reading.
     Answer(Reading),
 }
 
-/// A column for a role as a flag that a shell can read, with the reading of answers if one is named.
+/// Writes a `--map` flag for one column, quoted for the shell, with the reading of answers if one is given.
 pub(in crate::dataset::ready_made) fn flag(
     role: Role,
     column: &str,
     reading: Option<Reading>,
 ) -> String {
-    let how = match reading {
+    let suffix = match reading {
         Some(reading) => format!(":{}", reading.name()),
-        // What follows the last colon is how the column is read: here, by rule.
+        // Ends a column name that contains a colon: the text after the last colon is the reading, and an empty one means the rules.
         None if column.contains(':') && matches!(role, Role::Options | Role::Answer) => {
             ":".to_owned()
         }
         None => String::new(),
     };
-    let value = format!("{column}{how}");
+    let value = format!("{column}{suffix}");
     format!("--map {}={}", role.name(), shell_word(&value))
 }
 
 impl Map {
-    /// The maps as one. A later one wins over an earlier one, role by role.
+    /// Merges maps. An entry replaces earlier ones of the same role.
     pub(in crate::dataset::ready_made) fn joined<'a>(
         maps: impl IntoIterator<Item = &'a Self>,
     ) -> Self {
@@ -69,7 +69,6 @@ impl Map {
         joined
     }
 
-    /// The entry of a role.
     pub(in crate::dataset::ready_made) fn entry(&self, role: Role) -> Option<&Entry> {
         self.entries.iter().find(|entry| entry.role == role)
     }
@@ -85,7 +84,7 @@ impl FromStr for Map {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let starts: Vec<usize> = starts(text);
+        let starts = entry_starts(text);
         if starts.first() != Some(&0) {
             let roles = Role::ALL.map(Role::name).join(", ");
             return Err(format!(
@@ -96,7 +95,7 @@ impl FromStr for Map {
         let parts = starts.iter().zip(ends.chain([text.len()]));
         let mut entries: Vec<Entry> = Vec::new();
         for (start, end) in parts {
-            let entry = entry(&text[*start..end])?;
+            let entry = parse_entry(&text[*start..end])?;
             if entries.iter().any(|known| known.role == entry.role) {
                 return Err(format!("{} occurs twice", entry.role.name()));
             }
@@ -109,8 +108,8 @@ impl FromStr for Map {
     }
 }
 
-/// Where the entries of a map begin: at its start, and behind commas before `role=`.
-fn starts(text: &str) -> Vec<usize> {
+/// Byte offsets of the entries: each `role=` at the start of the text or after a comma.
+fn entry_starts(text: &str) -> Vec<usize> {
     let commas = text.match_indices(',').map(|(at, _)| at + 1);
     let is_role = |at: &usize| {
         let rest = &text[*at..];
@@ -120,25 +119,26 @@ fn starts(text: &str) -> Vec<usize> {
     std::iter::once(0).chain(commas).filter(is_role).collect()
 }
 
-fn entry(text: &str) -> Result<Entry, String> {
+/// Parses one entry: `role=column`, or `role=column:reading` for options and answers.
+fn parse_entry(text: &str) -> Result<Entry, String> {
     let (name, value) = text.split_once('=').ok_or("role=column expected")?;
     let name = name.trim();
-    let role = Role::ALL.into_iter().find(|role| role.name() == name);
-    let role = role.ok_or_else(|| format!("no role {name:?}"))?;
+    let role = Role::ALL
+        .into_iter()
+        .find(|role| role.name() == name)
+        .ok_or_else(|| format!("no role {name:?}"))?;
     let (column, how) = match (role, value.rsplit_once(':')) {
         (Role::Options | Role::Answer, Some((column, ""))) => (column, How::ByRule),
         (Role::Options, Some((column, how))) => {
-            let signs = how
+            let separator = how
                 .strip_prefix("split(")
-                .and_then(|how| how.strip_suffix(')'));
-            let signs = signs.filter(|signs| !signs.is_empty());
-            let signs =
-                signs.ok_or("options=COLUMN:split(|) expected, with the signs between options")?;
-            (column, How::Split(signs.to_owned()))
+                .and_then(|how| how.strip_suffix(')'))
+                .filter(|separator| !separator.is_empty())
+                .ok_or("options=COLUMN:split(|) expected, with the signs between options")?;
+            (column, How::Split(separator.to_owned()))
         }
         (Role::Answer, Some((column, how))) => {
-            let reading = Reading::from_name(how);
-            let reading = reading.ok_or_else(|| {
+            let reading = Reading::from_name(how).ok_or_else(|| {
                 let names = Reading::ALL.map(Reading::name).join(", ");
                 format!("answer=COLUMN:HOW expected, with one of {names}")
             })?;
@@ -146,10 +146,10 @@ fn entry(text: &str) -> Result<Entry, String> {
         }
         _ => (value, How::ByRule),
     };
-    let several = matches!(role, Role::Options | Role::Image) && !column.contains('{');
+    let is_list = matches!(role, Role::Options | Role::Image) && !column.contains('{');
     let columns = if column.is_empty() {
         Vec::new()
-    } else if several {
+    } else if is_list {
         column
             .split(',')
             .map(|column| column.trim().to_owned())
@@ -169,11 +169,12 @@ fn entry(text: &str) -> Result<Entry, String> {
 mod tests {
     use super::*;
 
+    const TEXT: &str = "id=nr,question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1,family=";
+
     #[test]
-    fn a_map_names_columns_by_role() {
-        let text = "id=nr,question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1,family=";
-        let map: Map = text.parse().unwrap();
-        assert_eq!(map.to_string(), text);
+    fn map_names_columns_by_role() {
+        let map: Map = TEXT.parse().unwrap();
+        assert_eq!(map.to_string(), TEXT);
         let columns = |role| map.entry(role).unwrap().columns.clone();
         assert_eq!(columns(Role::Image), ["pics/{bild}.png"]);
         assert_eq!(columns(Role::Family), Vec::<String>::new());
@@ -186,8 +187,11 @@ mod tests {
             How::Answer(Reading::Index1)
         );
         assert_eq!(map.entry(Role::Hint), None);
-        let cells: Map = "options=first,second:x,third".parse().unwrap_or_default();
-        assert_eq!(cells.entries, []);
+    }
+
+    #[test]
+    fn option_columns_split_at_commas() {
+        assert!("options=first,second:x,third".parse::<Map>().is_err());
         let cells: Map = "options=first,second,answer=truth".parse().unwrap();
         assert_eq!(
             cells.entry(Role::Options).unwrap().columns,
@@ -198,14 +202,19 @@ mod tests {
             comma.entry(Role::Options).unwrap().how,
             How::Split(",".into())
         );
+    }
+
+    #[test]
+    fn later_map_replaces_roles() {
+        let map: Map = TEXT.parse().unwrap();
         let both = Map::joined([&map, &"id=,answer=x".parse().unwrap()]);
         assert_eq!(both.entry(Role::Id).unwrap().columns, Vec::<String>::new());
         assert_eq!(both.entry(Role::Question).unwrap().columns, ["frage"]);
     }
 
     #[test]
-    fn a_wrong_map_is_refused_with_what_was_expected() {
-        for (text, says) in [
+    fn wrong_map_error_names_expected() {
+        for (text, expected) in [
             ("frage", "one of the roles question, image"),
             ("colour=frage", "one of the roles question, image"),
             ("id=a,id=b", "id occurs twice"),
@@ -213,7 +222,7 @@ mod tests {
             ("options=a:split()", "split(|) expected"),
         ] {
             let problem = text.parse::<Map>().unwrap_err();
-            assert!(problem.contains(says), "{text}: {problem}");
+            assert!(problem.contains(expected), "{text}: {problem}");
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Parquet files, as hubs of data sets ship them.
+//! Reader of Parquet files of data sets.
 //!
-//! Pass 1 goes over the rows one at a time and keeps the digests of images alone. Later the pages before an image are skipped by
-//! their headers, and one value is read.
+//! [`read()`] decodes every row once, for a table that keeps only the digests of images. [`bytes()`] later reads one image: it skips
+//! the pages before the image by their headers.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -23,14 +23,14 @@ use crate::error::{Error, Result};
 use crate::files::guarded::guarded;
 use crate::files::reading;
 
-/// How many rows are decoded at a time. Each holds its image until the next.
-const ROWS_AT_A_TIME: usize = 8;
+/// Rows that are decoded together; the images of all of them are in memory at once.
+const BATCH_ROWS: usize = 8;
 
 fn open(path: &Path) -> Result<File> {
     reading::open(path).map_err(|e| Error::file(path, "read", e))
 }
 
-/// The footer of a file, parsed once while the file is open.
+/// Footer of a Parquet file, parsed on first use.
 #[derive(Debug, Default)]
 pub(super) struct Footer(OnceLock<Arc<ParquetMetaData>>);
 
@@ -47,12 +47,13 @@ impl Footer {
                 .and_then(|()| reader.finish())
                 .map_err(|e| e.to_string())
         });
-        let footer = footer.map_err(|problem| wrong(path, &problem))?;
+        let footer = footer.map_err(|problem| corrupt_file(path, &problem))?;
         Ok(Arc::clone(self.0.get_or_init(|| Arc::new(footer))))
     }
 }
 
-fn wrong(path: &Path, problem: &str) -> Error {
+/// Error for a file that the Parquet library cannot read.
+fn corrupt_file(path: &Path, problem: &str) -> Error {
     let problem = problem.trim_start_matches("Parquet error: ");
     Error::data(
         path.display(),
@@ -66,10 +67,13 @@ pub(super) fn count(path: &Path) -> Result<u64> {
     Ok(u64::try_from(rows).unwrap_or(0))
 }
 
-/// Adds the rows of a file.
+/// Appends the rows of a file to a table.
+///
+/// # Errors
+/// If the file is corrupt, a compression codec is not supported, or there are too many rows or too many bytes in a row.
 pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()> {
     check_codecs(path, &*footer.metadata(path)?)?;
-    // The footer alone tells it, before a row is read.
+    // The footer has the number of rows: reject a large file before reading any row.
     let stated = footer.metadata(path)?.file_metadata().num_rows();
     if usize::try_from(stated).is_ok_and(|rows| rows > MOST_ROWS) {
         return Err(Error::data(path.display(), too_many_rows()));
@@ -77,9 +81,12 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
     let file = open(path)?;
     let mut columns: Vec<(String, usize)> = Vec::new();
     let mut too_long = None;
-    let mut add = |place: RowPlace, record: Record| -> Result<(), String> {
-        let fields = record.get_column_iter();
-        if fields.map(|(_, field)| length(field)).sum::<usize>() > LONGEST_ROW {
+    let mut add_row = |place: RowPlace, record: Record| -> Result<(), String> {
+        let size: usize = record
+            .get_column_iter()
+            .map(|(_, field)| byte_length(field))
+            .sum();
+        if size > LONGEST_ROW {
             let problem = format!("more than {} MB in a row", LONGEST_ROW >> 20);
             too_long = Some((place, problem.clone()));
             return Err(problem);
@@ -95,50 +102,50 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
         }
         table.push(place, cells)
     };
-    let walk = || {
+    let read_rows = || {
         let reader = SerializedFileReader::new(file).map_err(|e| e.to_string())?;
         let mut number = 0;
         for group in 0..reader.num_row_groups() {
             let rows = reader.get_row_group(group).map_err(|e| e.to_string())?;
             let records = parquet::record::reader::TreeBuilder::new()
-                .with_batch_size(ROWS_AT_A_TIME)
+                .with_batch_size(BATCH_ROWS)
                 .as_iter(reader.metadata().file_metadata().schema_descr_ptr(), &*rows)
                 .map_err(|e| e.to_string())?;
             for (row, record) in records.enumerate() {
                 number += 1;
                 let record = record.map_err(|e| format!("row {number}: {e}"))?;
-                add(RowPlace::Parquet { group, row, number }, record)?;
+                add_row(RowPlace::Parquet { group, row, number }, record)?;
             }
         }
         Ok(())
     };
-    guarded(walk).map_err(|problem| match too_long {
+    guarded(read_rows).map_err(|problem| match too_long {
         Some((row, problem)) => Error::data(format_args!("{}, {row}", path.display()), problem),
-        None => wrong(path, &problem),
+        None => corrupt_file(path, &problem),
     })
 }
 
-/// The length of a value in bytes; numbers count as 8.
-fn length(field: &Field) -> usize {
+/// Size of a value in bytes; numbers count as 8.
+fn byte_length(field: &Field) -> usize {
     match field {
         Field::Null => 0,
         Field::Str(text) => text.len(),
         Field::Bytes(bytes) => bytes.len(),
         Field::Group(record) => record
             .get_column_iter()
-            .map(|(_, field)| length(field))
+            .map(|(_, field)| byte_length(field))
             .sum(),
-        Field::ListInternal(list) => list.elements().iter().map(length).sum(),
+        Field::ListInternal(list) => list.elements().iter().map(byte_length).sum(),
         Field::MapInternal(map) => map
             .entries()
             .iter()
-            .map(|(key, value)| length(key) + length(value))
+            .map(|(key, value)| byte_length(key) + byte_length(value))
             .sum(),
         _ => size_of::<u64>(),
     }
 }
 
-/// Refuses a column whose compression is not read.
+/// Rejects a file with a compression codec that is not supported.
 fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
     let columns = footer
         .row_groups()
@@ -146,14 +153,14 @@ fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
         .flat_map(RowGroupMetaData::columns);
     for column in columns {
         let codec = column.compression();
-        let is_read = matches!(
+        let is_supported = matches!(
             codec,
             Compression::UNCOMPRESSED
                 | Compression::SNAPPY
                 | Compression::GZIP(_)
                 | Compression::ZSTD(_)
         );
-        if !is_read {
+        if !is_supported {
             let problem = format!(
                 "the column {:?} is compressed by {codec}, which is not read; write the file again: python -c \"import pyarrow.parquet as p; p.write_table(p.read_table('{}'), 'again.parquet')\"",
                 column.column_path().string(),
@@ -165,7 +172,7 @@ fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
     Ok(())
 }
 
-/// A value of a record.
+/// Converts a Parquet value to a cell. NaN is an absent cell; types without a cell of their own become text.
 fn cell_of(field: Field) -> Cell {
     let number = |text: String| Cell::Number(text.into());
     match field {
@@ -185,14 +192,13 @@ fn cell_of(field: Field) -> Cell {
         Field::UShort(value) => number(value.to_string()),
         Field::UInt(value) => number(value.to_string()),
         Field::ULong(value) => number(value.to_string()),
-        Field::Group(record) => {
-            let fields = record.into_columns().into_iter();
-            Cell::Fields(
-                fields
-                    .map(|(name, field)| (name.into(), cell_of(field)))
-                    .collect(),
-            )
-        }
+        Field::Group(record) => Cell::Fields(
+            record
+                .into_columns()
+                .into_iter()
+                .map(|(name, field)| (name.into(), cell_of(field)))
+                .collect(),
+        ),
         Field::ListInternal(list) => {
             Cell::List(list.elements().iter().cloned().map(cell_of).collect())
         }
@@ -200,22 +206,22 @@ fn cell_of(field: Field) -> Cell {
     }
 }
 
-/// A reader of one leaf that stays where it is: the next image is mostly a few rows further on.
+/// Reader of one leaf column of a row group. It keeps its position between calls, because the next image is usually a few rows ahead.
 struct Cursor {
     path: PathBuf,
     group: usize,
     leaf: usize,
-    /// The row that is read next.
+    /// Index in the row group of the next row to read.
     next: usize,
     reader: ColumnReaderImpl<ByteArrayType>,
-    /// The level of a value that is there.
-    defined: i16,
-    /// Whether a row may hold several values.
+    /// Definition level of a value that is not null.
+    max_definition: i16,
+    /// Whether a row can have several values.
     is_list: bool,
 }
 
 thread_local! {
-    /// The cursor of this thread. Each thread goes through the images in the order of their file.
+    /// Cursor of this thread. One is enough, because a thread reads the images of a file in order.
     static CURSOR: RefCell<Option<Cursor>> = const { RefCell::new(None) };
 }
 
@@ -227,11 +233,11 @@ impl Cursor {
         leaf: usize,
     ) -> Result<Self, String> {
         let file = reading::open(path).map_err(|e| e.to_string())?;
-        let of_group = &footer.row_groups()[group];
-        let chunk = &of_group.columns()[leaf];
-        let rows = usize::try_from(of_group.num_rows()).unwrap_or(0);
-        let pages = SerializedPageReader::new(Arc::new(file), chunk, rows, None);
-        let pages = pages.map_err(|e| e.to_string())?;
+        let row_group = &footer.row_groups()[group];
+        let chunk = &row_group.columns()[leaf];
+        let rows = usize::try_from(row_group.num_rows()).unwrap_or(0);
+        let pages = SerializedPageReader::new(Arc::new(file), chunk, rows, None)
+            .map_err(|e| e.to_string())?;
         let reader = get_column_reader(chunk.column_descr_ptr(), Box::new(pages));
         let ColumnReader::ByteArrayColumnReader(reader) = reader else {
             return Err("no column of bytes".to_owned());
@@ -242,43 +248,54 @@ impl Cursor {
             leaf,
             next: 0,
             reader,
-            defined: chunk.column_descr().max_def_level(),
+            max_definition: chunk.column_descr().max_def_level(),
             is_list: chunk.column_descr().max_rep_level() > 0,
         })
     }
 
-    /// Whether the reader can go on to a row of a leaf.
-    fn reaches(&self, path: &Path, group: usize, leaf: usize, row: usize) -> bool {
+    /// True if the row is in the column of the cursor, at or after its position.
+    fn can_reach(&self, path: &Path, group: usize, leaf: usize, row: usize) -> bool {
         self.path == path && (self.group, self.leaf) == (group, leaf) && self.next <= row
     }
 
-    /// The value of a row; of a list, that of the item.
-    fn value(&mut self, row: usize, item: usize) -> Result<Vec<u8>, String> {
-        let text = |e: ParquetError| e.to_string();
-        self.reader.skip_records(row - self.next).map_err(text)?;
+    /// Reads the value of a row, or one item if the column is a list, and moves past the row.
+    fn read_value(&mut self, row: usize, item: usize) -> Result<Vec<u8>, String> {
+        let message = |e: ParquetError| e.to_string();
+        self.reader.skip_records(row - self.next).map_err(message)?;
         self.next = row + 1;
-        let (mut defined, mut repeated) = (Vec::new(), Vec::new());
+        let (mut definitions, mut repetitions) = (Vec::new(), Vec::new());
         let mut values: Vec<ByteArray> = Vec::new();
         self.reader
-            .read_records(1, Some(&mut defined), Some(&mut repeated), &mut values)
-            .map_err(text)?;
+            .read_records(
+                1,
+                Some(&mut definitions),
+                Some(&mut repetitions),
+                &mut values,
+            )
+            .map_err(message)?;
         let item = if self.is_list { item } else { 0 };
-        // Values are stored without the nulls between them.
-        let before = defined
-            .iter()
-            .take(item)
-            .filter(|level| **level == self.defined);
-        let at = if defined.is_empty() {
+        // `values` has no nulls: the index is the number of non-null items before this one.
+        let index = if definitions.is_empty() {
             item
         } else {
-            before.count()
+            definitions
+                .iter()
+                .take(item)
+                .filter(|level| **level == self.max_definition)
+                .count()
         };
-        let value = values.get(at).map(|value| value.data().to_vec());
-        value.ok_or_else(|| "the value is gone".to_owned())
+        values
+            .get(index)
+            .map(|value| value.data().to_vec())
+            .ok_or_else(|| "the value is gone".to_owned())
     }
 }
 
-/// The bytes of a value of bytes or text: in a column, at the steps inside its cell.
+/// Reads the bytes of one value of bytes or text. `row` counts from the start of row group `group`, and `steps` is the path to the value
+/// inside the cell of `column`.
+///
+/// # Errors
+/// If the file is corrupt or does not have this value.
 pub(super) fn bytes(
     (path, footer): (&Path, &Footer),
     (group, row): (usize, usize),
@@ -296,31 +313,33 @@ pub(super) fn bytes(
             .get(group)
             .ok_or("no such row group")?
             .columns();
-        let leaf = leaf(columns, column, steps).ok_or("no such column")?;
-        let kept = CURSOR.take();
-        let kept = kept.filter(|kept| kept.reaches(path, group, leaf, row));
+        let leaf = leaf_index(columns, column, steps).ok_or("no such column")?;
+        let kept = CURSOR
+            .take()
+            .filter(|kept| kept.can_reach(path, group, leaf, row));
         let mut cursor = match kept {
             Some(cursor) => cursor,
             None => Cursor::open(path, &footer, group, leaf)?,
         };
-        let value = cursor.value(row, item.unwrap_or(0))?;
-        let is_text = !cursor.is_list;
+        let value = cursor.read_value(row, item.unwrap_or(0))?;
+        let is_list = cursor.is_list;
         CURSOR.set(Some(cursor));
-        let Some(item) = item.filter(|_| is_text) else {
+        let Some(item) = item.filter(|_| !is_list) else {
             return Ok(value);
         };
-        // The text of a list.
-        let items = std::str::from_utf8(&value).ok().and_then(list);
-        let value = items.and_then(|items| items.into_iter().nth(item));
-        value
+        // The column has no list: the value is a list as text.
+        std::str::from_utf8(&value)
+            .ok()
+            .and_then(list)
+            .and_then(|items| items.into_iter().nth(item))
             .map(String::into_bytes)
             .ok_or_else(|| "the value is gone".to_owned())
     };
-    guarded(read).map_err(|problem| wrong(path, &problem))
+    guarded(read).map_err(|problem| corrupt_file(path, &problem))
 }
 
-/// The index of the leaf of a column at some steps: that of the last field named, or the only one.
-fn leaf(
+/// Index of the first leaf column under `column` that has the name of the last field in `steps`; any leaf matches if `steps` has no field.
+fn leaf_index(
     columns: &[parquet::file::metadata::ColumnChunkMetaData],
     column: &str,
     steps: &[Step],

@@ -1,4 +1,4 @@
-//! The split of each file of a set, and the one that is asked: [`split_in_name`], [`chosen`].
+//! Splits of a data set: the split that a path names ([`split_in_name`]), and the files of the chosen split ([`chosen`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,16 +7,17 @@ use super::tree::Tree;
 use super::{ending, parquet};
 use crate::error::{Error, Result};
 
-/// A file of rows, with its split and its configuration.
+/// File of rows, with its split and configuration.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
+    /// Name of the split; empty if the path names none.
     pub(super) split: String,
     pub(super) config: String,
     pub(super) path: PathBuf,
 }
 
-/// The words that name splits, and the split that each means (Hugging Face, "File names and splits").
-const WORDS: [(&str, &str); 10] = [
+/// Words in paths, and the split that each names (Hugging Face, "File names and splits").
+const SPLIT_WORDS: [(&str, &str); 10] = [
     ("train", "train"),
     ("training", "train"),
     ("validation", "validation"),
@@ -29,19 +30,20 @@ const WORDS: [(&str, &str); 10] = [
     ("evaluation", "test"),
 ];
 
-/// The split that a path below a folder names: the first of its words, between signs that are no letters; empty if it names none.
+/// Split that a relative path names, by its first word in [`SPLIT_WORDS`]; empty if it has none. Any character other than a letter
+/// separates words.
 pub(super) fn split_in_name(path: &Path) -> String {
     let text = path.to_string_lossy().to_lowercase();
     let split = text
         .split(|c: char| !c.is_alphabetic())
-        .find_map(|word| WORDS.iter().find(|(known, _)| *known == word));
+        .find_map(|word| SPLIT_WORDS.iter().find(|(known, _)| *known == word));
     split.map_or_else(String::new, |(_, split)| (*split).to_owned())
 }
 
-/// The files of the split that is asked: the one named, else the only one, else `test`.
+/// Files of the wanted split, or of all splits for `all`. The default is the only split, or `test` if several exist.
 ///
 /// # Errors
-/// If no file is of the split named, or none is named and several splits are there; the error lists the splits with their rows.
+/// If the wanted split does not exist, or if no split is wanted and several exist without `test`. The error lists the splits.
 pub(super) fn chosen(
     tree: &Tree,
     files: Vec<Candidate>,
@@ -69,13 +71,14 @@ pub(super) fn chosen(
         }
     };
     let split = split.map(str::to_owned);
-    let of_split = files
+    Ok(files
         .into_iter()
-        .filter(|file| split.as_ref().is_none_or(|split| file.split == *split));
-    Ok(of_split.collect())
+        .filter(|file| split.as_ref().is_none_or(|split| file.split == *split))
+        .collect())
 }
 
-/// The splits with their rows where these are cheap to know, as `test (rows: 1000)`.
+/// Lists the splits with their numbers of rows, such as `test (rows: 1000)`. Rows are counted for Parquet files in a folder, which have
+/// the count in their footer; other splits get the number of files.
 fn listed(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
     let rows = |file: &&Path| match (tree, &*ending(file)) {
         (Tree::Folder { .. }, "parquet") => parquet::count(&tree.whole(file)).ok(),
@@ -104,7 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_split_is_a_word_of_a_path() {
+    fn split_is_whole_word_of_path() {
         for (path, split) in [
             ("data/test-00000-of-00001.parquet", "test"),
             ("val/metadata.csv", "validation"),
@@ -116,34 +119,42 @@ mod tests {
         }
     }
 
-    #[test]
-    fn one_split_is_chosen_or_named() {
-        let files = |splits: &[&str]| {
-            splits
-                .iter()
-                .map(|split| Candidate {
-                    split: (*split).to_owned(),
-                    config: String::new(),
-                    path: split.into(),
-                })
-                .collect::<Vec<Candidate>>()
-        };
+    /// Chosen paths of a set with one file per split; each path is the name of its split.
+    fn choose(splits: &[&str], wanted: Option<&str>) -> Result<Vec<PathBuf>> {
         let folder = tempfile::tempdir().unwrap();
         let tree = Tree::from_folder(folder.path()).unwrap();
-        let choose = |splits: &[&str], wanted| {
-            let files = chosen(&tree, files(splits), wanted)?.into_iter();
-            Ok::<_, Error>(files.map(|file| file.path).collect::<Vec<_>>())
-        };
+        let files = splits
+            .iter()
+            .map(|split| Candidate {
+                split: (*split).to_owned(),
+                config: String::new(),
+                path: split.into(),
+            })
+            .collect();
+        let files = chosen(&tree, files, wanted)?;
+        Ok(files.into_iter().map(|file| file.path).collect())
+    }
+
+    #[test]
+    fn default_is_only_split_or_test() {
         assert_eq!(choose(&["a"], None).unwrap(), [Path::new("a")]);
         assert_eq!(
             choose(&["test", "train"], None).unwrap(),
             [Path::new("test")]
         );
+    }
+
+    #[test]
+    fn wanted_split_is_chosen() {
         assert_eq!(
             choose(&["test", "train"], Some("train")).unwrap(),
             [Path::new("train")]
         );
         assert_eq!(choose(&["dev", "train"], Some("all")).unwrap().len(), 2);
+    }
+
+    #[test]
+    fn ambiguous_or_unknown_split_is_error() {
         let problem = choose(&["dev", "train"], None).unwrap_err().to_string();
         assert!(
             problem.contains("dev (files: 1), train (files: 1); --read split"),

@@ -1,4 +1,4 @@
-//! An enhancement model on disk: [`ModelFile`].
+//! An enhancement model, in a file or built in: [`ModelFile`].
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
@@ -17,30 +17,31 @@ use super::weights::Weights;
 use crate::conventions::preset::{Preset, PresetOutputs};
 use crate::conventions::sidecar::{self, ModelSidecar, OutputChoice};
 
-/// An ONNX file with its sidecar, read and checked as far as possible without ONNX Runtime.
+/// An ONNX model with its sidecar, read and checked as far as possible without ONNX Runtime.
 #[derive(Debug)]
 pub struct ModelFile {
-    /// The words that name it, as the user gave them.
+    /// The argument that names the model, as the user wrote it.
     pub(crate) named: PathBuf,
-    /// Path of the file; for an enhancer of the program, what messages call it.
+    /// Path of the file; for a built-in enhancer, its name in messages.
     pub(crate) path: PathBuf,
     pub(crate) name: EnhancerName,
     pub(crate) digest: Digest,
     pub(crate) bytes: Vec<u8>,
     pub(crate) weights: Weights,
-    /// The user's sidecar; empty if there is none.
+    /// The sidecar of the model; empty if it has none.
     pub(crate) sidecar: ModelSidecar,
     /// The preset, if one was named.
     pub(crate) preset: Option<Preset>,
 }
 
 impl ModelFile {
-    /// Reads a model: an enhancer of the program (`lift`, `gray-gain`), or `FILE.onnx` or `PRESET:FILE.onnx` with its sidecar
-    /// `FILE.onnx.toml` if there is one, and the files of its external data.
+    /// Reads a model: a built-in enhancer (`lift`, `gray-gain`), `FILE.onnx` or `PRESET:FILE.onnx`.
+    ///
+    /// Also reads the optional sidecar `FILE.onnx.toml` and the files of external data.
     ///
     /// # Errors
-    /// If a file cannot be read or is not an ONNX model, its name is not an [`EnhancerName`], the sidecar has an unknown key,
-    /// or the enhancer of the program or the preset does not exist.
+    /// If a file cannot be read or is not an ONNX model, its name is not an [`EnhancerName`], the sidecar has an unknown key, or the
+    /// built-in enhancer or the preset does not exist.
     pub fn read(model: &Path) -> Result<Self> {
         if let Some(built_in) = built_in(model)? {
             let path = PathBuf::from(format!("{} (built in)", built_in.name));
@@ -76,7 +77,7 @@ impl ModelFile {
         })
     }
 
-    /// The model of these bytes, with the text of its sidecar.
+    /// Parses an ONNX model and the TOML text of its sidecar, and computes the digest.
     fn from_bytes(
         path: PathBuf,
         name: EnhancerName,
@@ -98,7 +99,7 @@ impl ModelFile {
         })
     }
 
-    /// The enhancer of the program with a digest; `None` if no enhancer of this version has it.
+    /// The built-in enhancer with this digest; `None` if this version of the program has no such enhancer.
     #[must_use]
     pub fn built_in_with(digest: &str) -> Option<Self> {
         darkqa_models::BUILT_IN
@@ -107,35 +108,39 @@ impl ModelFile {
             .find(|file| file.digest.to_string() == digest)
     }
 
-    /// Data that the model was trained on; `None` if neither sidecar nor preset states them.
+    /// Training data of the model; `None` if neither sidecar nor preset states it.
     #[must_use]
     pub fn trained_on(&self) -> Option<&str> {
-        let preset = self.preset.as_ref();
-        let preset = preset.and_then(|preset| preset.content.sidecar.trained_on.as_deref());
-        self.sidecar.trained_on.as_deref().or(preset)
+        let by_preset = self
+            .preset
+            .as_ref()
+            .and_then(|preset| preset.content.sidecar.trained_on.as_deref());
+        self.sidecar.trained_on.as_deref().or(by_preset)
     }
 
-    /// The same file, with this output as the default to read.
+    /// The model with the index of the output to read. An output that the sidecar states takes precedence. The digest does not change.
     #[must_use]
-    pub fn with_output(mut self, place: usize) -> Self {
+    pub fn with_output(mut self, index: usize) -> Self {
         let stated = &mut self.sidecar.output;
-        *stated = stated.take().or(Some(OutputChoice::Index(place)));
+        *stated = stated.take().or(Some(OutputChoice::Index(index)));
         self
     }
 
-    /// Name in tables and records: the file's name without its extension, or that of an enhancer of the program.
+    /// Name in tables and records: the file name without its extension, or the name of the built-in enhancer.
     #[must_use]
     pub fn name(&self) -> &EnhancerName {
         &self.name
     }
 
-    /// Path of the file; for an enhancer of the program, what messages call it.
+    /// Path of the file; for a built-in enhancer, its name in messages.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Digest of everything that affects opening and probing the model. It includes which statements are from the sidecar and which from
-    /// the preset, although that affects no image.
+    /// Digest of everything that affects opening and probing the model.
+    ///
+    /// Unlike [`digest`](Self::digest), it depends on whether a value comes from the sidecar or from the preset, although the enhanced
+    /// images are the same.
     ///
     /// # Errors
     /// If a number of the sidecar is infinite or NaN.
@@ -152,15 +157,17 @@ impl ModelFile {
     }
 }
 
-/// Name of an enhancer whose file has this stem: other characters than letters, digits, `_`, `-` and `.` become `-`. If letters were
-/// lost, the begin of the stem's digest tells such files apart.
+/// Name of an enhancer whose file has this stem. Each run of characters other than ASCII letters, digits, `_`, `-` and `.` becomes `-`.
+///
+/// A stem that is not ASCII gets a suffix, the first 6 hexadecimal digits of its digest, because such stems often differ only in the
+/// characters replaced.
 fn name_of(stem: &str) -> Result<EnhancerName> {
-    let fits = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-    if stem.chars().all(fits) {
+    let is_allowed = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    if stem.chars().all(is_allowed) {
         return EnhancerName::new(stem);
     }
     let mut name = stem
-        .split(|c: char| !fits(c))
+        .split(|c: char| !is_allowed(c))
         .filter(|word| !word.is_empty())
         .collect::<Vec<_>>()
         .join("-");
@@ -173,19 +180,20 @@ fn name_of(stem: &str) -> Result<EnhancerName> {
     EnhancerName::new(name.trim_matches('-'))
 }
 
-/// Content of an enhancer's digest: all that decides an enhanced image, except the degraded one.
+/// Content of an enhancer's digest: everything that determines an enhanced image, except the input image.
 #[derive(Serialize)]
 struct EnhancementFacts<'a> {
     file: Digest,
-    /// Digests of external data, by the location that the model states.
+    /// Digests of external data, by the location in the model.
     external: BTreeMap<&'a str, Digest>,
     convention: ModelSidecar,
-    /// The preset's rules that choose an output, if no sidecar states one.
+    /// The preset's rules for choosing an output, if they apply.
     outputs: Option<PresetOutputs<'a>>,
 }
 
-/// Digest of a model's content, its external data and the convention of sidecar and preset. Each file is hashed alone, so
-/// that only one is in memory at a time.
+/// Digest of a model's bytes, its external data, and the convention of sidecar and preset.
+///
+/// Files of external data are read and hashed one after another, so that only one is in memory at a time.
 fn digest(
     path: &Path,
     bytes: &[u8],
@@ -204,21 +212,23 @@ fn digest(
         None => sidecar,
         Some(preset) => sidecar.with_defaults(&preset.content.sidecar),
     };
-    // The preset chooses the output unless a sidecar does, or there is only one.
-    let read_by_preset =
+    // The preset chooses the output unless the convention states `output` or `image`, or the model has only one output.
+    let preset_chooses_output =
         convention.output.is_none() && convention.image.is_none() && output_count(bytes) != 1;
     let facts = EnhancementFacts {
         file: Digest::from_bytes(bytes),
         external,
         convention: convention.without_defaults(),
-        outputs: preset.filter(|_| read_by_preset).map(Preset::outputs),
+        outputs: preset
+            .filter(|_| preset_chooses_output)
+            .map(Preset::outputs),
     };
     Digest::canonical("darkqa.enhancer/2", &facts)
 }
 
 /// Number of outputs of a model: field 12 of its `GraphProto`, which is field 7 of the `ModelProto` (`onnx/onnx.proto`).
 fn output_count(model: &[u8]) -> usize {
-    let within = |range: Range<usize>, wanted: u64| {
+    let messages = |range: Range<usize>, wanted: u64| {
         fields(model, range)
             .filter_map(Result::ok)
             .filter_map(move |field| match field {
@@ -226,11 +236,15 @@ fn output_count(model: &[u8]) -> usize {
                 _ => None,
             })
     };
-    let graphs = within(0..model.len(), 7);
-    graphs.map(|graph| within(graph, 12).count()).sum()
+    messages(0..model.len(), 7)
+        .map(|graph| messages(graph, 12).count())
+        .sum()
 }
 
-/// Path of a file with external data, which must be in the model's folder or below (ONNX Runtime refuses others too).
+/// Path of a file of external data.
+///
+/// # Errors
+/// If the file is not in the model's folder or a subfolder. ONNX Runtime refuses such files too.
 fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
     let relative = Path::new(location);
     let inside = relative
@@ -247,8 +261,11 @@ fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
     Ok(model.with_file_name("").join(relative))
 }
 
-/// The bytes of a file of weights that has at least this size.
-fn read_weights(model: &Path, file: &Path, least: u64) -> Result<Vec<u8>> {
+/// Reads a file of external data.
+///
+/// # Errors
+/// If the file is missing, shorter than `min_size` bytes, or cannot be read.
+fn read_weights(model: &Path, file: &Path, min_size: u64) -> Result<Vec<u8>> {
     let fault = |problem: String| Error::Enhancer {
         path: model.to_owned(),
         problem,
@@ -263,22 +280,26 @@ fn read_weights(model: &Path, file: &Path, least: u64) -> Result<Vec<u8>> {
         }
         Err(e) => return Err(Error::file(file, "read", e)),
     };
-    if size < least {
+    if size < min_size {
         return Err(fault(format!(
-            "the weights of the model are cut short: {} has {size} of {least} bytes; copy or download it again",
+            "the weights of the model are cut short: {} has {size} of {min_size} bytes; copy or download it again",
             file.display()
         )));
     }
-    reading::at_most(file, MOST_WEIGHTS)
+    reading::at_most(file, MAX_WEIGHTS_BYTES)
 }
 
-/// Most bytes of a file of weights. Chosen: the largest published enhancers have a hundredth.
-const MOST_WEIGHTS: u64 = 1 << 36;
+/// Maximum size of a file of external data, in bytes (chosen): 100 times the largest published enhancers.
+const MAX_WEIGHTS_BYTES: u64 = 1 << 36;
 
-/// Largest ONNX file in bytes: what a protobuf message can hold (2³¹ − 1, <https://protobuf.dev/programming-guides/encoding/>).
-const MOST_BYTES: u64 = i32::MAX as u64;
+/// Maximum size of an ONNX file, in bytes: the limit of a protobuf message (2³¹ − 1,
+/// <https://protobuf.dev/programming-guides/encoding/>).
+const MAX_MODEL_BYTES: u64 = i32::MAX as u64;
 
-/// The bytes of an ONNX file. A file that is too large to be one is refused before it is read.
+/// Reads an ONNX file.
+///
+/// # Errors
+/// If the file is missing, cannot be read, or is larger than [`MAX_MODEL_BYTES`]. A file that is too large is not read.
 fn read_model(path: &Path) -> Result<Vec<u8>> {
     let size = std::fs::metadata(path)
         .map_err(|e| match e.kind() {
@@ -288,7 +309,7 @@ fn read_model(path: &Path) -> Result<Vec<u8>> {
             _ => Error::file(path, "read", e),
         })?
         .len();
-    if size > MOST_BYTES {
+    if size > MAX_MODEL_BYTES {
         return Err(Error::Enhancer {
             path: path.to_owned(),
             problem: format!(
@@ -297,7 +318,7 @@ fn read_model(path: &Path) -> Result<Vec<u8>> {
             ),
         });
     }
-    reading::at_most(path, MOST_BYTES)
+    reading::at_most(path, MAX_MODEL_BYTES)
 }
 
 fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
@@ -316,7 +337,7 @@ fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
 mod tests {
     use super::*;
 
-    /// `ir_version = 8` and a graph with only one initialiser, whose external data is in `location`.
+    /// ONNX model with `ir_version = 8` and one initialiser, whose external data is in `location`.
     fn model(location: &str) -> Vec<u8> {
         let field = |number: u8, content: &[u8]| {
             [&[number << 3 | 2, content.len() as u8], content].concat()
@@ -377,9 +398,9 @@ mod tests {
         }
     }
 
-    /// The digest is of the canonical JSON of the stated keys alone, so that keys added later change no digest.
+    /// The digest covers the canonical JSON of the keys that the sidecar states, so that new keys do not change the digests of old files.
     #[test]
-    fn what_is_not_stated_is_not_in_the_digest() {
+    fn digest_covers_only_stated_keys() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.onnx");
         let file = model("a.bin");
@@ -414,7 +435,7 @@ mod tests {
     }
 
     #[test]
-    fn any_file_name_gives_a_name() {
+    fn file_stems_become_enhancer_names() {
         let name = |stem: &str| name_of(stem).unwrap().to_string();
         assert_eq!(name("zero-dce_v1.2"), "zero-dce_v1.2");
         assert_eq!(name("zero dce (1)"), "zero-dce-1");
@@ -438,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_cannot_be_used_is_refused_with_the_reason() {
+    fn unusable_files_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let cases: [(&str, &[u8], &str); 4] = [
             ("text.onnx", b"not a model", "is not a complete ONNX model"),
@@ -460,10 +481,10 @@ mod tests {
             let message = ModelFile::read(&path).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
-        // Empty, but for its size.
+        // A sparse file: too large, without any data.
         let large = folder.path().join("large.onnx");
         let file = std::fs::File::create(&large).unwrap();
-        file.set_len(MOST_BYTES + 1).unwrap();
+        file.set_len(MAX_MODEL_BYTES + 1).unwrap();
         let message = ModelFile::read(&large).unwrap_err().to_string();
         assert!(message.contains("2.1 GB"), "{message}");
         let missing = ModelFile::read(Path::new("missing.onnx")).unwrap_err();

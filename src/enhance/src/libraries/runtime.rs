@@ -1,10 +1,10 @@
-//! ONNX Runtime's library, found or installed, and opened: [`RuntimeSearch::open`], [`Runtime`].
+//! Finds or installs the library of ONNX Runtime, and opens it: [`RuntimeSearch::open`], [`Runtime`].
 //!
-//! A process has one ONNX Runtime, so every later call of `open` returns the first one.
+//! A process can load only one ONNX Runtime, so later calls of `open` return the first one.
 //!
-//! Released builds send telemetry to Microsoft by default. The C API can switch it off only after the library has reported
-//! the start of the process and left an identifier in the user's cache folder (seen with 1.31.1 on Linux). The environment
-//! variable [`TELEMETRY_SWITCH`] acts before that, so programs must call [`forbid_telemetry`] first.
+//! Released builds send telemetry to Microsoft by default. The C API can disable telemetry only after the library has reported the start
+//! of the process and written an identifier to the user's cache folder (seen with 1.31.1 on Linux). The environment variable
+//! [`TELEMETRY_SWITCH`] takes effect earlier, so programs must call [`forbid_telemetry`] first.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -37,32 +37,32 @@ pub struct RuntimeSearch {
     pub install: Install,
 }
 
-/// The opened ONNX Runtime. Clones share it.
+/// The open ONNX Runtime. Clones share the library and the thread.
 #[derive(Clone)]
 pub struct Runtime(Arc<OpenRuntime>);
 
 struct OpenRuntime {
     path: PathBuf,
     version: String,
-    /// Where it was found, as `beside the program`.
+    /// Where the library was found, such as `beside the program`.
     place: String,
     environment: Environment,
     thread: RuntimeThread,
 }
 
-/// Environment variable that switches off ONNX Runtime's telemetry from the start if it is `1`.
+/// Environment variable that disables ONNX Runtime's telemetry from the start if its value is `1`.
 const TELEMETRY_SWITCH: &str = "ORT_DISABLE_TELEMETRY";
 
-/// Sets [`TELEMETRY_SWITCH`] for this process, so that ONNX Runtime sends nothing and leaves no identifier behind.
+/// Sets [`TELEMETRY_SWITCH`] for this process, so that ONNX Runtime sends no telemetry and writes no identifier.
 ///
 /// # Safety
-/// No other thread of the process may be running, because the environment must not change while C code may read it.
+/// No other thread of the process may be running: C code in another thread could read the environment while it changes.
 #[expect(
     unsafe_code,
     reason = "there is no other way to switch off telemetry before ONNX Runtime starts"
 )]
 pub unsafe fn forbid_telemetry() {
-    // SAFETY: the caller guarantees that no other thread could read the environment meanwhile.
+    // SAFETY: the caller guarantees that no other thread is running, so none can read the environment during the change.
     unsafe { std::env::set_var(TELEMETRY_SWITCH, "1") };
 }
 
@@ -70,21 +70,21 @@ pub unsafe fn forbid_telemetry() {
 static OPEN: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl RuntimeSearch {
-    /// Opens the named library. Without a name, it opens the first usable one in the places of [`LibraryPlace`]; if there is none, it
-    /// installs version 1.31.1 with pip, if allowed.
+    /// Opens the library at `self.library`. If no library is named, opens the first usable one in the places of [`LibraryPlace`]. If no
+    /// place has one, installs version 1.31.1 with pip, unless [`Install::Offline`] forbids it.
     ///
     /// # Errors
-    /// If the named library is not usable, or none was found and none could be installed. The message lists the places tried and the
-    /// remedy.
+    /// If the named library is not usable, or if no library was found and none could be installed. The message lists the places tried
+    /// and the remedies.
     pub fn open(&self) -> Result<Runtime> {
-        // The lock is held to the end, so that a second thread waits for the first one's installation.
+        // The lock is kept until the function returns, so that a second thread waits while the first one installs the library.
         let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(runtime) = open.as_ref() {
             return self.check_same(runtime);
         }
         let found = match &self.library {
             Some(named) => {
-                // The system's loader would search a bare name in its own folders.
+                // An absolute path, because the system's loader would search for a bare file name in its own folders.
                 let path = std::path::absolute(named).unwrap_or_else(|_| named.clone());
                 let version = probe(&path).map_err(|e| unusable_library(&path, &e))?;
                 let place = "named by --llie-options ort-lib or ORT_DYLIB_PATH".to_owned();
@@ -100,11 +100,14 @@ impl RuntimeSearch {
         Ok(open.insert(runtime).clone())
     }
 
-    /// Returns the runtime that is already open; an error if another library is named.
+    /// Returns the open runtime.
+    ///
+    /// # Errors
+    /// If `self.library` is another library than the open one.
     fn check_same(&self, runtime: &Runtime) -> Result<Runtime> {
-        let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let resolved = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
         match &self.library {
-            Some(path) if real(path) != real(runtime.path()) => Err(unusable_library(
+            Some(path) if resolved(path) != resolved(runtime.path()) => Err(unusable_library(
                 path,
                 &format!(
                     "cannot be loaded, because this process has already loaded {}",
@@ -116,17 +119,17 @@ impl RuntimeSearch {
     }
 }
 
-/// A usable library.
+/// A usable library that is not open yet.
 #[derive(Debug)]
 struct FoundLibrary {
     path: PathBuf,
     version: String,
-    /// Where it was found, as `beside the program`.
+    /// Where the library was found, such as `beside the program`.
     place: String,
 }
 
-/// The first usable library, or one that is installed now.
-fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
+/// Returns the first usable library of the candidates; otherwise installs one if allowed.
+fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
     let mut rejected = Vec::new();
     for (place, path) in surroundings.candidates() {
         match check(place, &path) {
@@ -138,10 +141,10 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
                     place,
                 });
             }
-            Err(problem) if place == LibraryPlace::Cache && allowed == Install::Allowed => {
+            Err(problem) if place == LibraryPlace::Cache && policy == Install::Allowed => {
                 rejected.push(format!("{} {problem}", path.display()));
-                // A broken library that this program installed is replaced, rather than another version used.
-                match install_here(surroundings, &rejected) {
+                // Reinstall a broken library in the cache: a later candidate may have another version.
+                match install_into_cache(surroundings, &rejected) {
                     Ok(found) => return Ok(found),
                     Err(problem) => tracing::warn!("it cannot be installed again: {problem}"),
                 }
@@ -161,14 +164,14 @@ fn find(surroundings: &Surroundings, allowed: Install) -> Result<FoundLibrary> {
                 format!("{folder} holds no library; the packages from version 1.19 on do")
             }),
     );
-    let installed = match allowed {
+    let installed = match policy {
         Install::Offline => Err("--llie-options offline forbids its installation".to_owned()),
-        Install::Allowed => install_here(surroundings, &rejected),
+        Install::Allowed => install_into_cache(surroundings, &rejected),
     };
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
 }
 
-/// Checks a candidate, one of the cache against its receipt too; returns its version.
+/// Checks a candidate and returns its version. The pinned library in the cache must also match its installation receipt.
 fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
     if place == LibraryPlace::Cache
         && let Some(pin) = Pin::for_this_platform()
@@ -180,7 +183,10 @@ fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
 }
 
 /// Installs the pinned library into the cache.
-fn install_here(surroundings: &Surroundings, rejected: &[String]) -> Result<FoundLibrary, String> {
+fn install_into_cache(
+    surroundings: &Surroundings,
+    rejected: &[String],
+) -> Result<FoundLibrary, String> {
     let pin = Pin::for_this_platform().ok_or_else(|| {
         format!(
             "no library is known for {} {}",
@@ -198,7 +204,7 @@ fn install_here(surroundings: &Surroundings, rejected: &[String]) -> Result<Foun
     })?;
     tracing::warn!(
         "no usable ONNX Runtime was found{}; installing version {PINNED} with pip, once, into {}",
-        skipped(rejected),
+        skipped_note(rejected),
         folder.display()
     );
     let path = install(pin, &folder)?;
@@ -211,20 +217,20 @@ fn install_here(surroundings: &Surroundings, rejected: &[String]) -> Result<Foun
     })
 }
 
-/// The libraries and packages that cannot be used, each with its problem.
-fn skipped(rejected: &[String]) -> String {
+/// Note in brackets with the rejected libraries and packages and their problems; empty if none was rejected.
+fn skipped_note(rejected: &[String]) -> String {
     match rejected {
         [] => String::new(),
         rejected => format!(" (skipped: {})", rejected.join("; ")),
     }
 }
 
-/// Message for a missing library: the places tried, and how to provide one.
+/// Error message for a missing library, with the places tried and the remedies.
 fn not_found_message(problem: &str, rejected: &[String]) -> String {
-    let rejected = skipped(rejected);
+    let skipped = skipped_note(rejected);
     let places = LibraryPlace::ALL.map(|place| place.to_string()).join(", ");
     format!(
-        "no library was found ({places}){rejected}, and {problem}. Three ways out: install the Python package into the environment of this program or one on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --llie-options ort-lib=FILE or ORT_DYLIB_PATH; or let it be installed: without --llie-options offline, with pip on PATH and a reachable package index"
+        "no library was found ({places}){skipped}, and {problem}. Three ways out: install the Python package into the environment of this program or one on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --llie-options ort-lib=FILE or ORT_DYLIB_PATH; or let it be installed: without --llie-options offline, with pip on PATH and a reachable package index"
     )
 }
 
@@ -249,7 +255,7 @@ impl Runtime {
                 "ONNX Runtime may report its use to Microsoft; {TELEMETRY_SWITCH}=1 in the environment forbids that"
             );
         }
-        // Errors are also returned to the caller, so log messages are shown only at debug level.
+        // Logged at debug level only, because ONNX Runtime also returns its errors to the caller.
         let logger = Arc::new(|level, _: &str, _: &str, place: &str, message: &str| {
             if matches!(level, LogLevel::Warning | LogLevel::Error | LogLevel::Fatal) {
                 tracing::debug!("ONNX Runtime, {place}: {message}");
@@ -273,10 +279,10 @@ impl Runtime {
         })))
     }
 
-    /// The same library with another thread, on which other sessions work at the same time.
+    /// The same library with a second thread, so that the sessions of both threads run in parallel.
     ///
-    /// The thread is started by the first one: on Linux it inherits the setting that treats subnormal numbers as zero. Elsewhere they may
-    /// be slower there, which changes no byte.
+    /// The first thread starts the second one, which on Linux then inherits the CPU setting that treats subnormal numbers as zero. On
+    /// other systems, subnormal numbers may slow the second thread down, but its results have the same bytes.
     pub(crate) fn beside(&self) -> Result<Self> {
         let thread = self.0.thread.run(RuntimeThread::start)?;
         let thread = thread.map_err(|e| Error::Runtime(e.to_string()))?;
@@ -289,7 +295,7 @@ impl Runtime {
         })))
     }
 
-    /// Path of the library's file.
+    /// Path of the library file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.0.path
@@ -301,7 +307,7 @@ impl Runtime {
         &self.0.version
     }
 
-    /// Where the library was found, as `beside the program`.
+    /// Where the library was found, such as `beside the program`.
     pub(crate) fn place(&self) -> &str {
         &self.0.place
     }
@@ -310,7 +316,7 @@ impl Runtime {
         &self.0.environment
     }
 
-    /// The thread that sessions are created and run on.
+    /// The thread that creates and runs the sessions.
     pub(crate) fn thread(&self) -> &RuntimeThread {
         &self.0.thread
     }
@@ -321,7 +327,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_library_offline_the_message_says_how_to_provide_one() {
+    fn missing_library_message_lists_remedies() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("libonnxruntime.so"), "text").unwrap();
         let surroundings = Surroundings {
@@ -344,14 +350,14 @@ mod tests {
     }
 
     #[test]
-    fn without_a_cache_folder_the_variables_are_named() {
+    fn missing_cache_folder_is_an_error() {
         let error = find(&Surroundings::default(), Install::Allowed).unwrap_err();
         let message = error.to_string();
         assert!(message.contains("no cache folder"), "{message}");
     }
 
     #[test]
-    fn a_wrong_library_that_was_named_is_an_error() {
+    fn unusable_named_library_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("missing.so");
         let search = RuntimeSearch {

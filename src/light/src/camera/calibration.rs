@@ -1,4 +1,4 @@
-//! Noise of a camera as a function of its gain: [`Calibration`], built in or from a TOML file.
+//! Noise of a camera sensor as a function of its gain: [`Calibration`], built in or from a TOML file.
 
 use std::fmt::Display;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::text::TomlFault;
 
-/// Names and files of the five built-in calibrations, the paper's camera first.
+/// Built-in calibrations, as names with TOML texts, the paper's camera first.
 const PRESETS: [(&str, &str); 5] = [
     ("sony-a7s2", include_str!("sony-a7s2.toml")),
     ("nikon-d850", include_str!("nikon-d850.toml")),
@@ -16,32 +16,32 @@ const PRESETS: [(&str, &str); 5] = [
     ("canon-eos-700d", include_str!("canon-eos-700d.toml")),
 ];
 
-/// Calibrated noise of a sensor (Wei et al., "Physics-based noise modeling for extreme low-light photography", ELD),
-/// with the ranges that its gain and its ratio are drawn from.
+/// Noise calibration of a camera sensor (Wei et al., "Physics-based noise modeling for extreme low-light photography", ELD), with the
+/// ranges of gain and amplification ratio for random draws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Calibration {
-    /// Name of the camera, as `sony-a7s2`.
+    /// Name of the camera, such as `sony-a7s2`.
     pub name: String,
-    /// Range of a sample above its black level, in ADU.
+    /// White level minus black level, in ADU.
     pub adu_range: f64,
-    /// Range that the system gain K is drawn from, log-uniform, in ADU per electron.
+    /// Range of the system gain K for log-uniform draws, in ADU per electron.
     pub gain: [f64; 2],
-    /// Range that the ratio r is drawn from, uniform.
+    /// Range of the amplification ratio r for uniform draws.
     pub ratio: [f64; 2],
-    /// K at the first step, in ADU per electron; each further step doubles it. `None` if each step has its own gain.
+    /// K of the first step, in ADU per electron; K doubles with each step. `None` if each step has its own gain.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_gain: Option<f64>,
-    /// Scale σ_TL of the read noise, in ADU.
+    /// Fit of the scale σ_TL of the read noise, in ADU.
     pub read_scale: LogFit,
-    /// Standard deviation σ_r of the row noise, in ADU.
+    /// Fit of the standard deviation σ_r of the row noise, in ADU.
     pub row_deviation: LogFit,
     /// Measurements at each gain, in ascending order of gain.
     #[serde(rename = "step")]
     pub steps: Vec<GainStep>,
 }
 
-/// Fit of a noise parameter σ to the gain: ln σ = slope · ln K + intercept + deviation · z, with z standard normal.
+/// Log-linear fit of a noise parameter σ to the gain: ln σ = slope · ln K + intercept + deviation · z, with z standard normal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogFit {
@@ -53,16 +53,16 @@ pub struct LogFit {
     pub deviation: f64,
 }
 
-/// Measurements at one gain. Synthesis draws one shape and one set of offsets of them.
+/// Measurements at one gain. Noise synthesis draws one of the shapes and one of the offset sets.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GainStep {
-    /// K of the step, in ADU per electron; either all steps have it or none.
+    /// K of the step, in ADU per electron; stated in all steps or in none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<f64>,
-    /// Shapes λ of the read noise's Tukey-λ distribution.
+    /// Shapes λ of the Tukey-λ distribution of the read noise.
     pub shape: Vec<f64>,
-    /// Offsets of the planes, in ADU, in the calibration's order R, G1, B, G2.
+    /// Offset sets, in ADU: one offset for each Bayer plane, in the order R, G1, B, G2.
     pub bias: Vec<[f64; 4]>,
 }
 
@@ -85,7 +85,7 @@ impl Calibration {
         PRESETS.iter().map(|(name, _)| *name)
     }
 
-    /// The built-in calibration of this name; `None` if there is none.
+    /// Built-in calibration of this name; `None` if the name is unknown.
     #[must_use]
     pub fn preset(name: &str) -> Option<Self> {
         let (name, text) = PRESETS.iter().find(|(known, _)| *known == name)?;
@@ -111,10 +111,10 @@ impl Calibration {
         Ok(calibration)
     }
 
-    /// The calibration as a file that [`Calibration::parse`] reads, below lines of comments.
+    /// Writes the calibration as TOML for [`Calibration::parse`], below comment lines.
     ///
     /// # Errors
-    /// If a number cannot be written.
+    /// If the calibration cannot be written as TOML.
     pub fn to_toml(&self, comments: &[String]) -> Result<String> {
         let keys = toml::to_string(self).map_err(|e| Error::data(&self.name, e))?;
         Ok(comments
@@ -124,25 +124,26 @@ impl Calibration {
             .collect())
     }
 
+    /// Checks all values against their limits; the error names the key.
     fn check(&self) -> std::result::Result<(), String> {
         let range = |key: &str, [low, high]: [f64; 2], limits| {
-            within(key, low, limits)?;
-            within(key, high, limits)?;
+            check_limits(key, low, limits)?;
+            check_limits(key, high, limits)?;
             if low > high {
                 return Err(format!("{key}: the range [{low}, {high}] runs backwards"));
             }
             Ok(())
         };
-        within("adu-range", self.adu_range, [1.0, 1e6])?;
+        check_limits("adu-range", self.adu_range, [1.0, 1e6])?;
         range("gain", self.gain, GAINS)?;
         range("ratio", self.ratio, RATIOS)?;
         for (key, fit) in [
             ("read-scale", self.read_scale),
             ("row-deviation", self.row_deviation),
         ] {
-            within(&format!("{key}.slope"), fit.slope, [-10.0, 10.0])?;
-            within(&format!("{key}.intercept"), fit.intercept, [-20.0, 20.0])?;
-            within(&format!("{key}.deviation"), fit.deviation, [0.0, 5.0])?;
+            check_limits(&format!("{key}.slope"), fit.slope, [-10.0, 10.0])?;
+            check_limits(&format!("{key}.intercept"), fit.intercept, [-20.0, 20.0])?;
+            check_limits(&format!("{key}.deviation"), fit.deviation, [0.0, 5.0])?;
         }
         if self.steps.is_empty() {
             return Err("step: at least one [[step]] is needed".to_owned());
@@ -154,23 +155,23 @@ impl Calibration {
                 return Err(key("shape and bias: at least one of each is needed"));
             }
             for shape in &step.shape {
-                within(&key("shape"), *shape, [-0.49, 2.0])?;
+                check_limits(&key("shape"), *shape, [-0.49, 2.0])?;
             }
             for offset in step.bias.as_flattened() {
-                within(&key("bias"), *offset, [-1e4, 1e4])?;
+                check_limits(&key("bias"), *offset, [-1e4, 1e4])?;
             }
         }
         Ok(())
     }
 
-    /// Checks that the gain of every step is known in one of two ways: by `first-gain`, or by a `gain` in each step.
+    /// Checks that the gains are stated once: either by `first-gain`, or by a `gain` in every step, in ascending order.
     fn check_step_gains(&self) -> std::result::Result<(), String> {
-        let given: Vec<f64> = self.steps.iter().filter_map(|step| step.gain).collect();
-        if given.is_empty() {
+        let gains: Vec<f64> = self.steps.iter().filter_map(|step| step.gain).collect();
+        if gains.is_empty() {
             let Some(first) = self.first_gain else {
                 return Err("first-gain: missing, and no [[step]] has a gain".to_owned());
             };
-            return within("first-gain", first, GAINS);
+            return check_limits("first-gain", first, GAINS);
         }
         if let Some(index) = self.steps.iter().position(|step| step.gain.is_none()) {
             return Err(format!(
@@ -181,28 +182,28 @@ impl Calibration {
         if self.first_gain.is_some() {
             return Err("first-gain: every [[step]] has a gain; leave out first-gain".to_owned());
         }
-        for (index, gain) in given.iter().enumerate() {
-            within(&format!("step {}, gain", index + 1), *gain, GAINS)?;
+        for (index, gain) in gains.iter().enumerate() {
+            check_limits(&format!("step {}, gain", index + 1), *gain, GAINS)?;
         }
-        if let Some(index) = given.windows(2).position(|two| two[0] >= two[1]) {
+        if let Some(index) = gains.windows(2).position(|two| two[0] >= two[1]) {
             return Err(format!(
                 "step {}, gain: {} is not above {}, the gain of the step before it",
                 index + 2,
-                given[index + 1],
-                given[index]
+                gains[index + 1],
+                gains[index]
             ));
         }
         Ok(())
     }
 
-    /// The noise at system gain `gain`.
+    /// Noise parameters at the system gain `gain`, which is in ADU per electron.
     ///
-    /// `scatter` holds the standard normal numbers z of the fits of σ_TL and σ_r. `choices`, uniform in (0, 1), choose among
-    /// a step's measurements of λ and of the offsets, all with the same probability. The calibration's author advises to
-    /// take both near the gain: the offsets of ISO 25600 do not belong to K = 0.1.
+    /// `scatter` contains the standard normal draws z for σ_TL and σ_r. `choices`, uniform in (0, 1), select a shape and an
+    /// offset set from the step with the nearest gain, each with equal probability. The calibration's author advises to use only
+    /// measurements near the gain: offsets measured at ISO 25600 do not apply at K = 0.1.
     #[must_use]
     pub fn noise_at(&self, gain: f64, scatter: [f64; 2], choices: [f64; 2]) -> SensorNoise {
-        let step = &self.steps[self.step(gain)];
+        let step = &self.steps[self.nearest_step(gain)];
         let chosen = |choice: f64, n: usize| ((choice * n as f64) as usize).min(n - 1);
         let [r, g1, b, g2] = step.bias[chosen(choices[1], step.bias.len())];
         SensorNoise {
@@ -213,20 +214,20 @@ impl Calibration {
         }
     }
 
-    /// Index of the step with the nearest gain, in ln K. Steps above the upper end of the gain range are not used.
-    fn step(&self, gain: f64) -> usize {
+    /// Index of the step with the nearest gain on a log scale, at most the step nearest to the upper end of the gain range.
+    fn nearest_step(&self, gain: f64) -> usize {
         let nearest = |gain: f64| match self.first_gain {
             Some(first) => {
                 let step = (libm::log2(gain / first) + 0.5).floor();
                 step.clamp(0.0, (self.steps.len() - 1) as f64) as usize
             }
-            None => self.nearest_of_given(gain),
+            None => self.nearest_listed_step(gain),
         };
         nearest(gain).min(nearest(self.gain[1]))
     }
 
-    /// Index of the step whose own gain is nearest in ln K; the lower one of two that are equally near.
-    fn nearest_of_given(&self, gain: f64) -> usize {
+    /// Index of the step whose own `gain` is nearest on a log scale; the lower of two equally near steps.
+    fn nearest_listed_step(&self, gain: f64) -> usize {
         self.steps
             .iter()
             .map(|step| {
@@ -239,8 +240,8 @@ impl Calibration {
     }
 }
 
-/// Whether a number lies within its limits; the error names its key.
-fn within(key: &str, value: f64, [low, high]: [f64; 2]) -> std::result::Result<(), String> {
+/// Checks that a value is between two limits, inclusive; the error names the key.
+fn check_limits(key: &str, value: f64, [low, high]: [f64; 2]) -> std::result::Result<(), String> {
     if value >= low && value <= high {
         Ok(())
     } else {
@@ -250,12 +251,13 @@ fn within(key: &str, value: f64, [low, high]: [f64; 2]) -> std::result::Result<(
     }
 }
 
-/// Allowed range of the system gain K, in ADU per electron; the built-in calibrations lie between 0.094 and 29.
+/// Allowed range of the system gain K, in ADU per electron; the built-in calibrations range from 0.094 to 29.
 pub(crate) const GAINS: [f64; 2] = [0.01, 100.0];
 /// Allowed range of the amplification ratio r.
 pub(super) const RATIOS: [f64; 2] = [1.0, 10000.0];
 
 impl LogFit {
+    /// σ at a gain, `z` standard deviations above the line in ln σ.
     fn at(&self, gain: f64, z: f64) -> f64 {
         libm::exp(self.slope * libm::log(gain) + self.intercept + self.deviation * z)
     }

@@ -1,14 +1,16 @@
-//! The facts of a TIFF file in the tags of its first picture: [`TiffOutline`].
+//! Parser for the tags of the first image in a TIFF file: [`TiffOutline`].
 //!
-//! They are read here because the decoder of the crate `tiff` hands out no tags of a first picture that it cannot decode (a camera's
-//! RAW file, a mask, a broken file), none longer than 1 MiB, as some profiles are, and takes the missing part of a truncated file for
-//! samples in some compressions (TIFF 6.0, section 2; BigTIFF as in libtiff).
+//! The decoder of the crate `tiff` is not enough here. It returns no tags if it cannot decode the first image (a camera's RAW file, a
+//! mask, a broken file). It returns no tag longer than 1 MiB, and some ICC profiles are longer. For some compressions it decodes
+//! the missing part of a truncated file as if it were samples.
+//!
+//! The format is that of TIFF 6.0, section 2, and BigTIFF as in libtiff.
 
-/// Most directories of a file that are counted; chosen. It also ends a chain that goes in a circle.
-const MOST_PAGES: usize = 10_000;
+/// Maximum number of directories counted after the first (chosen). The limit also ends a circular chain.
+const MAX_PAGES: usize = 10_000;
 
-/// Most values of a tag that are read; chosen. Strips of one row of the tallest image are fewer.
-const MOST_VALUES: u64 = 1 << 20;
+/// Maximum number of values read from a tag (chosen). The tallest image has fewer strips, even at one row per strip.
+const MAX_VALUES: u64 = 1 << 20;
 
 // Tags (TIFF 6.0, appendix A; DNG 1.7).
 const NEW_SUBFILE_TYPE: u16 = 254;
@@ -26,37 +28,37 @@ const SAMPLE_FORMAT: u16 = 339;
 const ICC_PROFILE: u16 = 34675;
 const DNG_VERSION: u16 = 50706;
 
-/// Photometric interpretation of amounts of ink.
+/// Photometric interpretation for ink amounts, usually CMYK.
 const SEPARATED: u64 = 5;
 
-/// Sample format of IEEE floats.
+/// Sample format for IEEE floats.
 const FLOAT: u64 = 3;
 
-/// The facts of a TIFF file that decide how it is read.
+/// Properties of a TIFF file that decide how it is decoded.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct TiffOutline<'a> {
-    /// The orientation, 1 to 8, as in EXIF; 0 if it is not stated.
+    /// Orientation, 1 to 8, as in EXIF; 0 without the tag.
     pub(super) orientation: u64,
-    /// The number of pictures. Smaller copies of others are not counted.
+    /// Number of pages. Reduced-resolution copies after the first page are not counted.
     pub(super) pages: usize,
-    /// Whether the samples are amounts of cyan, magenta, yellow and black in 8 bits, pixel by pixel.
+    /// True for interleaved samples of cyan, magenta, yellow and black with 8 bits each.
     pub(super) is_cmyk: bool,
-    /// The colours that cannot be shown as they are; `None` for grey, RGB and the inks of `is_cmyk`.
+    /// Description of an unsupported colour space; `None` for grey, RGB, YCbCr and the inks of `is_cmyk`.
     pub(super) colours: Option<&'static str>,
-    /// The ICC profile; `None` if there is none.
+    /// ICC profile, if the file has one.
     pub(super) profile: Option<&'a [u8]>,
-    /// True for a camera's RAW file, whose first picture is a preview.
+    /// True for a camera's RAW file: its first image is a preview, or it is a DNG file.
     pub(super) is_raw: bool,
-    /// The number of bits of a sample.
+    /// Bits per sample.
     pub(super) bits: u64,
-    /// Whether the samples are floats.
+    /// True if the samples are floats.
     pub(super) is_float: bool,
-    /// The number of bytes up to the end of the samples.
+    /// Byte offset at which the last strip or tile of the first image ends.
     pub(super) end: u64,
 }
 
 impl<'a> TiffOutline<'a> {
-    /// Reads the tags; of a broken file those that can be read.
+    /// Parses the tags. Fields whose tags cannot be read have default values.
     pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut outline = Self::default();
         let Some((reader, first)) = Reader::open(file) else {
@@ -75,7 +77,7 @@ impl<'a> TiffOutline<'a> {
             && value(INK_SET).is_none_or(|set| set == 1)
             && value(PLANAR_CONFIGURATION).is_none_or(|planes| planes == 1);
         if !outline.is_cmyk {
-            outline.colours = colours(value(PHOTOMETRIC));
+            outline.colours = unsupported_colours(value(PHOTOMETRIC));
         }
         outline.profile = reader.bytes(&directory, ICC_PROFILE);
         let is_preview = value(NEW_SUBFILE_TYPE).is_some_and(is_reduced);
@@ -93,7 +95,7 @@ impl<'a> TiffOutline<'a> {
                 .map(|(offset, count)| offset.saturating_add(*count));
             outline.end = outline.end.max(end.max().unwrap_or(0));
         }
-        for _ in 0..MOST_PAGES {
+        for _ in 0..MAX_PAGES {
             let Some((directory, following)) = reader.directory(next) else {
                 break;
             };
@@ -105,15 +107,15 @@ impl<'a> TiffOutline<'a> {
     }
 }
 
-/// Whether a picture is a smaller copy of another.
+/// True if the subfile type marks a reduced-resolution copy of another image.
 fn is_reduced(subfile_type: u64) -> bool {
     subfile_type & 1 == 1
 }
 
-/// The name of colours that cannot be shown as they are.
-fn colours(photometric: Option<u64>) -> Option<&'static str> {
+/// Description of an unsupported colour space; `None` for a supported one or without the tag.
+fn unsupported_colours(photometric: Option<u64>) -> Option<&'static str> {
     match photometric? {
-        // White is 0, black is 0, RGB, YCbCr.
+        // In this order: grey with 0 as white, grey with 0 as black, RGB, YCbCr.
         0..=2 | 6 => None,
         3 => Some("a TIFF of palette colours"),
         4 => Some("a mask"),
@@ -124,114 +126,114 @@ fn colours(photometric: Option<u64>) -> Option<&'static str> {
     }
 }
 
-/// One tag of a directory.
+/// One tag of an image file directory.
 struct Entry {
     tag: u16,
-    kind: u16,
+    value_type: u16,
+    /// Number of values.
     count: u64,
-    /// The place of the values in the file.
-    at: u64,
+    /// Byte offset of the values in the file.
+    offset: u64,
 }
 
-/// A TIFF structure in a byte order.
+/// Reader of a TIFF file in its byte order.
 struct Reader<'a> {
     file: &'a [u8],
     is_big_endian: bool,
-    /// Whether offsets have 8 bytes (BigTIFF).
-    is_big: bool,
+    /// True for BigTIFF, whose offsets have 8 bytes.
+    is_big_tiff: bool,
 }
 
 impl<'a> Reader<'a> {
-    /// The reader of a file, and the place of its first directory.
+    /// Opens a file. Returns its reader and the offset of the first directory; `None` if the header is truncated.
     fn open(file: &'a [u8]) -> Option<(Self, u64)> {
         let is_big_endian = file.starts_with(b"MM");
         let mut reader = Self {
             file,
             is_big_endian,
-            is_big: false,
+            is_big_tiff: false,
         };
-        reader.is_big = reader.number(2, 2)? == 43;
-        let first = if reader.is_big {
-            reader.number(8, 8)?
+        reader.is_big_tiff = reader.read_uint(2, 2)? == 43;
+        let first = if reader.is_big_tiff {
+            reader.read_uint(8, 8)?
         } else {
-            reader.number(4, 4)?
+            reader.read_uint(4, 4)?
         };
         Some((reader, first))
     }
 
-    /// A whole number of 1, 2, 4 or 8 bytes.
-    fn number(&self, at: u64, bytes: usize) -> Option<u64> {
-        let at = usize::try_from(at).ok()?;
-        let bytes = self.file.get(at..at.checked_add(bytes)?)?;
-        let add = |sum: u64, byte: &u8| sum << 8 | u64::from(*byte);
+    /// Reads an unsigned integer of 1, 2, 4 or 8 bytes; `None` past the end of the file.
+    fn read_uint(&self, offset: u64, size: usize) -> Option<u64> {
+        let start = usize::try_from(offset).ok()?;
+        let bytes = self.file.get(start..start.checked_add(size)?)?;
+        let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
         Some(if self.is_big_endian {
-            bytes.iter().fold(0, add)
+            bytes.iter().fold(0, append)
         } else {
-            bytes.iter().rev().fold(0, add)
+            bytes.iter().rev().fold(0, append)
         })
     }
 
-    /// The entries of a directory, and the place of the next; `None` at its end.
+    /// Reads the entries of a directory and the offset of the next one (0 after the last); `None` at offset 0 or if an entry is truncated.
     fn directory(&self, at: u64) -> Option<(Vec<Entry>, u64)> {
         if at == 0 {
             return None;
         }
-        let (counted, offset) = if self.is_big { (8, 8) } else { (2, 4) };
-        let count = self.number(at, counted)?;
-        let size = 4 + 2 * offset as u64;
-        // An entry takes at least 12 bytes of the file.
+        let (count_size, offset_size) = if self.is_big_tiff { (8, 8) } else { (2, 4) };
+        let count = self.read_uint(at, count_size)?;
+        let entry_size = 4 + 2 * offset_size as u64;
+        // A broken count is limited to the entries that fit in the file: an entry has at least 12 bytes.
         let count = count.min(self.file.len() as u64 / 12);
         let mut entries = Vec::new();
-        let mut place = at.checked_add(counted as u64)?;
+        let mut place = at.checked_add(count_size as u64)?;
         for _ in 0..count {
-            let (tag, kind) = (
-                self.number(place, 2)? as u16,
-                self.number(place + 2, 2)? as u16,
+            let (tag, value_type) = (
+                self.read_uint(place, 2)? as u16,
+                self.read_uint(place + 2, 2)? as u16,
             );
-            let count = self.number(place + 4, offset)?;
-            let value = place + 4 + offset as u64;
-            let length = count.saturating_mul(bytes_of(kind));
-            let at = if length <= offset as u64 {
-                value
+            let count = self.read_uint(place + 4, offset_size)?;
+            let inline = place + 4 + offset_size as u64;
+            let length = count.saturating_mul(size_of_type(value_type));
+            let offset = if length <= offset_size as u64 {
+                inline
             } else {
-                self.number(value, offset)?
+                self.read_uint(inline, offset_size)?
             };
             entries.push(Entry {
                 tag,
-                kind,
+                value_type,
                 count,
-                at,
+                offset,
             });
-            place = place.checked_add(size)?;
+            place = place.checked_add(entry_size)?;
         }
-        Some((entries, self.number(place, offset).unwrap_or(0)))
+        Some((entries, self.read_uint(place, offset_size).unwrap_or(0)))
     }
 
-    /// The bytes of a tag; `None` if the directory does not have it, or the file ends before they do.
+    /// Returns the bytes of a tag; `None` if the directory lacks it or the file ends too early.
     fn bytes(&self, directory: &[Entry], tag: u16) -> Option<&'a [u8]> {
         let entry = directory.iter().find(|entry| entry.tag == tag)?;
-        let at = usize::try_from(entry.at).ok()?;
-        let end = at.checked_add(usize::try_from(entry.count).ok()?)?;
-        self.file.get(at..end)
+        let start = usize::try_from(entry.offset).ok()?;
+        let end = start.checked_add(usize::try_from(entry.count).ok()?)?;
+        self.file.get(start..end)
     }
 
-    /// The values of a tag as whole numbers; empty if the directory does not have it.
+    /// Reads the values of a tag as unsigned integers, up to the end of the file; empty if the directory lacks the tag.
     fn values(&self, directory: &[Entry], tag: u16) -> Vec<u64> {
         let Some(entry) = directory.iter().find(|entry| entry.tag == tag) else {
             return Vec::new();
         };
-        let bytes = bytes_of(entry.kind);
-        let places =
-            (0..entry.count.min(MOST_VALUES)).map(|index| entry.at.checked_add(index * bytes));
-        places
-            .map_while(|at| self.number(at?, bytes as usize))
+        let size = size_of_type(entry.value_type);
+        (0..entry.count.min(MAX_VALUES))
+            .map(|index| entry.offset.checked_add(index * size))
+            .map_while(|offset| self.read_uint(offset?, size as usize))
             .collect()
     }
 }
 
-/// The bytes of a value of a type: whole numbers of 1, 2, 4 and 8 bytes. All other types count as bytes.
-fn bytes_of(kind: u16) -> u64 {
-    match kind {
+/// Size in bytes of one value of an unsigned integer type. Every other type has 1 here.
+fn size_of_type(value_type: u16) -> u64 {
+    match value_type {
         3 => 2,
         4 | 13 => 4,
         16 | 18 => 8,

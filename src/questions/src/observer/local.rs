@@ -1,72 +1,77 @@
-//! Light and noise that differ from place to place: [`fit`].
+//! Fit with light and noise that vary across the image: [`fit`].
 //!
-//! One curve for all pixels is wrong if only a part of an image was changed: what covers one corner would count as noise
-//! everywhere, and uneven light as noise in every tile. So the curve is estimated together with a smooth field of light, from the
-//! tiles that agree with it: iteratively reweighted least squares, in which the weight of a tile is the inverse of its mean squared
-//! residual (Huber and Ronchetti, *Robust Statistics*, 2009, chapter 7).
+//! A single curve for all pixels fails if only a part of the image was changed. A covered corner would raise the noise everywhere, and
+//! uneven light would look like noise in every tile. This fit therefore estimates the curve together with a smooth light field, by
+//! iteratively reweighted least squares: the weight of a tile is the inverse of its mean squared residual, so tiles that contradict
+//! the curve count little (Huber and Ronchetti, *Robust Statistics*, 2009, chapter 7).
 //!
-//! The tiles vote on the result. A tile with contrast agrees if the received contrast is between half and twice the predicted one.
-//! Unless at least half of them agree, the image is another one, and there is no local fit. So an image of another room is judged by
-//! all of its pixels, and cannot be confirmed by the few tiles that happen to look alike.
+//! The tiles with contrast then vote. A tile agrees if its received contrast is between half and twice the predicted contrast. If fewer
+//! than half of them agree, the image shows something else, and the fit to all pixels is used. An image of another room therefore
+//! cannot be confirmed by a few tiles that look alike by chance.
 
 use super::channel::{ChannelFit, CodeTotals, Fit, ROUNDING, TileFit};
 use super::tiles::{CODES, TileSums, Tiles};
 
-/// Rounds of reweighting without a field of light, so that a covered part is not mistaken for a bright one (chosen).
+/// Number of rounds before the light field is fitted (chosen). Covered tiles lose their weight first, so the field does not fit them.
 const ROUNDS_WITHOUT_FIELD: usize = 3;
 
-/// Rounds of reweighting (chosen).
+/// Total number of rounds of reweighting (chosen).
 const ROUNDS: usize = 12;
 
-/// Coefficients of the field of light: a polynomial of the second degree in the place.
+/// Number of coefficients of the light field, a quadratic polynomial in the tile's position.
 const TERMS: usize = 6;
 
-/// Least gain of the light (chosen).
+/// Minimum gain of the light (chosen).
 pub(super) const MIN_GAIN: f64 = 0.02;
 
-/// Contrast of a tile that agrees, relative to the predicted one: nearer to "as predicted" than to "nothing", and the inverse.
+/// Ratio of received to predicted contrast at which a tile agrees: from half-way between no contrast and the predicted contrast, to the
+/// inverse.
 const AGREEING: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
-/// Least signal-to-noise ratio of a tile's contrast at which the tile can deny it (chosen, that of an outline's element).
-const CERTAIN: f64 = 6.8;
+/// Minimum signal-to-noise ratio of a tile's predicted contrast for the tile to contradict the prediction (chosen, as for an element of
+/// an outline).
+const MIN_SNR: f64 = 6.8;
 
-/// A tile is disturbed if its mean squared residual is above this many times the median of all tiles (chosen), and above
-/// [`MAX_UNEXPLAINED`] of its own contrast.
+/// Maximum ratio of a tile's mean squared residual to the median over all tiles (chosen). A tile is disturbed if it exceeds this ratio
+/// and [`MAX_UNEXPLAINED`].
 const MAX_RESIDUAL: f64 = 9.0;
 
-/// See [`MAX_RESIDUAL`] (chosen).
+/// Maximum ratio of a tile's sum of squared residuals to its squared predicted contrasts (chosen).
 const MAX_UNEXPLAINED: f64 = 0.25;
 
-/// Number of pixels by which the noise of a tile is drawn to that of all tiles (chosen).
+/// Number of pixels with the expected noise that are added to each tile, to shrink its noise towards that of all tiles (chosen).
 const SHARED_PIXELS: f64 = 64.0;
 
-/// Fits the channels of a received image: tile by tile if most tiles agree with one curve, else all pixels alike.
+/// Fits the channels of a received image: tile by tile if enough tiles agree with one curve, else with one fit for all pixels.
 pub(super) fn fit(tiles: &Tiles, sums: &TileSums) -> Fit {
     let whole = Fit::whole(tiles, sums);
     by_tile(tiles, sums, &whole).unwrap_or(whole)
 }
 
-/// The fit with light and noise of each tile; `None` unless at least half of the tiles with contrast agree. `whole` is the fit to
-/// all pixels.
+/// Fit with the light and noise of each tile; `None` unless at least half of the tiles with contrast agree. `whole` is the fit to all
+/// pixels, from which the iteration starts.
 fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
     let curves = curves(tiles, sums, whole);
     let moments = moments(tiles, sums, &curves);
-    let found: Vec<Contrast> = moments.iter().map(Contrast::from_moments).collect();
-    let [yes, all] = (0..tiles.len())
+    let contrasts: Vec<Contrast> = moments.iter().map(Contrast::from_moments).collect();
+    let [agreeing, voting] = (0..tiles.len())
         .filter(|tile| tiles.has_contrast(*tile))
-        .fold([0, 0], |[yes, all], tile| {
-            let agrees = AGREEING.contains(&found[tile].amplitude);
-            [yes + usize::from(agrees), all + 1]
+        .fold([0, 0], |[agreeing, voting], tile| {
+            let agrees = AGREEING.contains(&contrasts[tile].amplitude);
+            [agreeing + usize::from(agrees), voting + 1]
         });
-    if yes == 0 || 2 * yes < all {
+    if agreeing == 0 || 2 * agreeing < voting {
         return None;
     }
-    let usual = median(found.iter().map(|contrast| contrast.residual)).max(ROUNDING);
-    let disturbed = |tile: usize| {
-        let contrast = &found[tile];
-        contrast.is_disturbed(usual) || tiles.has_contrast(tile) && contrast.is_denied()
-    };
-    let disturbed: Vec<bool> = (0..tiles.len()).map(disturbed).collect();
+    let median_residual = median(contrasts.iter().map(|contrast| contrast.residual)).max(ROUNDING);
+    let disturbed: Vec<bool> = contrasts
+        .iter()
+        .enumerate()
+        .map(|(tile, contrast)| {
+            contrast.is_disturbed(median_residual)
+                || tiles.has_contrast(tile) && contrast.contradicts_prediction()
+        })
+        .collect();
     let channels = [0, 1, 2].map(|channel| {
         let mut codes = CodeTotals::default();
         for tile in (0..tiles.len()).filter(|tile| !disturbed[*tile]) {
@@ -79,25 +84,29 @@ fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
             curve,
         }
     });
-    let tiles = (0..tiles.len()).map(|tile| TileFit {
-        gain: moments[tile].map(|moments| moments.gain()),
-        noise: [0, 1, 2].map(|channel| {
-            let variance = &channels[channel].variance;
-            let pixels = tiles.by_code(sums, tile, channel);
-            let expected = pixels.map(|same| same.count * variance[same.code].max(ROUNDING));
-            moments[tile][channel].noise(expected.sum())
-        }),
-        is_disturbed: disturbed[tile],
-    });
+    let tile_fits = (0..tiles.len())
+        .map(|tile| TileFit {
+            gain: moments[tile].map(|moments| moments.gain()),
+            noise: [0, 1, 2].map(|channel| {
+                let variance = &channels[channel].variance;
+                let expected: f64 = tiles
+                    .by_code(sums, tile, channel)
+                    .map(|same| same.count * variance[same.code].max(ROUNDING))
+                    .sum();
+                moments[tile][channel].noise(expected)
+            }),
+            is_disturbed: disturbed[tile],
+        })
+        .collect();
     Some(Fit {
-        tiles: tiles.collect(),
+        tiles: tile_fits,
         channels,
         is_local: true,
         explained: whole.explained,
     })
 }
 
-/// The curve of each channel, with which most tiles agree.
+/// Estimates the curve of each channel by iteratively reweighted least squares over the tiles, starting from `whole`.
 fn curves(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> [[f64; CODES]; 3] {
     let mut curves = [0, 1, 2].map(|channel| whole.channels[channel].curve);
     let mut weights = vec![1.0; tiles.len()];
@@ -105,7 +114,7 @@ fn curves(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> [[f64; CODES]; 3] {
     for round in 0..ROUNDS {
         let moments = moments(tiles, sums, &curves);
         if round >= ROUNDS_WITHOUT_FIELD {
-            gains = field(tiles, &moments, &weights);
+            gains = light_field(tiles, &moments, &weights);
         }
         let residuals: Vec<f64> = moments
             .iter()
@@ -141,7 +150,7 @@ fn curves(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> [[f64; CODES]; 3] {
     curves
 }
 
-/// Sums over the pixels of a tile, in one channel, with P the predicted and R the received code.
+/// Sums over the pixels of one tile in one channel, with P the predicted and R the received code.
 #[derive(Debug, Clone, Copy, Default)]
 struct Moments {
     /// Number of pixels.
@@ -159,7 +168,7 @@ struct Moments {
 }
 
 impl Moments {
-    /// The gain of the light that explains the received codes best; 1 if nothing is predicted.
+    /// Least-squares gain of the light; 1 if nothing is predicted.
     fn gain(&self) -> f64 {
         if self.power > 0.0 {
             self.product / self.power
@@ -168,21 +177,21 @@ impl Moments {
         }
     }
 
-    /// The sum of squared residuals in light of a given gain.
+    /// Sum of squared residuals at a given gain of the light.
     fn residual(&self, gain: f64) -> f64 {
         (self.squares - 2.0 * gain * self.product + gain * gain * self.power).max(0.0)
     }
 
-    /// The variance of the noise relative to the expected one, a sum over the pixels.
+    /// Ratio of the noise variance to the expected variance. `expected` is the sum of the expected variances of the pixels.
     fn noise(&self, expected: f64) -> f64 {
         let shared = SHARED_PIXELS * expected / self.pixels.max(1.0);
         (self.residual(self.gain()) + shared) / (expected + shared).max(ROUNDING)
     }
 }
 
-/// The moments of each tile and channel.
+/// Moments of each tile and channel.
 fn moments(tiles: &Tiles, sums: &TileSums, curves: &[[f64; CODES]; 3]) -> Vec<[Moments; 3]> {
-    let of_channel = |tile: usize, channel: usize| {
+    let channel_moments = |tile: usize, channel: usize| {
         let mut moments = Moments::default();
         for same in tiles.by_code(sums, tile, channel) {
             let predicted = curves[channel][same.code];
@@ -195,20 +204,19 @@ fn moments(tiles: &Tiles, sums: &TileSums, curves: &[[f64; CODES]; 3]) -> Vec<[M
         }
         moments
     };
-    let tiles = 0..tiles.len();
-    tiles
-        .map(|tile| [0, 1, 2].map(|channel| of_channel(tile, channel)))
+    (0..tiles.len())
+        .map(|tile| [0, 1, 2].map(|channel| channel_moments(tile, channel)))
         .collect()
 }
 
-/// The received contrast of a tile against the predicted one, over all channels.
+/// Received contrast of a tile compared with the predicted contrast, over all channels.
 #[derive(Debug, Clone, Copy)]
 struct Contrast {
-    /// Slope of the received codes over those predicted in the tile's own light; 0 if no contrast is predicted.
+    /// Slope of received over predicted codes, after the tile's own gain; 0 if no contrast is predicted.
     amplitude: f64,
     /// Sum of the squared predicted contrasts.
     power: f64,
-    /// Mean squared residual of a sample in the tile's own light.
+    /// Mean squared residual of a sample at the tile's own gain.
     residual: f64,
     /// Number of samples.
     samples: f64,
@@ -233,26 +241,26 @@ impl Contrast {
         }
     }
 
-    /// Whether more is left than noise, with the usual mean squared residual of a sample.
-    fn is_disturbed(&self, usual: f64) -> bool {
-        self.residual > MAX_RESIDUAL * usual
+    /// True if the residual exceeds the noise. `median_residual` is the median over all tiles of the mean squared residual.
+    fn is_disturbed(&self, median_residual: f64) -> bool {
+        self.residual > MAX_RESIDUAL * median_residual
             && self.residual * self.samples > MAX_UNEXPLAINED * self.power
     }
 
-    /// Whether the contrast is certainly not the predicted one.
-    fn is_denied(&self) -> bool {
-        let certainty = self.power / self.residual.max(ROUNDING);
-        certainty >= CERTAIN * CERTAIN && !AGREEING.contains(&self.amplitude)
+    /// True if the predicted contrast is strong enough to detect and the received contrast does not agree with it.
+    fn contradicts_prediction(&self) -> bool {
+        let squared_snr = self.power / self.residual.max(ROUNDING);
+        squared_snr >= MIN_SNR * MIN_SNR && !AGREEING.contains(&self.amplitude)
     }
 }
 
-/// The gains of a smooth field of light at each tile: the polynomial that explains the received codes best.
-fn field(tiles: &Tiles, moments: &[[Moments; 3]], weights: &[f64]) -> Vec<[f64; 3]> {
+/// Gains of the smooth light field at each tile and channel, from a weighted least-squares fit of the polynomial.
+fn light_field(tiles: &Tiles, moments: &[[Moments; 3]], weights: &[f64]) -> Vec<[f64; 3]> {
     let rows = tiles.len().div_ceil(tiles.columns.max(1));
     let terms: Vec<[f64; TERMS]> = (0..tiles.len())
         .map(|tile| {
             let [column, row] = tiles.place(tile);
-            // From −1 to 1.
+            // Centre of the tile, from −1 to 1.
             let x = (2.0 * column + 1.0) / tiles.columns as f64 - 1.0;
             let y = (2.0 * row + 1.0) / rows as f64 - 1.0;
             [1.0, x, y, x * x, x * y, y * y]
@@ -277,7 +285,7 @@ fn field(tiles: &Tiles, moments: &[[Moments; 3]], weights: &[f64]) -> Vec<[f64; 
         .collect()
 }
 
-/// Normal equations of a weighted linear regression on `N` terms; the first is constant.
+/// Normal equations of a weighted linear regression on `N` terms; the first term is constant.
 #[derive(Debug, Clone)]
 pub(super) struct Equations<const N: usize> {
     matrix: [[f64; N]; N],
@@ -294,7 +302,8 @@ impl<const N: usize> Default for Equations<N> {
 }
 
 impl<const N: usize> Equations<N> {
-    /// Adds observations at a place with these terms: the sum of their squared predictors, and of predictor × response.
+    /// Adds observations that share these terms: `power` is the sum of their squared predictors, `product` the sum of predictor ×
+    /// response.
     pub(super) fn add(&mut self, terms: &[f64; N], power: f64, product: f64) {
         for (i, row) in self.matrix.iter_mut().enumerate() {
             for (j, value) in row.iter_mut().enumerate() {
@@ -304,7 +313,8 @@ impl<const N: usize> Equations<N> {
         }
     }
 
-    /// The coefficients; the constant 1 if there is no observation. Terms that the observations do not determine are near 0.
+    /// Returns the coefficients; without observations, the constant term is 1 and the others are 0. A small ridge keeps terms near 0
+    /// that the observations do not determine.
     pub(super) fn solve(mut self) -> [f64; N] {
         let total = self.matrix[0][0];
         let mut solution = [0.0; N];
@@ -315,7 +325,7 @@ impl<const N: usize> Equations<N> {
         for i in 1..N {
             self.matrix[i][i] += 1e-6 * total;
         }
-        // Gaussian elimination; the matrix is positive definite, so no pivot is needed.
+        // Gaussian elimination; the matrix is positive definite, so it needs no pivoting.
         for i in 0..N {
             for row in i + 1..N {
                 let factor = self.matrix[row][i] / self.matrix[i][i];
@@ -333,7 +343,7 @@ impl<const N: usize> Equations<N> {
     }
 }
 
-/// The median, the upper of the middle two; 0 without values.
+/// Median of the values, the upper one of two middle values; 0 without values.
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);

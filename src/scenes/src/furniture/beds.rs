@@ -1,4 +1,4 @@
-//! Beds with their pillows, and cushions.
+//! Beds with pillows, and cushions for seats.
 
 use glam::{Vec3, vec3};
 
@@ -10,10 +10,10 @@ use super::super::scene::{Piece, kind};
 use super::super::surface::Surface;
 use super::{FurnitureSet, at, legs};
 
-/// A bed with its blanket, and one or two pillows.
+/// A bed with a blanket and one or two pillows.
 pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
-    let double = dice.chance(0.6);
-    let width = if double {
+    let is_double = dice.chance(0.6);
+    let width = if is_double {
         dice.between(1.45, 1.7)
     } else {
         dice.between(0.95, 1.1)
@@ -27,8 +27,8 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
     let blanket = Surface::fabric(cover, dice);
     legs(&mut mesh, vec3(width, 0.2, length), 0.06, 0.07, &wood);
     mesh.board(half, [0.16, 0.3], [0.02, length], &wood);
-    let head = dice.between(0.85, 1.1);
-    mesh.cushion(half + 0.03, [0.1, head], [0.0, 0.07], 0.03, &wood);
+    let head_height = dice.between(0.85, 1.1);
+    mesh.cushion(half + 0.03, [0.1, head_height], [0.0, 0.07], 0.03, &wood);
     mesh.cushion(
         half - 0.02,
         [0.28, 0.5],
@@ -36,26 +36,26 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
         0.07,
         &sheet,
     );
-    // The blanket hangs over both sides and the foot, and is folded back at the head.
-    let from = dice.between(0.55, 0.7);
+    // The blanket overhangs both sides and the foot of the bed. It is folded back at `fold`, measured from the head.
+    let fold = dice.between(0.55, 0.7);
     mesh.cushion(
         half + 0.035,
         [0.2, 0.56],
-        [from, length + 0.035],
+        [fold, length + 0.035],
         0.06,
         &blanket,
     );
     mesh.cushion(
         half + 0.03,
         [0.44, 0.575],
-        [from - 0.16, from + 0.06],
+        [fold - 0.16, fold + 0.06],
         0.05,
         &if dice.chance(0.5) { sheet } else { blanket },
     );
     let mut set = FurnitureSet::from_piece(Piece::new(kind("bed", "bed"), mesh, cover.name));
-    set.size = vec3(width + 0.1, head, length + 0.04);
+    set.size = vec3(width + 0.1, head_height, length + 0.04);
     let paint = Paint::random(&["white", "grey", "pink", "yellow", "blue", "green"], dice);
-    let count = if double { 2 } else { 1 };
+    let count = if is_double { 2 } else { 1 };
     for i in 0..count {
         let x = (i as f32 - (count as f32 - 1.0) / 2.0) * width * 0.48;
         let size = vec3(width / count as f32 * 0.8, 0.42, 0.17);
@@ -65,7 +65,7 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
     set
 }
 
-/// A pillow or cushion with its center at the origin, tilted backwards by an angle.
+/// A pillow or cushion with its center at the origin, tilted backwards by `lean` radians.
 pub(in super::super) fn pillow(
     word: &'static str,
     size: Vec3,
@@ -86,6 +86,7 @@ pub(in super::super) fn cushion(dice: &mut Dice) -> Piece {
     if dice.chance(0.15) {
         let other = Paint::random(&["white", "black"], dice);
         surface = surface.with(Pattern::Stripes(0.05, other.color));
+        // Two colors: the cushion has no single color name.
         name = "";
     }
     let side = dice.between(0.38, 0.45);

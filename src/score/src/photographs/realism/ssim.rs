@@ -11,30 +11,31 @@ use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::Rgb;
 use darkqa_ground::types::images::{Isa, Kernel};
 
-/// Half-width of the window in pixels: 3.5 deviations of 1.5 pixels, rounded down.
+/// Half-width of the window in pixels: 3.5 standard deviations of 1.5 pixels, rounded.
 const RADIUS: usize = 5;
+/// Number of weights along a side of the window.
 const TAPS: usize = 2 * RADIUS + 1;
 
-/// Weights of a window along one side.
+/// Weights along one side of the window.
 type Window = [f32; TAPS];
 
 /// Number of local means: of x, y, x² + y² and xy.
 const MOMENTS: usize = 4;
 
-/// Samples of a row that are computed together. The last rows of all moments stay in the nearest cache; 64 to 192 are as fast on an
-/// EPYC. A multiple of [`LANES`].
+/// Windows in a row of a tile, a multiple of [`LANES`]. The last [`TAPS`] rows of all moments fit in the L1 cache. Tiles of 64 to 192
+/// are equally fast on an AMD EPYC.
 const TILE: usize = 96;
 
-/// Sums that are added up side by side.
+/// Number of partial sums that are added in parallel.
 const LANES: usize = 8;
 
-/// Samples of the three channels that the windows of a tile cover.
+/// Samples of an image row that the windows of a tile cover; the three channels are interleaved.
 const COVERED: usize = TILE + 3 * (TAPS - 1);
 
-/// Rows of windows that are computed one after the other.
+/// Rows of windows per band. Threads compute bands in parallel.
 const BAND: usize = 64;
 
-/// Code that is subtracted from every sample, so that its square keeps more digits in `f32`.
+/// Code that is subtracted from every sample. Squares of the difference are more precise in `f32`.
 const MIDDLE: u8 = 128;
 
 /// Checks that two images have the same size; the error names both sizes.
@@ -50,12 +51,12 @@ pub fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
     Err(Error::data("pair", problem))
 }
 
-/// Structural similarity (Wang et al. 2004): gaussian window of deviation 1.5 (11 × 11), K1 0.01, K2 0.03, population
-/// covariance, data range 255; the mean over the three channels and the interior, where the window lies within the image.
+/// Structural similarity (Wang et al. 2004): Gaussian window of standard deviation 1.5 (11 × 11), K1 0.01, K2 0.03, population
+/// covariance, data range 255. The result is the mean over the three channels and over all windows inside the image.
 ///
 /// It equals scikit-image's `structural_similarity` with `gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
-/// data_range=255, channel_axis=-1` to 10⁻⁶, and to 10⁻⁵ where all is dark: the local means are `f32` about the middle code, which
-/// takes a third of the time of `f64`.
+/// data_range=255, channel_axis=-1` to 10⁻⁶, and to 10⁻⁵ for dark images. Local means are `f32`, relative to code 128: this takes a
+/// third of the time of `f64`.
 ///
 /// # Errors
 /// If the sizes differ, or if a side is shorter than the window.
@@ -67,11 +68,11 @@ pub fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
             format_args!("{width} × {height} pixels are fewer than the window's {TAPS} × {TAPS}");
         return Err(Error::data("pair", problem));
     }
-    Ok(mean(a, b, Isa::best()))
+    Ok(mean_similarity(a, b, Isa::best()))
 }
 
-/// The mean over all windows. The sums of the rows are added in their order, so that the result does not depend on the threads.
-fn mean(a: &Rgb, b: &Rgb, isa: Isa) -> f64 {
+/// Mean similarity over all windows. Row sums are added in row order, so that the result does not depend on the number of threads.
+fn mean_similarity(a: &Rgb, b: &Rgb, isa: Isa) -> f64 {
     let [height, width] = [a.height(), a.width()].map(|side| side - (TAPS - 1));
     let window = window();
     let mut sums = vec![0.0; height];
@@ -88,6 +89,7 @@ fn mean(a: &Rgb, b: &Rgb, isa: Isa) -> f64 {
     sums.iter().sum::<f64>() / (3 * height * width) as f64
 }
 
+/// Gaussian weights of standard deviation 1.5 pixels; their sum is 1.
 fn window() -> Window {
     let weights: [f64; TAPS] = std::array::from_fn(|tap| {
         let distance = tap as f64 - RADIUS as f64;
@@ -97,31 +99,31 @@ fn window() -> Window {
     weights.map(|weight| (weight / sum) as f32)
 }
 
-/// Numbers of a row, on a boundary of the cache: a vector that crosses one is loaded in two steps.
+/// Row of numbers, aligned to a cache line: loading a vector that crosses two lines takes two accesses.
 #[repr(align(64))]
 #[derive(Clone, Copy)]
 struct Row<const N: usize>([f32; N]);
 
-/// Codes of both images in a row that the windows of a tile cover.
+/// Codes of both images in one image row, as far as the windows of a tile cover it.
 type Codes = [[u8; COVERED]; 2];
 
-/// Adjacent rows of windows.
+/// Adjacent rows of windows of an image pair, computed by one thread.
 struct Band<'a> {
     images: [&'a Rgb; 2],
-    /// Row of the first windows.
+    /// Index of the first row of windows.
     first: usize,
     window: &'a Window,
-    /// The sum over each row of windows.
+    /// Output: the sum of similarities of each row of windows.
     sums: &'a mut [f64],
 }
 
 impl Band<'_> {
-    /// Rows that the windows of the band cover.
+    /// Number of image rows that the windows of the band cover.
     fn lines(&self) -> usize {
         self.sums.len() + TAPS - 1
     }
 
-    /// The covered codes, tile after tile. A tile goes down through many rows of an image, which would miss the cache at each one.
+    /// Copies the covered codes tile by tile. Reading a tile directly from an image would miss the cache at each row.
     fn tiled(&self) -> Vec<Codes> {
         let stride = 3 * self.images[0].width();
         let lines = self.lines();
@@ -145,8 +147,8 @@ impl Kernel for Band<'_> {
     fn run(self) {
         let windows = 3 * (self.images[0].width() - (TAPS - 1));
         let mut moments = [Row([0.0; COVERED]); MOMENTS];
-        // The means over each of the last rows, by its number modulo the taps.
-        let mut rows = vec![[Row([0.0; TILE]); MOMENTS]; TAPS];
+        // Ring buffer of the weighted means along the last `TAPS` image rows.
+        let mut recent = vec![[Row([0.0; TILE]); MOMENTS]; TAPS];
         let mut means = [Row([0.0; TILE]); MOMENTS];
         for (tile, begin) in self
             .tiled()
@@ -155,13 +157,13 @@ impl Kernel for Band<'_> {
         {
             for (line, codes) in tile.iter().enumerate() {
                 set_moments(&mut moments, codes);
-                for (row, moment) in rows[line % TAPS].iter_mut().zip(&moments) {
-                    set_along_row(row, self.window, moment);
+                for (row, moment) in recent[line % TAPS].iter_mut().zip(&moments) {
+                    filter_along_row(row, self.window, moment);
                 }
                 if let Some(first) = (line + 1).checked_sub(TAPS) {
                     for (moment, means) in means.iter_mut().enumerate() {
-                        let row = |tap: usize| &rows[(first + tap) % TAPS][moment];
-                        set_over_rows(means, self.window, std::array::from_fn(row));
+                        let row = |tap: usize| &recent[(first + tap) % TAPS][moment];
+                        filter_over_rows(means, self.window, std::array::from_fn(row));
                     }
                     let mut similarities = similarities(&means);
                     similarities[TILE.min(windows - begin)..].fill(0.0);
@@ -172,7 +174,7 @@ impl Kernel for Band<'_> {
     }
 }
 
-/// Sets x, y, x² + y² and xy of the centered samples.
+/// Computes x, y, x² + y² and xy of samples minus [`MIDDLE`].
 #[inline(always)]
 fn set_moments(moments: &mut [Row<COVERED>; MOMENTS], codes: &Codes) {
     let [xs, ys, squares, products] = moments;
@@ -186,9 +188,9 @@ fn set_moments(moments: &mut [Row<COVERED>; MOMENTS], codes: &Codes) {
     }
 }
 
-/// Sets the weighted means of a row's samples in each window. The window is symmetric, so that two samples share a product.
+/// Computes the weighted mean along a row for each window. The window is symmetric: two samples share one multiplication.
 #[inline(always)]
-fn set_along_row(means: &mut Row<TILE>, window: &Window, samples: &Row<COVERED>) {
+fn filter_along_row(means: &mut Row<TILE>, window: &Window, samples: &Row<COVERED>) {
     for i in 0..TILE {
         let mut mean = window[RADIUS] * samples.0[i + 3 * RADIUS];
         for (tap, weight) in window[..RADIUS].iter().enumerate() {
@@ -198,9 +200,9 @@ fn set_along_row(means: &mut Row<TILE>, window: &Window, samples: &Row<COVERED>)
     }
 }
 
-/// Sets the weighted means over the rows of each window.
+/// Computes the weighted mean over the rows of each window.
 #[inline(always)]
-fn set_over_rows(means: &mut Row<TILE>, window: &Window, rows: [&Row<TILE>; TAPS]) {
+fn filter_over_rows(means: &mut Row<TILE>, window: &Window, rows: [&Row<TILE>; TAPS]) {
     for i in 0..TILE {
         let mut mean = window[RADIUS] * rows[RADIUS].0[i];
         for (tap, weight) in window[..RADIUS].iter().enumerate() {
@@ -210,13 +212,13 @@ fn set_over_rows(means: &mut Row<TILE>, window: &Window, rows: [&Row<TILE>; TAPS
     }
 }
 
-/// The similarity of each window, from the means of x, y, x² + y² and xy.
+/// Similarity of each window, from the means of x, y, x² + y² and xy.
 #[inline(always)]
 fn similarities([x, y, squares, product]: &[Row<TILE>; MOMENTS]) -> [f32; TILE] {
     std::array::from_fn(|i| similarity(x.0[i], y.0[i], squares.0[i], product.0[i]))
 }
 
-/// The sum in `f64`, in an order that vector instructions can keep.
+/// Sum in `f64`, added lane by lane: every instruction set can keep this order.
 #[inline(always)]
 fn sum(numbers: &[f32; TILE]) -> f64 {
     let mut sums = [0.0; LANES];
@@ -228,7 +230,7 @@ fn sum(numbers: &[f32; TILE]) -> f64 {
     sums.iter().sum()
 }
 
-/// Similarity of a window, from the means of x, y, x² + y² and xy of centered samples.
+/// Similarity of a window, from the means of x, y, x² + y² and xy of samples minus [`MIDDLE`].
 #[inline(always)]
 fn similarity(x: f32, y: f32, squares: f32, product: f32) -> f32 {
     const C1: f32 = (0.01 * 255.0) * (0.01 * 255.0);
@@ -242,7 +244,7 @@ fn similarity(x: f32, y: f32, squares: f32, product: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// An image by an integer rule. The expected values are those of scikit-image 0.26 for the same images.
+    /// Synthetic image that an integer formula generates, so that Python can generate the same image.
     fn image(height: usize, width: usize, salt: usize) -> Rgb {
         Rgb::new(
             height,
@@ -254,16 +256,17 @@ mod tests {
         .unwrap()
     }
 
+    /// Height, width and salt of an image, and its SSIM to the image of salt 1 by scikit-image 0.26.
     const SKIMAGE: [(usize, usize, usize, f64); 4] = [
         (11, 11, 2, 0.046_313_122_302_007_72),
         (24, 40, 3, 0.008_024_444_085_244_848),
         (37, 50, 5, 0.011_143_454_653_654_81),
-        // More rows than a band and more samples than a tile, and a part of each at the end.
+        // Several bands and tiles; the last band and the last tile are partial.
         (150, 101, 5, 0.019_581_441_542_294_38),
     ];
 
     #[test]
-    fn values_are_those_of_scikit_image() {
+    fn ssim_matches_scikit_image() {
         for (height, width, salt, expected) in SKIMAGE {
             let found = ssim(&image(height, width, 1), &image(height, width, salt)).unwrap();
             assert!(
@@ -273,9 +276,9 @@ mod tests {
         }
     }
 
-    /// The variances of dark images are small beside the middle code, which costs digits.
+    /// Dark images have small variances relative to [`MIDDLE`]², so that `f32` loses digits.
     #[test]
-    fn values_of_dark_images_are_those_of_scikit_image() {
+    fn dark_ssim_matches_scikit_image() {
         let [clean, other] = [1, 5].map(|salt| {
             let mut dark = image(150, 101, salt);
             dark.samples_mut().iter_mut().for_each(|code| *code %= 13);
@@ -286,18 +289,18 @@ mod tests {
     }
 
     #[test]
-    fn an_image_is_most_similar_to_itself() {
+    fn identical_images_have_ssim_one() {
         let [clean, other] = [1, 5].map(|salt| image(150, 101, salt));
         assert!((ssim(&clean, &clean).unwrap() - 1.0).abs() < 1e-6);
         assert!(ssim(&clean, &other).unwrap() < 0.1);
     }
 
     #[test]
-    fn every_instruction_set_gives_the_same_bits() {
+    fn instruction_sets_give_same_bits() {
         let images = [1, 5].map(|salt| image(150, 101, salt));
         let [first, rest @ ..] = &Isa::available()
             .into_iter()
-            .map(|isa| mean(&images[0], &images[1], isa).to_bits())
+            .map(|isa| mean_similarity(&images[0], &images[1], isa).to_bits())
             .collect::<Vec<_>>()[..]
         else {
             unreachable!("every machine has the baseline");
@@ -306,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_must_fit() {
+    fn small_images_are_rejected() {
         let error = ssim(&image(10, 30, 1), &image(10, 30, 1))
             .unwrap_err()
             .to_string();
