@@ -19,7 +19,7 @@ const SECRET: &str = "[secret]";
 const IMAGE_PREFIX: &str = "data:image/";
 
 /// Suffixes of environment variables whose value is a key.
-const KEY_VARIABLE_SUFFIXES: [&str; 4] = ["_KEY", "_TOKEN", "_SECRET", "_PASSWORD"];
+const KEY_VARIABLE_SUFFIXES: [&str; 6] = ["KEY", "TOKEN", "SECRET", "PASSWORD", "_PAT", "_PASS"];
 
 /// The kind of a redacted part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -73,12 +73,12 @@ pub(super) enum Paths {
 /// An absolute path (group 2) after the start of the text or a delimiter (group 1).
 static PATH: LazyLock<Regex> = LazyLock::new(|| {
     compile(
-        r#"(^|[\s"'=:,;(\[])((?:/[^\s"',;:()\[\]/]+){2,}/?|[A-Za-z]:\\[^\s"',;]+|\\\\[^\s"',;]+)"#,
+        r#"(^|[\s"'=:,;(\[]|\bfile://)((?:/[^\s"',;:()\[\]/]+){2,}/?|[A-Za-z]:\\[^\s"',;]+|\\\\[^\s"',;]+)"#,
     )
 });
 /// The user name and password before a host; group 1 is the URL scheme.
 static USER: LazyLock<Regex> =
-    LazyLock::new(|| compile(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'@?#]+@"#));
+    LazyLock::new(|| compile(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'?#]+@"#));
 /// A URL with a query or fragment; group 1 is the URL without them.
 static QUERY: LazyLock<Regex> = LazyLock::new(|| compile(r#"(https?://[^\s"'?#]+)[?#][^\s"']*"#));
 /// Key formats of known vendors.
@@ -115,9 +115,12 @@ impl Redactor {
             let value = value.into_string().ok()?;
             (is_key && value.trim().len() >= MIN_KEY_BYTES).then(|| value.trim().to_owned())
         });
+        let mut keys: Vec<String> = keys.collect();
+        // A key may begin with another one.
+        keys.sort_by_key(|key| std::cmp::Reverse(key.len()));
         let mut redactor = Self {
             private_paths: Vec::new(),
-            keys: keys.collect(),
+            keys,
             changes: BTreeMap::new(),
         };
         for path in paths {
@@ -199,7 +202,7 @@ impl Redactor {
         text = self.replace_matches(&USER, &text, Change::Address, |found| found[1].to_owned());
         for key in &self.keys {
             if text.contains(key) {
-                *self.changes.entry(Change::Key).or_default() += 1;
+                *self.changes.entry(Change::Key).or_default() += text.matches(key).count();
                 text = text.replace(key, SECRET);
             }
         }
@@ -253,7 +256,8 @@ fn whole_matches<'t>(text: &'t str, path: &'t str) -> impl Iterator<Item = usize
     text.match_indices(path).filter_map(move |(start, _)| {
         let before = text[..start].chars().next_back();
         let after = text[start + path.len()..].chars().next();
-        let is_part = before.is_some_and(|c| is_name(c) || c == '/') || after.is_some_and(is_name);
+        let is_below = before == Some('/') && !text[..start].ends_with("file://");
+        let is_part = is_below || before.is_some_and(is_name) || after.is_some_and(is_name);
         (!is_part).then_some(start)
     })
 }
@@ -287,6 +291,8 @@ mod tests {
             ("script:/mnt/x/z.jsonl", "script:DIR/z.jsonl"),
             ("C:\\Users\\ann\\set", "DIR/set"),
             ("http://ann:word@host:8000/v1?key=1", "http://host:8000/v1"),
+            ("http://ann:p@ss@host/v1", "http://host/v1"),
+            ("see file:///mnt/x/y.png", "see file://DIR/y.png"),
             ("key a-key-of-mine!", "key [secret]!"),
             ("sk-abcdefghijklmnopqrst", "[secret]"),
         ] {

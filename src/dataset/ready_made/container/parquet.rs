@@ -274,6 +274,12 @@ impl Cursor {
             )
             .map_err(message)?;
         let item = if self.is_list { item } else { 0 };
+        if definitions
+            .get(item)
+            .is_some_and(|level| *level < self.max_definition)
+        {
+            return Err("the value is null".to_owned());
+        }
         // `values` has no nulls: the index is the number of non-null items before this one.
         let index = if definitions.is_empty() {
             item
@@ -338,19 +344,29 @@ pub(super) fn bytes(
     guarded(read).map_err(|problem| corrupt_file(path, &problem))
 }
 
-/// Index of the first leaf column under `column` that has the name of the last field in `steps`; any leaf matches if `steps` has no field.
+/// Index of the first leaf column under `column` whose path has the fields of `steps` in their order, the last one at its end; any leaf
+/// matches if `steps` has no field. Parts of the path between them are the lists of Parquet.
 fn leaf_index(
     columns: &[parquet::file::metadata::ColumnChunkMetaData],
     column: &str,
     steps: &[Step],
 ) -> Option<usize> {
-    let field = steps.iter().rev().find_map(|step| match step {
-        Step::Field(name) => Some(name.as_str()),
-        Step::Item(_) => None,
-    });
+    let fields: Vec<&String> = steps
+        .iter()
+        .filter_map(|step| match step {
+            Step::Field(name) => Some(name),
+            Step::Item(_) => None,
+        })
+        .collect();
     columns.iter().position(|chunk| {
-        let path = chunk.column_path().parts();
-        path.first().is_some_and(|first| first == column)
-            && field.is_none_or(|field| path.last().is_some_and(|last| last == field))
+        let Some((first, path)) = chunk.column_path().parts().split_first() else {
+            return false;
+        };
+        let mut parts = path.iter();
+        first == column
+            && fields.iter().all(|field| parts.any(|part| part == *field))
+            && fields
+                .last()
+                .is_none_or(|field| path.last() == Some(*field))
     })
 }

@@ -40,6 +40,12 @@ pub(super) fn split_in_name(path: &Path) -> String {
     split.map_or_else(String::new, |(_, split)| (*split).to_owned())
 }
 
+/// The usual word for a split; the name itself if there is none.
+fn usual_word(name: &str) -> &str {
+    let known = SPLIT_WORDS.iter().find(|(word, _)| *word == name);
+    known.map_or(name, |(_, usual)| usual)
+}
+
 /// Files of the wanted split, or of all splits for `all`. The default is the only split, or `test` if several exist.
 ///
 /// # Errors
@@ -56,6 +62,8 @@ pub(super) fn chosen(
     let split = match wanted {
         Some("all") => None,
         Some(name) if splits.contains_key(name) => Some(name),
+        // `val` names the split that a file `val.parquet` has.
+        Some(name) if splits.contains_key(usual_word(name)) => Some(usual_word(name)),
         Some(name) => {
             let problem = format_args!("no split {name:?}; there are {}", listed(tree, &splits));
             return Err(Error::usage("--read split", problem));
@@ -151,6 +159,10 @@ mod tests {
             [Path::new("train")]
         );
         assert_eq!(choose(&["dev", "train"], Some("all")).unwrap().len(), 2);
+        assert_eq!(
+            choose(&["validation", "train"], Some("val")).unwrap(),
+            [Path::new("validation")]
+        );
     }
 
     #[test]

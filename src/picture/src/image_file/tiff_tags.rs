@@ -6,8 +6,13 @@
 //!
 //! The format is that of TIFF 6.0, section 2, and BigTIFF as in libtiff.
 
+use std::collections::BTreeSet;
+
 /// Maximum number of directories counted after the first (chosen). The limit also ends a circular chain.
 const MAX_PAGES: usize = 10_000;
+
+/// Maximum number of entries of a directory that are read (chosen): real ones have fewer than 100. A stated count may be any number.
+const MAX_ENTRIES: u64 = 4096;
 
 /// Maximum number of values read from a tag (chosen). The tallest image has fewer strips, even at one row per strip.
 const MAX_VALUES: u64 = 1 << 20;
@@ -67,7 +72,7 @@ impl<'a> TiffOutline<'a> {
         let Some((directory, mut next)) = reader.directory(first) else {
             return outline;
         };
-        let value = |tag| reader.values(&directory, tag).first().copied();
+        let value = |tag| reader.first_value(&directory, tag);
         outline.pages = 1;
         outline.orientation = value(ORIENTATION).unwrap_or(0);
         outline.bits = value(BITS_PER_SAMPLE).unwrap_or(1);
@@ -90,17 +95,17 @@ impl<'a> TiffOutline<'a> {
             let offsets = reader.values(&directory, offsets);
             let counts = reader.values(&directory, counts);
             let end = offsets
-                .iter()
-                .zip(&counts)
-                .map(|(offset, count)| offset.saturating_add(*count));
+                .zip(counts)
+                .map(|(offset, count)| offset.saturating_add(count));
             outline.end = outline.end.max(end.max().unwrap_or(0));
         }
-        for _ in 0..MAX_PAGES {
-            let Some((directory, following)) = reader.directory(next) else {
-                break;
-            };
-            let kind = reader.values(&directory, NEW_SUBFILE_TYPE);
-            outline.pages += usize::from(!kind.first().copied().is_some_and(is_reduced));
+        let mut visited = BTreeSet::from([first]);
+        while visited.len() < MAX_PAGES
+            && visited.insert(next)
+            && let Some((directory, following)) = reader.directory(next)
+        {
+            let kind = reader.first_value(&directory, NEW_SUBFILE_TYPE);
+            outline.pages += usize::from(!kind.is_some_and(is_no_page));
             next = following;
         }
         outline
@@ -110,6 +115,11 @@ impl<'a> TiffOutline<'a> {
 /// True if the subfile type marks a reduced-resolution copy of another image.
 fn is_reduced(subfile_type: u64) -> bool {
     subfile_type & 1 == 1
+}
+
+/// True if the subfile type marks a copy of reduced resolution or a transparency mask of another image.
+fn is_no_page(subfile_type: u64) -> bool {
+    subfile_type & 0b101 != 0
 }
 
 /// Description of an unsupported colour space; `None` for a supported one or without the tag.
@@ -182,8 +192,7 @@ impl<'a> Reader<'a> {
         let (count_size, offset_size) = if self.is_big_tiff { (8, 8) } else { (2, 4) };
         let count = self.read_uint(at, count_size)?;
         let entry_size = 4 + 2 * offset_size as u64;
-        // A broken count is limited to the entries that fit in the file: an entry has at least 12 bytes.
-        let count = count.min(self.file.len() as u64 / 12);
+        let count = count.min(MAX_ENTRIES);
         let mut entries = Vec::new();
         let mut place = at.checked_add(count_size as u64)?;
         for _ in 0..count {
@@ -218,16 +227,20 @@ impl<'a> Reader<'a> {
         self.file.get(start..end)
     }
 
-    /// Reads the values of a tag as unsigned integers, up to the end of the file; empty if the directory lacks the tag.
-    fn values(&self, directory: &[Entry], tag: u16) -> Vec<u64> {
-        let Some(entry) = directory.iter().find(|entry| entry.tag == tag) else {
-            return Vec::new();
-        };
-        let size = size_of_type(entry.value_type);
-        (0..entry.count.min(MAX_VALUES))
-            .map(|index| entry.offset.checked_add(index * size))
-            .map_while(|offset| self.read_uint(offset?, size as usize))
-            .collect()
+    /// Reads the values of a tag as unsigned integers, up to the end of the file; none if the directory lacks the tag.
+    fn values(&self, directory: &[Entry], tag: u16) -> impl Iterator<Item = u64> {
+        let entry = directory.iter().find(|entry| entry.tag == tag);
+        let (offset, count, size) = entry.map_or((0, 0, 1), |entry| {
+            (entry.offset, entry.count, size_of_type(entry.value_type))
+        });
+        (0..count.min(MAX_VALUES))
+            .map(move |index| offset.checked_add(index * size))
+            .map_while(move |offset| self.read_uint(offset?, size as usize))
+    }
+
+    /// Reads the first value of a tag; `None` if the directory lacks the tag.
+    fn first_value(&self, directory: &[Entry], tag: u16) -> Option<u64> {
+        self.values(directory, tag).next()
     }
 }
 
@@ -238,5 +251,40 @@ fn size_of_type(value_type: u16) -> u64 {
         4 | 13 => 4,
         16 | 18 => 8,
         _ => 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Bytes of a directory with a subfile type alone.
+    const DIRECTORY: u32 = 18;
+
+    /// A TIFF file whose directories have these subfile types and indexes of their next directory.
+    fn file(directories: &[(u32, Option<u32>)]) -> Vec<u8> {
+        let mut file = [&b"II*\0"[..], &8_u32.to_le_bytes()].concat();
+        for (subfile_type, next) in directories {
+            let next = next.map_or(0, |index| 8 + index * DIRECTORY);
+            for number in [1_u16, NEW_SUBFILE_TYPE, 4] {
+                file.extend(number.to_le_bytes());
+            }
+            for number in [1, *subfile_type, next] {
+                file.extend(number.to_le_bytes());
+            }
+        }
+        file
+    }
+
+    #[test]
+    fn a_circle_of_directories_ends() {
+        let circle = file(&[(0, Some(1)), (0, Some(2)), (0, Some(1))]);
+        assert_eq!(TiffOutline::parse(&circle).pages, 3);
+    }
+
+    #[test]
+    fn copies_and_masks_are_no_pages() {
+        let masked = file(&[(0, Some(1)), (4, Some(2)), (1, None)]);
+        assert_eq!(TiffOutline::parse(&masked).pages, 1);
     }
 }

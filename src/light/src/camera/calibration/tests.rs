@@ -43,7 +43,7 @@ fn measurements_are_those_of_the_nearest_step() {
         (6.0, 6),
         (100.0, 6),
     ] {
-        assert_eq!(sony().step(gain), step, "K = {gain}");
+        assert_eq!(sony().nearest_step(gain), step, "K = {gain}");
     }
     for (gain, shape) in [(0.1, 0.1143), (0.7746, -0.0429), (6.0, -0.1143)] {
         let noise = sony().noise_at(gain, [0.0; 2], [0.0; 2]);
