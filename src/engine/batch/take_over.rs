@@ -57,16 +57,19 @@ impl<'a, D: Detail> Driver<'a, D> {
                     return Ok(());
                 };
                 let refusal = line.refusal.clone();
-                let imported = replies.take(line)?;
-                if let Imported::Failed(key, FailureKind::Request | FailureKind::Filtered) =
-                    imported
-                {
-                    refused.insert(key);
-                    if let Some((status, body)) = refusal {
-                        for model in &models {
-                            is_adapted |= model.adapt_to_refusal(status, body.as_bytes());
+                match replies.take(line)? {
+                    Imported::Failed(key, FailureKind::Filtered) => {
+                        self.refused.insert(key);
+                    }
+                    Imported::Failed(key, FailureKind::Request) => {
+                        refused.insert(key);
+                        if let Some((status, body)) = refusal {
+                            for model in &models {
+                                is_adapted |= model.adapt_to_refusal(status, body.as_bytes());
+                            }
                         }
                     }
+                    _ => {}
                 }
                 Ok(())
             })?;
