@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     limit_heaps();
     // SAFETY: nothing has started a thread yet.
-    unsafe { darkqa_enhance::forbid_telemetry() };
+    unsafe { darkqa_enhance::disable_telemetry() };
     cli::main(std::env::args_os())
 }
 

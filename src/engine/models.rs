@@ -118,7 +118,7 @@ pub(crate) fn open_all(
     let mut models: Vec<ModelUnderTest> = Vec::new();
     for settings in &ask.models {
         let model = match &settings.id {
-            name if name.is_of_experiment() => built_in(name)?,
+            name if name.is_choice_only() => built_in(name)?,
             name => {
                 let endpoint = endpoints.get(settings.server.as_ref())?;
                 open(name, endpoint.as_ref(), &settings.parameters)?

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use crate::dataset::Picture;
 use crate::error::{Error, Result};
-use crate::images::frames::{DegradedAt, Source, SourceFrame, SourcePhotograph};
+use crate::images::frames::{DegradeStage, Source, SourceFrame, SourcePhotograph};
 use crate::images::image_steps::ImageSteps;
 use crate::images::recipes::Recipe;
 use crate::images::stored::StoredPlace;
@@ -169,7 +169,7 @@ impl<'a> FrameWork<'a> {
             let picture = self.picture()?;
             let pixels = timings.time(TimedStep::Decode, || picture.pixels())?;
             let pixels = match (recipe.degraded_at, recipe.scaling) {
-                (DegradedAt::Resized, Scaling::LongerSide(side)) => {
+                (DegradeStage::Resized, Scaling::LongerSide(side)) => {
                     resized(pixels, side).map_err(|problem| Error::data(&self.frame, problem))?
                 }
                 _ => pixels,

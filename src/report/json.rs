@@ -135,14 +135,14 @@ struct ComparedRun<'a> {
 
 /// Runs that a summary describes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum RunList<'a> {
+pub(crate) enum SummaryRuns<'a> {
     /// One run, with its folder if the summary is stored elsewhere.
     One(&'a RunManifest, Option<&'a Path>),
     /// Several runs, each with its folder.
     Several(&'a [(&'a RunManifest, &'a Path)]),
 }
 
-impl<'a> RunList<'a> {
+impl<'a> SummaryRuns<'a> {
     /// Head of a summary, with the name of its schema.
     pub(super) fn head(self, schema: &'static str) -> RunsHead<'a> {
         let (run, folder, runs) = match self {
@@ -167,7 +167,7 @@ impl<'a> RunList<'a> {
 /// If the document cannot be serialised.
 pub(crate) fn summary(
     report: &ChoiceReport<'_>,
-    runs: RunList<'_>,
+    runs: SummaryRuns<'_>,
     length: ReportLength,
 ) -> Result<String> {
     let groups = strict_groups(report.findings);

@@ -6,7 +6,7 @@ use crate::text::words::counted;
 use darkqa_score::cluster::{ClusterUnit, Clusters};
 use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
-use darkqa_score::tested_sentences::AskedSets;
+use darkqa_score::tested_sentences::RunContents;
 
 /// The difference between two conditions that a run detects, and the frames that 5 points need.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,7 +26,11 @@ pub(crate) struct PowerForecast {
 
 impl PowerForecast {
     /// The forecast for questions in these clusters, each given by its cluster's index; `None` without questions.
-    pub(crate) fn new(clusters: &Clusters, of_questions: &[u32], asked: AskedSets) -> Option<Self> {
+    pub(crate) fn new(
+        clusters: &Clusters,
+        of_questions: &[u32],
+        asked: RunContents,
+    ) -> Option<Self> {
         let mut questions = vec![0; clusters.count()];
         for cluster in of_questions {
             questions[*cluster as usize] += 1;
@@ -38,7 +42,7 @@ impl PowerForecast {
         let sample = PlannedSample {
             questions,
             models: asked.models.max(1),
-            level: asked.first_level(),
+            level: asked.first_significance_level(),
         };
         Some(Self {
             questions: of_questions.len(),
@@ -105,7 +109,7 @@ mod tests {
             .iter()
             .map(|(question, frame)| clusters.get(frame, question).unwrap())
             .collect();
-        let asked = AskedSets {
+        let asked = RunContents {
             models,
             enhancers: 1,
             lights: 1,

@@ -10,7 +10,7 @@ use super::{enhancers, own_answers};
 use crate::error::Result;
 use crate::files::write_with;
 use crate::report::choice_report::ChoiceReport;
-use crate::report::json::{RunList, summary};
+use crate::report::json::{SummaryRuns, summary};
 use crate::report::markdown::MarkdownReport;
 use crate::report::products::{PAGE, products};
 use crate::report::report_length::ReportLength;
@@ -61,10 +61,10 @@ pub(super) fn in_its_folder(
     let (folder, findings) = (target.path(), combined.findings());
     let report = ChoiceReport::new(&findings, alerts(combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));
-    let files = files(&report, combined, RunList::One(manifest, None))?;
+    let files = files(&report, combined, SummaryRuns::One(manifest, None))?;
     write_rows(&findings, folder)?;
     target.write(&files, manifest)?;
-    let list = RunList::One(manifest, Some(folder));
+    let list = SummaryRuns::One(manifest, Some(folder));
     let text = text(&report, &[(manifest, folder)], list, show)?;
     if show.is_document() {
         return Ok(text);
@@ -81,7 +81,7 @@ pub(super) fn in_its_folder(
 pub(super) fn files(
     report: &ChoiceReport<'_>,
     combined: &Combined,
-    runs: RunList<'_>,
+    runs: SummaryRuns<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, &combined.shown())?;
     let summary = summary(report, runs, ReportLength::Summary)?;
@@ -100,7 +100,7 @@ pub(super) fn write_rows(findings: &Findings<'_>, folder: &Path) -> Result<()> {
 pub(super) fn text(
     report: &ChoiceReport<'_>,
     runs: &[(&RunManifest, &Path)],
-    list: RunList<'_>,
+    list: SummaryRuns<'_>,
     show: StdoutFormat,
 ) -> Result<String> {
     match show.syntax {

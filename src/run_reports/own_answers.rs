@@ -8,7 +8,7 @@ use super::enhancers;
 use super::report_folder::ReportFolder;
 use super::whole_report::{WholeReport, with_summary};
 use crate::error::Result;
-use crate::report::json::RunList;
+use crate::report::json::SummaryRuns;
 use crate::report::markdown::MarkdownReport;
 use crate::report::products::PAGE;
 use crate::report::report_length::ReportLength;
@@ -35,10 +35,10 @@ pub(super) fn in_its_folder(
 ) -> Result<String> {
     let found = found(combined);
     let report = report(combined, &found, &[]);
-    let files = files(&report, combined, RunList::One(manifest, None))?;
+    let files = files(&report, combined, SummaryRuns::One(manifest, None))?;
     target.write(&files, manifest)?;
     let folder = target.path();
-    let list = RunList::One(manifest, Some(folder));
+    let list = SummaryRuns::One(manifest, Some(folder));
     let text = shown(&report, &[(manifest, folder)], list, show)?;
     if show.is_document() {
         return Ok(text);
@@ -57,7 +57,7 @@ pub(super) fn compared(
     let found = found(combined);
     let report = report(combined, &found, again);
     let runs = combined.manifests();
-    let list = RunList::Several(&runs);
+    let list = SummaryRuns::Several(&runs);
     let files = if wanted {
         files(&report, combined, list)?
     } else {
@@ -73,7 +73,7 @@ pub(super) fn whole(combined: &Combined) -> Result<WholeReport> {
     let report = report(combined, &found, &[]);
     let runs = combined.manifests();
     Ok(WholeReport {
-        files: files(&report, combined, RunList::One(runs[0].0, None))?,
+        files: files(&report, combined, SummaryRuns::One(runs[0].0, None))?,
         markdown: markdown(&report, &runs, ReportLength::Summary),
     })
 }
@@ -82,7 +82,7 @@ pub(super) fn whole(combined: &Combined) -> Result<WholeReport> {
 fn files(
     report: &AgreementReport<'_>,
     combined: &Combined,
-    runs: RunList<'_>,
+    runs: SummaryRuns<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, &combined.shown())?;
     let summary = summary(report, runs, ReportLength::Summary)?;
@@ -113,7 +113,7 @@ fn report<'a>(
 fn shown(
     report: &AgreementReport<'_>,
     runs: &[(&RunManifest, &Path)],
-    list: RunList<'_>,
+    list: SummaryRuns<'_>,
     show: StdoutFormat,
 ) -> Result<String> {
     match show.syntax {

@@ -18,7 +18,7 @@ use super::{open, own_answers};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::report::choice_report::ChoiceReport;
-use crate::report::json::RunList;
+use crate::report::json::SummaryRuns;
 use crate::report::products::PAGE;
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
@@ -290,7 +290,7 @@ fn report_combined(
     if let Some(baseline) = baseline {
         baseline.add_to(&mut report);
     }
-    let list = RunList::Several(&runs);
+    let list = SummaryRuns::Several(&runs);
     let stdout_text = text(&report, &runs, list, args.format())?;
     let files = match &args.out {
         Some(out) => {

@@ -6,7 +6,7 @@ use super::whole_report::{WholeReport, shown};
 use super::{choice, enhancers, open, own_answers};
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
-use crate::report::json::RunList;
+use crate::report::json::SummaryRuns;
 use crate::report::report_length::ReportLength;
 use crate::runs::stored::{AnyRun, StoredRun};
 use crate::tables::{FLIPS, write_flips};
@@ -32,7 +32,7 @@ fn choice_report(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
     let report = ChoiceReport::new(&findings, alerts(&combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));
     let runs = combined.manifests();
-    let mut files = choice::files(&report, &combined, RunList::One(runs[0].0, None))?;
+    let mut files = choice::files(&report, &combined, SummaryRuns::One(runs[0].0, None))?;
     if !findings.first_failures.is_empty() {
         let mut rows = Vec::new();
         write_flips(&findings, &mut rows)?;

@@ -10,7 +10,7 @@ use crate::types::degradations::Axis;
 use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::findings::Findings;
-use darkqa_score::threshold::{CurveSummary, NoThreshold, ThinLevel};
+use darkqa_score::threshold::{CurveSummary, NoThreshold, SparseLevel};
 
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
@@ -130,7 +130,7 @@ pub(crate) fn why(reason: &NoThreshold) -> String {
 }
 
 /// Replies and clusters at a level that has too few of them.
-fn thin_level_text(level: &ThinLevel) -> String {
+fn thin_level_text(level: &SparseLevel) -> String {
     let replies = match level.replies {
         1 => "1 reply".to_owned(),
         replies => format!("{replies} replies"),
@@ -160,7 +160,7 @@ fn notes(curves: &[&Curve]) -> Vec<String> {
     let needs_data = curves
         .clone()
         .any(|curve| matches!(curve.summary.threshold, Err(NoThreshold::Thin(_))));
-    let requirement = needs_data.then(|| format!("a threshold needs {}", ThinLevel::needed()));
+    let requirement = needs_data.then(|| format!("a threshold needs {}", SparseLevel::needed()));
     let left_out = curves
         .filter(|curve| !curve.summary.left_out.is_empty())
         .map(|curve| {

@@ -8,7 +8,7 @@ use std::hint::black_box;
 use std::path::PathBuf;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_enhance::{Enhancer, Install, ModelFile, RuntimeSearch, Tiling, forbid_telemetry};
+use darkqa_enhance::{Enhancer, Install, ModelFile, RuntimeSearch, Tiling, disable_telemetry};
 use darkqa_ground::types::Rgb;
 
 /// A dark frame with texture, made by integer arithmetic.
@@ -26,7 +26,7 @@ fn frame(height: usize, width: usize) -> Rgb {
 #[expect(unsafe_code, reason = "ONNX Runtime is told by the environment alone")]
 fn enhance(c: &mut Criterion) {
     // SAFETY: no other thread runs yet.
-    unsafe { forbid_telemetry() };
+    unsafe { disable_telemetry() };
     let own = concat!(env!("CARGO_MANIFEST_DIR"), "/models/gray-gain.onnx");
     let model = env::var_os("DARKQA_BENCH_LLIE").map_or(own.into(), PathBuf::from);
     let number = |name: &str| env::var(name).ok().map(|text| text.parse().unwrap());

@@ -30,9 +30,9 @@ pub mod tools;
 
 /// Keeps the ONNX Runtime of this test program from reporting anything; to be called before it is opened.
 #[expect(unsafe_code, reason = "the environment is how ONNX Runtime is told")]
-pub fn forbid_telemetry() {
+pub fn disable_telemetry() {
     static ONCE: std::sync::Once = std::sync::Once::new();
     // SAFETY: the tests read the environment through the standard library, which locks it; ONNX Runtime, which does not,
     // is opened after this call alone, by every thread that opens it.
-    ONCE.call_once(|| unsafe { darkqa_enhance::forbid_telemetry() });
+    ONCE.call_once(|| unsafe { darkqa_enhance::disable_telemetry() });
 }

@@ -19,7 +19,7 @@ use super::url::BaseUrl;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::costs::{Charge, Reservation};
 use crate::ask::failures::{Again, AskError, Reach};
-use crate::ask::pace::{Allowance, Gate, Quota};
+use crate::ask::pace::{Gate, Quota, RateLimits};
 use crate::ask::requests::Request;
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::Wire;
@@ -347,7 +347,7 @@ impl Endpoint {
         };
         if let (Some(gate), Some(sent)) = (&self.quota, limited) {
             let tokens = reply.usage.and_then(|usage| usage.total());
-            gate.succeeded(sent, tokens, Allowance::default(), self.sending.max_wait);
+            gate.succeeded(sent, tokens, RateLimits::default(), self.sending.max_wait);
         }
         let served = reply.served_model.as_deref();
         if self.replicas.len() > 1

@@ -11,7 +11,7 @@ use super::connection::{Connection, Deadline, HttpReply};
 use super::sending::Sending;
 use super::url::BaseUrl;
 use crate::ask::failures::{Again, AskError, Complaint, Reach, Unreadable, UnreadableReply};
-use crate::ask::pace::{Allowance, Gate, Window, asked_wait};
+use crate::ask::pace::{Gate, RateLimits, Window, asked_wait};
 use crate::ask::requests::Request;
 use crate::ask::secrets::without_secrets;
 use crate::ask::vendors::Vendor;
@@ -148,7 +148,7 @@ impl Replica {
     /// The reply without keys; its tokens and the remaining limits are noted in the gate.
     fn succeeded(&self, reply: Reply, answer: &HttpReply, sent: Instant) -> Reply {
         self.window.succeeded(answer.took);
-        let allowance = Allowance::read(&answer.headers, SystemTime::now());
+        let allowance = RateLimits::read(&answer.headers, SystemTime::now());
         let tokens = reply.usage.and_then(|usage| usage.total());
         self.gate
             .succeeded(sent, tokens, allowance, self.sending.max_wait);
@@ -179,7 +179,7 @@ impl Replica {
         failed.failure.status = Some(status);
         let now = SystemTime::now();
         let stated = asked_wait(&answer.headers, now).max(complaint.wait);
-        let reset = || Allowance::read(&answer.headers, now).pause();
+        let reset = || RateLimits::read(&answer.headers, now).pause();
         failed.wait = stated
             .or_else(|| reset().filter(|_| status == 429))
             .filter(|_| is_retryable);

@@ -1,4 +1,4 @@
-//! Rate limits that a server reports in its response headers: [`Allowance`].
+//! Rate limits that a server reports in its response headers: [`RateLimits`].
 
 use std::time::{Duration, SystemTime};
 
@@ -18,14 +18,14 @@ struct RateLimit {
 
 /// Rate limits on requests and on tokens; `None` if the server does not report them.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(in crate::ask) struct Allowance {
+pub(in crate::ask) struct RateLimits {
     requests: Option<RateLimit>,
     tokens: Option<RateLimit>,
 }
 
 /// Advice for the next requests, from the rate limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Asks {
+pub(super) enum PaceAdvice {
     Nothing,
     /// Leave this much time between requests.
     Spacing(Duration),
@@ -33,7 +33,7 @@ pub(super) enum Asks {
     Pause(Duration),
 }
 
-impl Allowance {
+impl RateLimits {
     /// Reads the response headers `x-ratelimit-{limit,remaining,reset}-{requests,tokens}` (OpenAI and compatible servers),
     /// `x-ratelimit-{limit,remaining,reset}` (OpenRouter, for requests) and
     /// `anthropic-ratelimit-{requests,tokens}-{limit,remaining,reset}`. A limit without `remaining` or `reset` is ignored.
@@ -70,19 +70,21 @@ impl Allowance {
     }
 
     /// Advice for requests of `tokens` tokens each; the stricter limit decides.
-    pub(super) fn asks(&self, tokens: f64) -> Asks {
+    pub(super) fn asks(&self, tokens: f64) -> PaceAdvice {
         let requests = self
             .requests
-            .map_or(Asks::Nothing, |limit| limit.advice(1.0));
+            .map_or(PaceAdvice::Nothing, |limit| limit.advice(1.0));
         let tokens = self
             .tokens
-            .map_or(Asks::Nothing, |limit| limit.advice(tokens));
+            .map_or(PaceAdvice::Nothing, |limit| limit.advice(tokens));
         match (requests, tokens) {
-            (Asks::Pause(a), Asks::Pause(b)) => Asks::Pause(a.max(b)),
-            (Asks::Spacing(a), Asks::Spacing(b)) => Asks::Spacing(a.max(b)),
-            (Asks::Pause(wait), _) | (_, Asks::Pause(wait)) => Asks::Pause(wait),
-            (Asks::Spacing(wait), _) | (_, Asks::Spacing(wait)) => Asks::Spacing(wait),
-            (Asks::Nothing, Asks::Nothing) => Asks::Nothing,
+            (PaceAdvice::Pause(a), PaceAdvice::Pause(b)) => PaceAdvice::Pause(a.max(b)),
+            (PaceAdvice::Spacing(a), PaceAdvice::Spacing(b)) => PaceAdvice::Spacing(a.max(b)),
+            (PaceAdvice::Pause(wait), _) | (_, PaceAdvice::Pause(wait)) => PaceAdvice::Pause(wait),
+            (PaceAdvice::Spacing(wait), _) | (_, PaceAdvice::Spacing(wait)) => {
+                PaceAdvice::Spacing(wait)
+            }
+            (PaceAdvice::Nothing, PaceAdvice::Nothing) => PaceAdvice::Nothing,
         }
     }
 }
@@ -93,15 +95,15 @@ impl RateLimit {
     ///
     /// If the limit refills continuously (OpenAI), requests at half of the limit match the refill rate, and slow down below, so the
     /// remaining amount settles at half. If it refills at the end of each minute, the remaining amount lasts until then.
-    fn advice(self, cost: f64) -> Asks {
+    fn advice(self, cost: f64) -> PaceAdvice {
         if self.reset.is_zero() || self.limit.is_some_and(|limit| self.remaining > limit / 2.0) {
-            return Asks::Nothing;
+            return PaceAdvice::Nothing;
         }
         if self.remaining < cost {
-            return Asks::Pause(self.reset);
+            return PaceAdvice::Pause(self.reset);
         }
         let spacing = self.reset.as_secs_f64() * cost / self.remaining;
-        Asks::Spacing(Duration::try_from_secs_f64(spacing).unwrap_or(Duration::MAX))
+        PaceAdvice::Spacing(Duration::try_from_secs_f64(spacing).unwrap_or(Duration::MAX))
     }
 }
 
@@ -137,12 +139,12 @@ mod tests {
 
     const NOW: u64 = 1_767_225_600; // 2026-01-01T00:00:00Z
 
-    fn read(pairs: &[(&'static str, &str)]) -> Allowance {
+    fn read(pairs: &[(&'static str, &str)]) -> RateLimits {
         let mut headers = HeaderMap::new();
         for (name, value) in pairs {
             headers.insert(*name, value.parse().unwrap());
         }
-        Allowance::read(&headers, SystemTime::UNIX_EPOCH + Duration::from_secs(NOW))
+        RateLimits::read(&headers, SystemTime::UNIX_EPOCH + Duration::from_secs(NOW))
     }
 
     #[test]
@@ -184,17 +186,20 @@ mod tests {
             ])
             .asks(1000.0)
         };
-        assert_eq!(openai("499", "120ms"), Asks::Nothing);
+        assert_eq!(openai("499", "120ms"), PaceAdvice::Nothing);
         // 250 left of 500 a minute: the spacing matches the refill rate, one request in 120 ms.
         assert_eq!(
             openai("250", "30s"),
-            Asks::Spacing(Duration::from_millis(120))
+            PaceAdvice::Spacing(Duration::from_millis(120))
         );
         assert_eq!(
             openai("100", "48s"),
-            Asks::Spacing(Duration::from_millis(480))
+            PaceAdvice::Spacing(Duration::from_millis(480))
         );
-        assert_eq!(openai("0", "1m0s"), Asks::Pause(Duration::from_mins(1)));
+        assert_eq!(
+            openai("0", "1m0s"),
+            PaceAdvice::Pause(Duration::from_mins(1))
+        );
     }
 
     #[test]
@@ -204,8 +209,14 @@ mod tests {
             ("anthropic-ratelimit-tokens-remaining", "10000"),
             ("anthropic-ratelimit-tokens-reset", "2026-01-01T00:00:30Z"),
         ]);
-        assert_eq!(tokens.asks(1000.0), Asks::Spacing(Duration::from_secs(3)));
-        assert_eq!(tokens.asks(20_000.0), Asks::Pause(Duration::from_secs(30)));
+        assert_eq!(
+            tokens.asks(1000.0),
+            PaceAdvice::Spacing(Duration::from_secs(3))
+        );
+        assert_eq!(
+            tokens.asks(20_000.0),
+            PaceAdvice::Pause(Duration::from_secs(30))
+        );
     }
 
     #[test]
@@ -215,7 +226,7 @@ mod tests {
                 ("x-ratelimit-limit-requests", "500"),
                 ("x-ratelimit-remaining-requests", "400")
             ]),
-            Allowance::default()
+            RateLimits::default()
         );
     }
 }

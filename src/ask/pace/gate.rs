@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tokio::time::{Instant, sleep_until};
 
-use super::allowance::{Allowance, Asks};
+use super::allowance::{PaceAdvice, RateLimits};
 use super::learned::LearnedRate;
 use super::quota::{Quota, QuotaWindow};
 
@@ -114,7 +114,7 @@ impl Gate {
         &self,
         sent: Instant,
         tokens: Option<u64>,
-        allowance: Allowance,
+        allowance: RateLimits,
         max_wait: Duration,
     ) {
         let (now, mut state) = (Instant::now(), self.state());
@@ -126,9 +126,9 @@ impl Gate {
         }
         state.learned.took(now, sent);
         state.reported_spacing = match allowance.asks(state.tokens) {
-            Asks::Nothing => Duration::ZERO,
-            Asks::Spacing(spacing) => spacing.min(WIDEST),
-            Asks::Pause(wait) => {
+            PaceAdvice::Nothing => Duration::ZERO,
+            PaceAdvice::Spacing(spacing) => spacing.min(WIDEST),
+            PaceAdvice::Pause(wait) => {
                 let until = now.checked_add(wait);
                 if let Some(until) = until.filter(|_| wait <= max_wait) {
                     state.pause_until(until);

@@ -5,8 +5,8 @@ use super::choices::{AllOffered, Lettered, Offered, Options, in_question};
 use super::columns::map::flag;
 use super::columns::names::{Role, without_endings};
 use super::columns::{Asked, Column, InQuestion, Roles};
-use super::omissions::{LeftOut, Why};
-use super::pictures::{ImageMarks, ImagesAre};
+use super::omissions::{OmissionReason, Omissions};
+use super::pictures::{ImageForm, ImageMarks};
 use super::settings::{SetArgs, SeveralImages};
 use crate::types::text::excerpt;
 use std::collections::BTreeMap;
@@ -42,10 +42,10 @@ impl Item {
 }
 
 /// Number of times that each instruction was cut from a question.
-pub(super) type Cut = BTreeMap<String, usize>;
+pub(super) type InstructionCounts = BTreeMap<String, usize>;
 
 /// Cuts instructions from the end of questions and counts them; `None` keeps the instructions.
-struct InstructionCutter<'a>(Option<&'a mut Cut>);
+struct InstructionCutter<'a>(Option<&'a mut InstructionCounts>);
 
 impl InstructionCutter<'_> {
     /// The text without the instructions at its end.
@@ -68,19 +68,19 @@ impl InstructionCutter<'_> {
 pub(super) fn items(
     table: &Table,
     roles: &Roles,
-    kind: ImagesAre,
+    kind: ImageForm,
     args: &SetArgs,
-    left_out: &mut LeftOut,
-    cut: &mut Cut,
+    left_out: &mut Omissions,
+    cut: &mut InstructionCounts,
 ) -> Result<Vec<Item>, String> {
     let mut cutter = InstructionCutter((!args.keep_instructions).then_some(cut));
     let (mut items, mut offered) = (Vec::new(), AllOffered::default());
     for (index, row) in table.rows.iter().enumerate() {
         let image_count = kind.in_row(row, roles).len();
         let why = match (image_count, args.multi_image) {
-            (0, _) => Some(Why::NoImage),
+            (0, _) => Some(OmissionReason::NoImage),
             (1, _) | (_, Some(SeveralImages::Send)) => None,
-            (_, Some(SeveralImages::Skip) | None) => Some(Why::SeveralImages),
+            (_, Some(SeveralImages::Skip) | None) => Some(OmissionReason::SeveralImages),
         };
         if let Some(why) = why {
             left_out.add(why, || format!("{image_count} images"));
@@ -98,7 +98,9 @@ pub(super) fn items(
                 options: options.map(|options| offered.once(options)),
             }),
             Err(PartsError::Row(problem)) => {
-                left_out.add(Why::Bad, || format!("{}: {problem}", table.place(index)));
+                left_out.add(OmissionReason::Bad, || {
+                    format!("{}: {problem}", table.place(index))
+                });
             }
             Err(PartsError::Set(problem)) => {
                 return Err(format!("{}: {problem}", table.place(index)));

@@ -43,15 +43,15 @@ pub(super) use summary::LEFT_OUT;
 
 use cells::Table;
 use choices::{Answered, is_own, truths};
-use columns::map::{How, Map};
+use columns::map::{CellFormat, Map};
 use columns::names::Role;
 use columns::{FamilyOf, Roles};
 use container::{FoundFiles, Joined, SetFile};
 use folder_info::FolderInfo;
 use groups::{GroupRule, Groups};
-use items::{Cut, items};
-use omissions::{LeftOut, Why, leave_out};
-use pictures::{Frames, Ids, ImagesAre, Scenes};
+use items::{InstructionCounts, items};
+use omissions::{OmissionReason, Omissions, leave_out};
+use pictures::{Frames, Ids, ImageForm, Scenes};
 use summary::Summary;
 
 /// The set at a place: a file, a pattern of files, a folder, or several files.
@@ -89,7 +89,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         let hint = hint.map_or_else(String::new, |hint| format!("\n {hint}"));
         Error::data(place.display(), format_args!("{problem}{hint}"))
     };
-    let (roles, set) = read(&table, &map, args, preset, ImagesAre::Files)
+    let (roles, set) = read(&table, &map, args, preset, ImageForm::Files)
         .map_err(|problem| wrong(&table, problem))?;
     table.forget(&roles.read_once());
     let name = match &*info.name {
@@ -102,7 +102,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         archive.as_ref(),
         &files,
         &roles,
-        ImagesAre::Files,
+        ImageForm::Files,
         args.multi_image,
     );
     let mut notes = notes;
@@ -229,7 +229,7 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     let info = FolderInfo::in_folder(folder)?;
     table.parse_cells(info.map.iter().chain(&args.map));
     let map = Map::joined(own.iter().chain(&info.map).chain(&args.map));
-    let (roles, set) = read(&table, &map, args, None, ImagesAre::Frames)
+    let (roles, set) = read(&table, &map, args, None, ImageForm::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
     let root = Root::new(folder, &[])?;
     let frames = Frames::new(
@@ -238,7 +238,7 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
         None,
         &[],
         &roles,
-        ImagesAre::Frames,
+        ImageForm::Frames,
         args.multi_image,
     );
     let name = file.display().to_string();
@@ -362,7 +362,7 @@ fn leave_out_unusable(opened: &Opened<'_>, set: &mut ReadSet, frames: &Frames<'_
     answered.retain(|question| match frames.problem(question.row) {
         None => true,
         Some(problem) => {
-            left.add(Why::Bad, || problem.to_string());
+            left.add(OmissionReason::Bad, || problem.to_string());
             false
         }
     });
@@ -374,8 +374,8 @@ fn leave_out_unusable(opened: &Opened<'_>, set: &mut ReadSet, frames: &Frames<'_
 struct ReadSet {
     answered: Vec<Answered>,
     said: Vec<String>,
-    cut: Cut,
-    left: LeftOut,
+    cut: InstructionCounts,
+    left: Omissions,
     groups: Groups,
 }
 
@@ -385,18 +385,18 @@ fn read(
     map: &Map,
     args: &SetArgs,
     preset: Option<&preset::Preset>,
-    kind: ImagesAre,
+    kind: ImageForm,
 ) -> Result<(Roles, ReadSet), String> {
     if table.rows.is_empty() {
         return Err("no questions in it".to_owned());
     }
     let roles = Roles::new(table, map)?;
     let rule = GroupRule::from_map(table, map)?;
-    let (mut left, mut cut) = (LeftOut::default(), Cut::new());
+    let (mut left, mut cut) = (Omissions::default(), InstructionCounts::new());
     let mut kept = items(table, &roles, kind, args, &mut left, &mut cut)?;
     let is_copy = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
     for item in kept.extract_if(.., |item| is_copy(item.row)) {
-        left.add(Why::Rotation, || table.place(item.row));
+        left.add(OmissionReason::Rotation, || table.place(item.row));
     }
     if kept.is_empty() {
         left.check(table.rows.len(), args)
@@ -405,7 +405,7 @@ fn read(
     }
     let how = map
         .entry(Role::Answer)
-        .map_or(&How::ByRule, |entry| &entry.how);
+        .map_or(&CellFormat::ByRule, |entry| &entry.how);
     let truths = truths(table, &roles, how, kept, &mut left)?;
     left.check(table.rows.len(), args)
         .map_err(|problem| image_hint(table, &roles, problem))?;

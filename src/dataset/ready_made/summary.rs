@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::cells::Table;
 use super::columns::{Asked, FamilyOf, Images, Roles};
-use super::items::Cut;
-use super::omissions::{LeftOut, Why};
+use super::items::InstructionCounts;
+use super::omissions::{OmissionReason, Omissions};
 use super::pictures::Series;
 use crate::dataset::image_source::ImageSource;
 use crate::types::{FrameId, Question};
@@ -18,8 +18,8 @@ pub(super) struct Summary<'a> {
     pub(super) family: &'a FamilyOf,
     pub(super) answers: &'a [String],
     pub(super) ids: String,
-    pub(super) cut: &'a Cut,
-    pub(super) left: &'a LeftOut,
+    pub(super) cut: &'a InstructionCounts,
+    pub(super) left: &'a Omissions,
     /// A description of the groups of questions; `None` without groups.
     pub(super) groups: Option<String>,
     /// The images of the set; none if the questions are about frames of other data.
@@ -60,7 +60,7 @@ impl Summary<'_> {
         lines.extend(self.groups.clone());
         for (why, number) in self.left.counts() {
             let first = match (why, self.left.bad()) {
-                (Why::Bad, Some((_, first))) => format!("; the first: {first}"),
+                (OmissionReason::Bad, Some((_, first))) => format!("; the first: {first}"),
                 _ => String::new(),
             };
             lines.push(format!(

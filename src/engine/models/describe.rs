@@ -64,7 +64,7 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
 
 /// The model at its endpoint; `None` if it is built in and has no replies of its own.
 pub(super) fn opened(model: &ModelSettings) -> Result<Option<Model>> {
-    if model.id.is_of_experiment() {
+    if model.id.is_choice_only() {
         return Ok(None);
     }
     let endpoint = model.server.as_deref().map(endpoint).transpose()?;

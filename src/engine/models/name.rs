@@ -29,7 +29,7 @@ const BUILT_IN: [&str; 4] = ["random", "observer", room_net::NAME, "script"];
 
 impl ModelName {
     /// True for the built-in models that answer multiple-choice questions only.
-    pub(super) fn is_of_experiment(&self) -> bool {
+    pub(super) fn is_choice_only(&self) -> bool {
         matches!(self, Self::Random | Self::Observer(_) | Self::RoomNet)
     }
 
@@ -53,7 +53,7 @@ impl ModelName {
     ///
     /// # Errors
     /// If a remote model's name contains a comma, or is close to a built-in name and not in the built-in price table.
-    pub(crate) fn refuse_near_miss(&self) -> Result<()> {
+    pub(crate) fn check_spelling(&self) -> Result<()> {
         let Self::Remote(name) = self else {
             return Ok(());
         };
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn near_misses_of_built_in_names_are_refused() {
-        let check = |name: &str| name.parse::<ModelName>().unwrap().refuse_near_miss();
+        let check = |name: &str| name.parse::<ModelName>().unwrap().check_spelling();
         for wrong in [
             "rndom",
             "Random",

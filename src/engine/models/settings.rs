@@ -150,7 +150,7 @@ impl AskSettings {
                 .iter()
                 .filter(|entry| entry.place.is_none())
                 .map(|entry| &entry.id)
-                .try_for_each(ModelName::refuse_near_miss)?;
+                .try_for_each(ModelName::check_spelling)?;
         }
         let (mut models, mut servers, mut notes) = (Vec::new(), Servers::default(), Vec::new());
         for entry in &entries {

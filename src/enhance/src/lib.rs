@@ -54,7 +54,7 @@ pub use enhancer::twin::sets_in_memory;
 pub use enhancer::{Enhancer, Fitting};
 pub use files::ModelFile;
 pub use graphs::{LoadLimits, Network, Stopper};
-pub use libraries::{Install, Runtime, RuntimeSearch, forbid_telemetry};
+pub use libraries::{Install, Runtime, RuntimeSearch, disable_telemetry};
 pub use limits::{MemoryLimit, TimeLimit};
 pub use probes::{
     DARK, Examination, FRAMES, Findings, ImageOutput, ImageUse, Implausible, ProposedLine, Settled,

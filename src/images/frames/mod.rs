@@ -11,5 +11,5 @@ pub(super) use photograph::{SourcePhotograph, matched};
 pub(crate) use source::{
     Frames, Source, SourceFrame, first_asked, input_summary, inspect_all, warn_of_inputs,
 };
-pub(super) use walk::{CameraOf, DegradedAt};
+pub(super) use walk::{CameraScope, DegradeStage};
 pub(crate) use walk::{Walk, WalkFolder};

@@ -31,17 +31,17 @@ pub(crate) struct Walk {
     #[arg(id = "image-size", long, value_name = "PIXELS|native", value_parser = longer_side, default_value = "512", add = Decides::Pixels)]
     pub side: Scaling,
     /// When light is reduced: before or after scaling
-    #[arg(id = "degrade", long, value_enum, default_value_t = DegradedAt::Native, add = Decides::Pixels)]
-    pub degraded_at: DegradedAt,
+    #[arg(id = "degrade", long, value_enum, default_value_t = DegradeStage::Native, add = Decides::Pixels)]
+    pub degraded_at: DegradeStage,
     /// The frames that share one state of the camera
-    #[arg(id = "sensor", long, value_enum, default_value_t = CameraOf::Episode, add = Decides::Pixels)]
-    pub camera: CameraOf,
+    #[arg(id = "sensor", long, value_enum, default_value_t = CameraScope::Episode, add = Decides::Pixels)]
+    pub camera: CameraScope,
 }
 
 /// When the light of a frame is reduced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum DegradedAt {
+pub(crate) enum DegradeStage {
     /// Before the frames are scaled, as a camera would
     Native,
     /// After the frames are scaled, so that scaling averages no noise away
@@ -51,7 +51,7 @@ pub(crate) enum DegradedAt {
 /// Group of frames that share one camera state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum CameraOf {
+pub(crate) enum CameraScope {
     /// All frames of a walk: one camera recorded it
     Episode,
     /// Each frame has its own

@@ -4,7 +4,7 @@ use std::num::NonZeroU32;
 
 use super::*;
 use crate::dataset::Dataset;
-use crate::images::frames::{CameraOf, DegradedAt};
+use crate::images::frames::{CameraScope, DegradeStage};
 use crate::images::notes::WantedNotes;
 use crate::images::recipes::Recipe;
 use crate::images::timings::Timings;
@@ -38,8 +38,8 @@ fn pipeline_output(
         kinds: KindSettings::default(),
         format: format.parse().unwrap(),
         scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
-        degraded_at: DegradedAt::Native,
-        camera_of: CameraOf::Frame,
+        degraded_at: DegradeStage::Native,
+        camera_of: CameraScope::Frame,
         enhancers: Vec::new(),
         elsewhere: Vec::new(),
     };

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::images::enhancement::{DarkImage, EnhancedImages};
-use crate::images::frames::{CameraOf, DegradedAt, Source, SourceFrame, Walk};
+use crate::images::frames::{CameraScope, DegradeStage, Source, SourceFrame, Walk};
 use crate::images::recipes::image_recipe::ImageRecipe;
 use crate::picture::PayloadFormat;
 use crate::picture::Scaling;
@@ -26,9 +26,9 @@ pub(crate) struct Recipe {
     pub(crate) format: PayloadFormat,
     pub(crate) scaling: Scaling,
     /// Whether light is reduced before or after scaling.
-    pub(crate) degraded_at: DegradedAt,
+    pub(crate) degraded_at: DegradeStage,
     /// The frames that share one state of the camera.
-    pub(crate) camera_of: CameraOf,
+    pub(crate) camera_of: CameraScope,
     /// Enhancers that are run, with the digests of their files.
     pub(crate) enhancers: Vec<(EnhancerName, Digest)>,
     /// Images that were enhanced elsewhere.
@@ -57,8 +57,8 @@ impl Recipe {
             kinds: kinds.clone(),
             format: PayloadFormat::Png,
             scaling: Scaling::Never,
-            degraded_at: DegradedAt::Native,
-            camera_of: CameraOf::Frame,
+            degraded_at: DegradeStage::Native,
+            camera_of: CameraScope::Frame,
             enhancers: enhancers
                 .map(|file| (file.name().clone(), file.digest()))
                 .collect(),
@@ -102,8 +102,8 @@ impl Recipe {
     pub(crate) fn noise(&self, source: &FrameId, frame: &FrameId) -> NoiseKey {
         let own = NoiseKey::new(self.seed, frame);
         match self.camera_of {
-            CameraOf::Frame => own,
-            CameraOf::Episode => own.with_camera_of(&NoiseKey::new(self.seed, source)),
+            CameraScope::Frame => own,
+            CameraScope::Episode => own.with_camera_of(&NoiseKey::new(self.seed, source)),
         }
     }
 
@@ -143,7 +143,7 @@ impl Recipe {
             enhancer: enhancer.transpose()?.flatten(),
             format: self.format.to_string(),
             scaling: self.scaling,
-            scaled_before: (self.degraded_at == DegradedAt::Resized).then_some(true),
+            scaled_before: (self.degraded_at == DegradeStage::Resized).then_some(true),
         })
     }
 
@@ -252,7 +252,7 @@ impl Recipe {
         let kind = how.kind();
         let applied = self.applied(source, frame, how)?;
         let random = kind.has_noise();
-        let of_source = random && self.camera_of == CameraOf::Episode;
+        let of_source = random && self.camera_of == CameraScope::Episode;
         Ok(DegradationFacts {
             kind,
             severity: how.severity(),
@@ -270,8 +270,8 @@ impl Recipe {
     pub(crate) fn view(&self, size: (u32, u32), focal: Option<f64>) -> FrameView {
         let own = size.0 as usize;
         let width = match self.degraded_at {
-            DegradedAt::Native => own,
-            DegradedAt::Resized => self.scaling.size(size).0,
+            DegradeStage::Native => own,
+            DegradeStage::Resized => self.scaling.size(size).0,
         };
         let scale = width as f64 / own as f64;
         FrameView {

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::report::finding_groups::FindingGroups;
-use crate::report::json::{Rows, RunList, RunsHead, document};
+use crate::report::json::{Rows, RunsHead, SummaryRuns, document};
 use crate::report::page::{PageContent, PageHead, PageInputs, page_of};
 use crate::report::products::files;
 use crate::report::report_length::ReportLength;
@@ -121,7 +121,7 @@ struct Head<'a> {
 /// If the document cannot be written.
 pub(crate) fn summary(
     report: &AgreementReport<'_>,
-    runs: RunList<'_>,
+    runs: SummaryRuns<'_>,
     length: ReportLength,
 ) -> Result<String> {
     let own_answers = report

@@ -125,7 +125,7 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
 /// Checks that nothing private is left in any file.
 fn check(files: &[(String, Vec<u8>)], redactor: &Redactor) -> Result<()> {
     for (name, content) in files {
-        if let Some(what) = redactor.leak(&String::from_utf8_lossy(content)) {
+        if let Some(what) = redactor.find_leak(&String::from_utf8_lossy(content)) {
             let problem = format_args!(
                 "{what} would be in it; nothing is written. Please report this with the line of the run that holds it"
             );

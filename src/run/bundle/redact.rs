@@ -23,7 +23,7 @@ const KEY_VARIABLE_SUFFIXES: [&str; 6] = ["KEY", "TOKEN", "SECRET", "PASSWORD", 
 
 /// The kind of a redacted part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Change {
+pub(super) enum Redaction {
     /// A path on a machine; its last component is kept.
     Path,
     /// A user name, password, query or fragment in a URL.
@@ -32,7 +32,7 @@ pub(super) enum Change {
     Key,
 }
 
-impl Change {
+impl Redaction {
     /// A sentence for the list of changes, with the number of times.
     pub(super) fn words(self, times: usize) -> String {
         let times = match times {
@@ -58,7 +58,7 @@ pub(super) struct Redactor {
     /// Keys in environment variables.
     keys: Vec<String>,
     /// How often each change was made.
-    pub(super) changes: BTreeMap<Change, usize>,
+    pub(super) changes: BTreeMap<Redaction, usize>,
 }
 
 /// The paths to redact in a text.
@@ -142,7 +142,7 @@ impl Redactor {
     }
 
     /// Description of a known key or private path that a redacted text still contains; `None` if it contains neither.
-    pub(super) fn leak(&self, text: &str) -> Option<&'static str> {
+    pub(super) fn find_leak(&self, text: &str) -> Option<&'static str> {
         if self.keys.iter().any(|key| text.contains(key)) {
             return Some("a key of the environment");
         }
@@ -196,22 +196,25 @@ impl Redactor {
             for found in PATH.captures_iter(&text) {
                 self.add_private_path(&found[2]);
             }
-            text =
-                self.replace_matches(&QUERY, &text, Change::Address, |found| found[1].to_owned());
+            text = self.replace_matches(&QUERY, &text, Redaction::Address, |found| {
+                found[1].to_owned()
+            });
         }
-        text = self.replace_matches(&USER, &text, Change::Address, |found| found[1].to_owned());
+        text = self.replace_matches(&USER, &text, Redaction::Address, |found| {
+            found[1].to_owned()
+        });
         for key in &self.keys {
             if text.contains(key) {
-                *self.changes.entry(Change::Key).or_default() += text.matches(key).count();
+                *self.changes.entry(Redaction::Key).or_default() += text.matches(key).count();
                 text = text.replace(key, SECRET);
             }
         }
-        text = self.replace_matches(&KEY, &text, Change::Key, |_| SECRET.to_owned());
+        text = self.replace_matches(&KEY, &text, Redaction::Key, |_| SECRET.to_owned());
         for path in &self.private_paths {
             let starts: Vec<usize> = whole_matches(&text, path).collect();
             let name = path.rsplit(['/', '\\']).next().unwrap_or_default();
             for start in starts.into_iter().rev() {
-                *self.changes.entry(Change::Path).or_default() += 1;
+                *self.changes.entry(Redaction::Path).or_default() += 1;
                 text.replace_range(start..start + path.len(), &format!("DIR/{name}"));
             }
         }
@@ -223,7 +226,7 @@ impl Redactor {
         &mut self,
         pattern: &Regex,
         text: &str,
-        change: Change,
+        change: Redaction,
         with: impl Fn(&Captures<'_>) -> String,
     ) -> String {
         let times = pattern.find_iter(text).count();
@@ -322,10 +325,10 @@ mod tests {
             "see DIR/ann/x and /home/anna"
         );
         assert_eq!(known("x/home/ann"), "x/home/ann");
-        assert!(redactor.leak("in /home/ann/x").is_some());
+        assert!(redactor.find_leak("in /home/ann/x").is_some());
         assert!(
             redactor
-                .leak("in /home/anna, http://a-key-of-yours")
+                .find_leak("in /home/anna, http://a-key-of-yours")
                 .is_none()
         );
     }
@@ -339,6 +342,6 @@ mod tests {
         let fine = json!({"model": {"/a/b/m": 1, "/c/d/n": 2}});
         let fine = redactor.value(fine, Paths::Any).unwrap();
         assert_eq!(fine, json!({"model": {"DIR/m": 1, "DIR/n": 2}}));
-        assert_eq!(redactor.changes.get(&Change::Path), Some(&4));
+        assert_eq!(redactor.changes.get(&Redaction::Path), Some(&4));
     }
 }

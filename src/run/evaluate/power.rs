@@ -7,13 +7,13 @@ use crate::report::power::PowerForecast;
 use crate::types::degradations::Kind;
 use crate::types::{Condition, Question, Variant};
 use darkqa_score::cluster::{Clusters, FrameTies};
-use darkqa_score::tested_sentences::AskedSets;
+use darkqa_score::tested_sentences::RunContents;
 
 /// The effect that questions about these data can detect; `None` without questions, or if nobody knows their answers.
 pub(super) fn power(
     dataset: &Dataset,
     questions: &[Question],
-    asked: AskedSets,
+    asked: RunContents,
 ) -> Option<PowerForecast> {
     if questions
         .iter()
@@ -43,7 +43,7 @@ pub(super) fn power(
 }
 
 /// The sets of trials in these conditions.
-pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> AskedSets {
+pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> RunContents {
     let variants: BTreeSet<Variant> = conditions.iter().map(Condition::kind_reading).collect();
     let last = variants.iter().filter_map(|variant| variant.kind).max();
     let lights = variants.iter().filter(|variant| variant.kind == last);
@@ -52,7 +52,7 @@ pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> AskedSets {
         .iter()
         .filter_map(|condition| condition.enhancer.as_ref())
         .collect();
-    AskedSets {
+    RunContents {
         models: models.max(1),
         enhancers: enhancers.len(),
         lights: lights.count(),

@@ -78,7 +78,7 @@ impl JudgeArgs {
         let of_judge = |e: crate::error::Error| e.at("the judge");
         model.require_open_answers().map_err(of_judge)?;
         if self.judge_base_url.is_none() && job.access.base_url.is_empty() {
-            model.refuse_near_miss().map_err(of_judge)?;
+            model.check_spelling().map_err(of_judge)?;
         }
         let mut access = job.access.clone();
         let own_access = self.judge_base_url.is_some()

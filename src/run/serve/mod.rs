@@ -40,7 +40,7 @@ use darkqa_questions::rules::Rules;
 use admission::{admit, body};
 use completion::{Completion, RequestFault};
 use puzzle::Puzzle;
-use recognise::Likenesses;
+use recognise::FrameMatcher;
 use request::ServedQuestion;
 
 /// The requests that are answered at once; further ones wait. Chosen.
@@ -69,7 +69,7 @@ pub(crate) struct ServeArgs {
 
 /// The state that all requests share.
 struct ServerState {
-    likenesses: Likenesses,
+    likenesses: FrameMatcher,
     /// The models by their names at this endpoint. They differ from `--model observer`, which runs without an endpoint.
     models: [(&'static str, Model); 2],
     /// Places for requests that are answered.
@@ -96,7 +96,7 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
         ("darkqa-observer", Model::Local(observer.model(None, prior))),
         ("darkqa-random", Model::Random(prior)),
     ];
-    let likenesses = Likenesses::new(&dataset, progress)?;
+    let likenesses = FrameMatcher::new(&dataset, progress)?;
     let state = Arc::new(ServerState {
         likenesses,
         models,
@@ -196,7 +196,7 @@ impl ServerState {
         let frame = request
             .image
             .as_ref()
-            .and_then(|(image, _)| self.likenesses.most_like(image));
+            .and_then(|(image, _)| self.likenesses.best_match(image));
         if request.image.is_some() && frame.is_none() && !self.met_unknown.swap(true, Relaxed) {
             tracing::warn!(
                 "an image shows none of the {} frames of --data: about such images the observer guesses, too",

@@ -1,4 +1,4 @@
-//! Matching of an image to the frame of a data set that it shows: [`Likenesses`].
+//! Matching of an image to the frame of a data set that it shows: [`FrameMatcher`].
 //!
 //! The linear light of the image is averaged over a coarse grid, which removes most of the sensor noise. The cell values are then
 //! correlated with those of every frame. The correlation does not depend on the brightness of the image, so a frame is recognised at
@@ -33,9 +33,9 @@ static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
 });
 
 /// Frames of a data set, each with its normalised cell values.
-pub(super) struct Likenesses(Vec<(FrameId, Vec<f64>)>);
+pub(super) struct FrameMatcher(Vec<(FrameId, Vec<f64>)>);
 
-impl Likenesses {
+impl FrameMatcher {
     /// Computes the cell values of every frame of a data set.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Likenesses {
     }
 
     /// Frame with the highest correlation to an image; `None` if the highest correlation is below the minimum.
-    pub(super) fn most_like(&self, image: &Rgb) -> Option<&FrameId> {
+    pub(super) fn best_match(&self, image: &Rgb) -> Option<&FrameId> {
         let own = cell_values(image);
         let (highest, id) = self
             .0

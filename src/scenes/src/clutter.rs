@@ -171,7 +171,7 @@ impl FloorPlan {
             let [low, high] = [foot - 0.16, foot + 0.16];
             let area = FloorArea([low.x.max(0.01), low.z.max(0.01), high.x, high.z]);
             if self.is_free(&area) && self.add_if_free(piece.clone(), at(foot, turned), None) {
-                self.keep_free(&at(foot, 0.0), vec3(0.36, 0.0, 0.36), -0.18);
+                self.reserve_floor(&at(foot, 0.0), vec3(0.36, 0.0, 0.36), -0.18);
                 return;
             }
         }

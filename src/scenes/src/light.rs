@@ -10,7 +10,7 @@ use super::bvh::{Bvh, Ray};
 use super::mesh::cos_sin;
 use super::noise::hash;
 use super::scene::{LightSource, Scene};
-use super::spot::Spot;
+use super::spot::SurfacePoint;
 
 /// The strata per axis of a sample pattern (chosen). Neighbouring pixels use different strata.
 pub(super) const STRATA: usize = 4;
@@ -54,7 +54,7 @@ impl LightSample {
 
 impl Lighting<'_> {
     /// The light that reaches a point: direct from lamps and windows, and indirect by way of other things.
-    pub(super) fn incoming(&self, spot: &Spot, sample: LightSample) -> [Vec3; 2] {
+    pub(super) fn incoming(&self, spot: &SurfacePoint, sample: LightSample) -> [Vec3; 2] {
         let indirect: Vec3 = (0..INDIRECT_RAYS)
             .map(|i| self.indirect(spot, sample, i))
             .sum();
@@ -75,7 +75,7 @@ impl Lighting<'_> {
     }
 
     /// The light that one ray over the half-space returns.
-    fn indirect(&self, spot: &Spot, sample: LightSample, which: usize) -> Vec3 {
+    fn indirect(&self, spot: &SurfacePoint, sample: LightSample, which: usize) -> Vec3 {
         let [u, v] = sample.pair(12 + which);
         let around = cos_sin(std::f32::consts::TAU * u);
         let (out, up) = (v.sqrt(), (1.0 - v).max(0.0).sqrt());
@@ -88,7 +88,7 @@ impl Lighting<'_> {
         let over = spot.normal.cross(across);
         let direction = across * (around.x * out) + over * (around.y * out) + spot.normal * up;
         let ray = Ray::new(spot.at + spot.normal * OFFSET, direction);
-        let Some(hit) = Spot::first(self.scene, self.tree, &ray) else {
+        let Some(hit) = SurfacePoint::first(self.scene, self.tree, &ray) else {
             return self.ambient;
         };
         if hit.glow != Vec3::ZERO {

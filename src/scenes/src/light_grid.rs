@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::bvh::Ray;
 use super::light::{LightSample, Lighting, STRATA, brightness};
-use super::spot::{Gloss, Spot, reflected};
+use super::spot::{Gloss, SurfacePoint, reflected};
 
 /// The share of the view that gets less than its typical light (chosen).
 const DARKER: f32 = 0.4;
@@ -14,7 +14,7 @@ const DARKER: f32 = 0.4;
 pub(super) struct LightGrid<'a> {
     lighting: &'a Lighting<'a>,
     grid: [usize; 2],
-    places: Vec<Option<Spot>>,
+    places: Vec<Option<SurfacePoint>>,
     /// The direct light, and the indirect light, which is smoother.
     incoming: [Vec<Vec3>; 2],
     /// The radiance of each thing that is a source of light; empty if sources are shown relative to the room.
@@ -28,12 +28,12 @@ const PASSES: [&[usize]; 2] = [&[1, 2, 1], &[1, 2, 4, 8, 2]];
 impl<'a> LightGrid<'a> {
     pub(super) fn new(
         lighting: &'a Lighting<'a>,
-        spots: &[Option<Spot>],
+        spots: &[Option<SurfacePoint>],
         size: [usize; 2],
         radiances: Vec<Option<Vec3>>,
     ) -> Self {
         let grid = size.map(|side| side.div_ceil(2));
-        let places: Vec<Option<Spot>> = (0..grid[0] * grid[1])
+        let places: Vec<Option<SurfacePoint>> = (0..grid[0] * grid[1])
             .map(|i| spots[(i / grid[0]) * 2 * size[0] + (i % grid[0]) * 2])
             .collect();
         let incoming: Vec<[Vec3; 2]> = places
@@ -108,7 +108,7 @@ impl<'a> LightGrid<'a> {
     }
 
     /// The light that reaches a point of the image.
-    fn at(&self, spot: &Spot, [x, y]: [f32; 2]) -> Vec3 {
+    fn at(&self, spot: &SurfacePoint, [x, y]: [f32; 2]) -> Vec3 {
         let [width, height] = self.grid;
         let (u, v) = ((x * 0.5).max(0.0), (y * 0.5).max(0.0));
         let (left, top) = (u.floor(), v.floor());
@@ -144,7 +144,7 @@ impl<'a> LightGrid<'a> {
     }
 
     /// The light that a point of the image sends to the camera.
-    pub(super) fn shade(&self, spot: &Spot, from: Vec3, at: [f32; 2]) -> Vec3 {
+    pub(super) fn shade(&self, spot: &SurfacePoint, from: Vec3, at: [f32; 2]) -> Vec3 {
         if spot.glow != Vec3::ZERO {
             return self.glow(spot);
         }
@@ -162,7 +162,7 @@ impl<'a> LightGrid<'a> {
             spot.at + spot.normal * 1e-3,
             reflected(direction, spot.normal),
         );
-        let back = Spot::first(self.lighting.scene, self.lighting.tree, &ray);
+        let back = SurfacePoint::first(self.lighting.scene, self.lighting.tree, &ray);
         let back = back.map_or(Vec3::ZERO, |back| {
             back.color * self.lighting.ambient * 1.6 + self.glow(&back)
         });
@@ -171,7 +171,7 @@ impl<'a> LightGrid<'a> {
 
     /// The light of a point that glows. On a display the brightness of a lamp is relative to that of the room, so that it never looks
     /// grey. As linear light, it is the radiance that lights the room.
-    fn glow(&self, spot: &Spot) -> Vec3 {
+    fn glow(&self, spot: &SurfacePoint) -> Vec3 {
         let radiance = self.radiances.get(spot.thing).copied().flatten();
         match radiance.filter(|_| spot.glow != Vec3::ZERO) {
             Some(radiance) => spot.color * radiance,
@@ -186,7 +186,7 @@ impl<'a> LightGrid<'a> {
 }
 
 /// The similarity of two points: 1 in the same plane, 0 on different things.
-fn similarity(a: &Spot, b: &Spot) -> f32 {
+fn similarity(a: &SurfacePoint, b: &SurfacePoint) -> f32 {
     if a.seen_thing != b.seen_thing || a.thing != b.thing {
         return 0.0;
     }

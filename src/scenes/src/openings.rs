@@ -36,9 +36,9 @@ impl FloorPlan {
             if !self.is_free_on_wall(&patch) {
                 continue;
             }
-            self.keep_wall_free(patch);
+            self.reserve_wall(patch);
             let pose = self.wall_pose(wall, along, 0.0);
-            self.keep_free(&pose, vec3(0.95, 0.0, 0.75), 0.0);
+            self.reserve_floor(&pose, vec3(0.95, 0.0, 0.75), 0.0);
             let mut turned = 0.0;
             if self.dice.chance(0.6) {
                 turned = self.dice.between(1.2, 1.9);
@@ -159,7 +159,7 @@ impl FloorPlan {
             let along = self.dice.between(reach + 0.05, span - reach - 0.05);
             let patch = WallPatch::around(wall, along, reach, [sill - 0.12, 2.3]);
             if self.is_free_on_wall(&patch) {
-                self.keep_wall_free(patch);
+                self.reserve_wall(patch);
                 let pose = self.wall_pose(wall, along, sill);
                 let daylight = self.dice.between(7.0, 13.0);
                 self.add(walls::window(width, 2.2 - sill, daylight), pose);
@@ -194,7 +194,7 @@ impl FloorPlan {
                 if is_long {
                     // Long curtains need free space in front of the wall.
                     let foot = at(vec3(pose.at.x, 0.0, pose.at.z), pose.angle);
-                    self.keep_free(&foot, vec3(2.0 * reach, 0.0, 0.2), 0.0);
+                    self.reserve_floor(&foot, vec3(2.0 * reach, 0.0, 0.2), 0.0);
                 }
             }
         }

@@ -45,7 +45,7 @@ pub(super) struct FloorPlan {
     pub(super) size: Vec3,
     pub(super) dice: Dice,
     /// Indices of the things that the camera should look at.
-    pub(super) focus_things: Vec<usize>,
+    pub(super) camera_targets: Vec<usize>,
     /// Bounding box of each thing: its lowest and its highest corner.
     pub(super) boxes: Vec<[Vec3; 2]>,
     pub(super) shell: Shell,
@@ -65,7 +65,7 @@ impl FloorPlan {
         let mut plan = Self {
             scene: Scene::default(),
             size,
-            focus_things: Vec::new(),
+            camera_targets: Vec::new(),
             boxes: Vec::new(),
             shell,
             areas: Vec::new(),
@@ -216,7 +216,12 @@ impl FloorPlan {
     }
 
     /// Places a set with its middle `along` metres from the left end of a wall. Returns its pose; `None` if something is in the way.
-    pub(super) fn stand_at(&mut self, set: FurnitureSet, wall: Wall, along: f32) -> Option<Pose> {
+    pub(super) fn try_place_at_wall(
+        &mut self,
+        set: FurnitureSet,
+        wall: Wall,
+        along: f32,
+    ) -> Option<Pose> {
         let pose = self.wall_pose(wall, along, 0.0);
         let pose = at(pose.to_room(vec3(0.0, 0.0, 0.016)), pose.angle);
         let area = Self::footprint(&pose, set.size, 0.0);
@@ -237,7 +242,7 @@ impl FloorPlan {
             let wall = self.dice.pick(choices);
             let half = set.size.x / 2.0 + 0.03;
             let along = self.dice.between(half, self.width(wall) - half);
-            self.stand_at(set.clone(), wall, along)
+            self.try_place_at_wall(set.clone(), wall, along)
         })
     }
 
@@ -251,12 +256,12 @@ impl FloorPlan {
             } else {
                 self.width(wall) - half
             };
-            self.stand_at(set.clone(), wall, along)
+            self.try_place_at_wall(set.clone(), wall, along)
         })
     }
 
     /// Places a set away from walls, centred on a place. Returns its pose; `None` if something is in the way.
-    pub(super) fn stand_free(
+    pub(super) fn place_away_from_walls(
         &mut self,
         set: FurnitureSet,
         place: Vec3,
@@ -274,12 +279,12 @@ impl FloorPlan {
     }
 
     /// Reserves a part of a wall: nothing is hung or placed there.
-    pub(super) fn keep_wall_free(&mut self, patch: WallPatch) {
+    pub(super) fn reserve_wall(&mut self, patch: WallPatch) {
         self.patches.push(patch);
     }
 
     /// Reserves a part of the floor, from `from` metres in front of a pose. Later sets are kept out of it.
-    pub(super) fn keep_free(&mut self, pose: &Pose, size: Vec3, from: f32) {
+    pub(super) fn reserve_floor(&mut self, pose: &Pose, size: Vec3, from: f32) {
         let area = Self::footprint(pose, size, from);
         self.areas.push(area);
     }
@@ -325,7 +330,7 @@ impl FloorPlan {
     }
 
     /// True if a place of the floor is at least `margin` metres from walls and furniture, so that a camera fits.
-    pub(super) fn walkable(&self, place: Vec3, margin: f32) -> bool {
+    pub(super) fn has_room_for_camera(&self, place: Vec3, margin: f32) -> bool {
         let point = FloorArea([place.x, place.z, place.x, place.z]);
         let inside = |value: f32, end: f32| (margin..=end - margin).contains(&value);
         inside(place.x, self.size.x)

@@ -15,7 +15,7 @@ use super::light::{LightSample, Lighting, STRATA, brightness};
 use super::light_grid::LightGrid;
 use super::room_light::RoomLight;
 use super::scene::Scene;
-use super::spot::Spot;
+use super::spot::SurfacePoint;
 use darkqa_ground::types::{Light, Pixels, Rgb};
 
 /// The image and the maps of a view.
@@ -72,7 +72,7 @@ pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, shown: RoomLigh
             SUBPIXELS
                 .map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy])
                 .map(|[x, y]| {
-                    let spot = Spot::through_mirror(scene, tree, &camera.ray(x, y));
+                    let spot = SurfacePoint::through_mirror(scene, tree, &camera.ray(x, y));
                     let color = spot.map_or(color, |spot| light.shade(&spot, camera.at, [x, y]));
                     curve(color * exposure)
                 })
@@ -113,19 +113,19 @@ pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, shown: RoomLigh
 }
 
 /// The first surface point on the ray through the middle of each pixel.
-fn spots(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<Option<Spot>> {
+fn spots(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<Option<SurfacePoint>> {
     let [width, height] = camera.size;
     let places = (0..width * height).into_par_iter().with_min_len(width);
     places
         .map(|i| {
             let ray = camera.ray((i % width) as f32, (i / width) as f32);
-            Spot::through_mirror(scene, tree, &ray)
+            SurfacePoint::through_mirror(scene, tree, &ray)
         })
         .collect()
 }
 
 /// Depth of each pixel in millimetres along the optical axis, at most 65,535; 0 if there is none.
-fn depth(spots: &[Option<Spot>], camera: &Camera) -> Vec<u16> {
+fn depth(spots: &[Option<SurfacePoint>], camera: &Camera) -> Vec<u16> {
     let (width, axis) = (camera.size[0], camera.axis());
     spots
         .iter()
@@ -152,7 +152,7 @@ pub(super) fn preview(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<u32> {
 }
 
 /// The lighting of a scene. The ambient light is estimated from the direct light and the colours of visible points.
-fn lighting<'a>(scene: &'a Scene, tree: &'a Bvh, spots: &[Option<Spot>]) -> Lighting<'a> {
+fn lighting<'a>(scene: &'a Scene, tree: &'a Bvh, spots: &[Option<SurfacePoint>]) -> Lighting<'a> {
     let mut lighting = Lighting {
         scene,
         tree,
@@ -184,7 +184,7 @@ fn lighting<'a>(scene: &'a Scene, tree: &'a Bvh, spots: &[Option<Spot>]) -> Ligh
 
 /// Whether a pixel is at an edge between things or colours.
 fn is_edge(
-    spots: &[Option<Spot>],
+    spots: &[Option<SurfacePoint>],
     colors: &[Vec3],
     [width, height]: [usize; 2],
     [x, y]: [usize; 2],

@@ -1,4 +1,4 @@
-//! Point where a ray hits a thing of the scene: [`Spot`].
+//! Point where a ray hits a thing of the scene: [`SurfacePoint`].
 
 use glam::Vec3;
 
@@ -8,7 +8,7 @@ use super::surface::SurfaceFinish;
 
 /// Point where a ray hits a thing of the scene, with the properties of the surface there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Spot {
+pub(super) struct SurfacePoint {
     /// Position in the scene, in metres.
     pub(super) at: Vec3,
     /// The surface normal, on the side that the ray came from.
@@ -40,7 +40,7 @@ pub(super) const FAR: f32 = 100.0;
 /// Share of light that a mirror reflects.
 const MIRROR_REFLECTANCE: f32 = 0.92;
 
-impl Spot {
+impl SurfacePoint {
     /// The first point that a ray hits; mirrors are ordinary surfaces. `None` if the ray hits nothing.
     pub(super) fn first(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.first(ray, FAR)?;

@@ -61,7 +61,7 @@ pub(super) fn camera(
         let sway = vec3(dice.between(-0.5, 0.5), 0.0, dice.between(-0.5, 0.5));
         let offset = target + sway - place;
         let distance = vec3(offset.x, 0.0, offset.z).length();
-        if !plan.walkable(place, margin) || distance < 0.8 {
+        if !plan.has_room_for_camera(place, margin) || distance < 0.8 {
             continue;
         }
         // At angle 0 the camera looks along −z.
@@ -80,7 +80,7 @@ pub(super) fn camera(
 /// The place of a random thing to look at.
 fn focus_place(plan: &FloorPlan, dice: &mut Dice) -> Vec3 {
     let known: Vec<usize> = plan
-        .focus_things
+        .camera_targets
         .iter()
         .copied()
         .filter(|thing| *thing < plan.scene.things.len())
@@ -127,7 +127,7 @@ fn score(plan: &FloorPlan, visible: &[u32]) -> f32 {
         if share > 0.003 {
             score += 0.1 + share.min(0.06) * 4.0;
         }
-        if plan.focus_things.contains(&i) && share > 0.012 {
+        if plan.camera_targets.contains(&i) && share > 0.012 {
             score += 0.35;
         }
         score -= (cut[i + 1] as f32 / width as f32).min(0.5) * 0.5;

@@ -53,7 +53,7 @@ type Tests = TestTree<Test>;
 
 /// Contents of a run that decide how the significance level is divided between its tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct AskedSets {
+pub struct RunContents {
     pub models: usize,
     pub enhancers: usize,
     /// Number of variants of the last degradation kind: the noise profiles, if the run has noise.
@@ -62,11 +62,11 @@ pub struct AskedSets {
     pub has_noise: bool,
 }
 
-impl AskedSets {
+impl RunContents {
     /// Significance level of the first test of an enhancer at the darker levels of one variant; without enhancers, of the first test of
     /// the cost of darkness. Later tests of the same question have this level or a larger one.
     #[must_use]
-    pub fn first_level(self) -> f64 {
+    pub fn first_significance_level(self) -> f64 {
         let rank = u32::from(self.models > 1);
         let main = MAIN * f64::from(1 + rank + self.enhancers as u32);
         let noise = if self.has_noise { NOISE } else { 0.0 };

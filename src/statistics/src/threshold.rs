@@ -24,7 +24,7 @@ pub struct Threshold {
 
 /// A level with too few replies for a threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ThinLevel {
+pub struct SparseLevel {
     pub level: AxisLevel,
     /// Number of its replies.
     pub replies: usize,
@@ -34,7 +34,7 @@ pub struct ThinLevel {
     pub clean_replies: usize,
 }
 
-impl ThinLevel {
+impl SparseLevel {
     /// Whether the replies are too few compared with those at L0.
     fn is_fragment(&self) -> bool {
         (self.replies as f64) < MIN_SHARE * self.clean_replies as f64
@@ -60,7 +60,7 @@ pub enum NoThreshold {
     /// Accuracy at L0 is not above chance, so that nothing can be lost.
     NotAboveChance,
     /// A level from L0 to the one after the crossing has too few replies.
-    Thin(ThinLevel),
+    Thin(SparseLevel),
 }
 
 /// Threshold and area of a curve.
@@ -74,7 +74,7 @@ pub struct CurveSummary {
     /// no degraded level has enough replies.
     pub area: Option<Estimate>,
     /// Levels that are left out of the curve, because they have too few replies.
-    pub left_out: Vec<ThinLevel>,
+    pub left_out: Vec<SparseLevel>,
 }
 
 /// Counts of one curve.
@@ -92,12 +92,12 @@ impl LevelCounts {
     /// Threshold and area; `None` without a reply at L0.
     #[must_use]
     pub fn summary(&self, draws: &Resamples) -> Option<CurveSummary> {
-        let sizes: Vec<ThinLevel> = (0..self.levels.len())
+        let sizes: Vec<SparseLevel> = (0..self.levels.len())
             .map(|index| self.size(index))
             .collect();
         let clean = *sizes.first().filter(|clean| clean.replies > 0)?;
         // If all levels are small, the area is still computed; only fragments are left out.
-        let is_left_out = |size: &ThinLevel| {
+        let is_left_out = |size: &SparseLevel| {
             size.replies == 0 || size.is_fragment() || size.is_small() && !clean.is_small()
         };
         let (left_out, kept): (Vec<usize>, Vec<usize>) =
@@ -112,13 +112,13 @@ impl LevelCounts {
     }
 
     /// The numbers of replies and clusters of a level.
-    fn size(&self, index: usize) -> ThinLevel {
+    fn size(&self, index: usize) -> SparseLevel {
         let replies = |index: usize| {
             self.counts[index]
                 .iter()
                 .map(|count| count.replies as usize)
         };
-        ThinLevel {
+        SparseLevel {
             level: self.levels[index],
             replies: replies(index).sum(),
             clusters: replies(index).filter(|replies| *replies > 0).count(),
@@ -158,13 +158,17 @@ impl LevelCounts {
     }
 
     /// The threshold. `sizes` are those of all levels asked, also of those that are left out here.
-    fn threshold(&self, draws: &Resamples, sizes: &[ThinLevel]) -> Result<Threshold, NoThreshold> {
+    fn threshold(
+        &self,
+        draws: &Resamples,
+        sizes: &[SparseLevel],
+    ) -> Result<Threshold, NoThreshold> {
         let replies = self.replies();
         let right = (0..replies.len()).map(|index| self.total(index, |count| count.right));
         let values: Vec<f64> = right.zip(&replies).map(|(right, n)| right / n).collect();
         let drops = self.drops();
         let chance = self.guesses.iter().map(|x| f64::from(*x)).sum::<f64>() / replies[0];
-        let is_thin = |size: &&ThinLevel| size.is_small() || size.is_fragment();
+        let is_thin = |size: &&SparseLevel| size.is_small() || size.is_fragment();
         if let Some(clean) = sizes.first().filter(is_thin) {
             return Err(NoThreshold::Thin(*clean));
         }

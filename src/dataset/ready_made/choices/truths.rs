@@ -7,11 +7,11 @@ use super::answers::{
 };
 use super::offered::Offered;
 use crate::dataset::ready_made::cells::{Cell, Table};
-use crate::dataset::ready_made::columns::map::{How, flag};
+use crate::dataset::ready_made::columns::map::{CellFormat, flag};
 use crate::dataset::ready_made::columns::names::Role;
 use crate::dataset::ready_made::columns::{Column, Roles, answer_column};
 use crate::dataset::ready_made::items::{AnswerCell, Item};
-use crate::dataset::ready_made::omissions::{LeftOut, Why};
+use crate::dataset::ready_made::omissions::{OmissionReason, Omissions};
 use crate::types::Choices;
 use crate::types::text::excerpt;
 
@@ -41,13 +41,13 @@ const SHARE_OF_VERBS: f64 = 0.9;
 pub(in crate::dataset::ready_made) fn truths(
     table: &Table,
     roles: &Roles,
-    how: &How,
+    how: &CellFormat,
     items: Vec<Item>,
-    left: &mut LeftOut,
+    left: &mut Omissions,
 ) -> Result<Truths, String> {
     if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
         for item in items {
-            left.add(Why::Open, || {
+            left.add(OmissionReason::Open, || {
                 format!("not in a column that is known ({})", table.place(item.row))
             });
         }
@@ -150,7 +150,7 @@ fn with_answers(
     table: &Table,
     column: &Column,
     items: Vec<Item>,
-    left: &mut LeftOut,
+    left: &mut Omissions,
     other: Option<String>,
 ) -> Result<Vec<(Item, String)>, String> {
     let count = items.len();
@@ -159,7 +159,7 @@ fn with_answers(
     for item in items {
         match AnswerCell::from_row(&table.rows[item.row], column) {
             AnswerCell::One(answer) => found.push((item, answer)),
-            AnswerCell::Several(shown) => left.add(Why::SeveralTruths, || shown),
+            AnswerCell::Several(shown) => left.add(OmissionReason::SeveralTruths, || shown),
             AnswerCell::Absent => absent.push(item.row),
         }
     }
@@ -174,7 +174,7 @@ fn with_answers(
         ));
     }
     for row in absent {
-        left.add(Why::Bad, || {
+        left.add(OmissionReason::Bad, || {
             format!("{}: no answer (column {:?})", table.place(row), column.name)
         });
     }
@@ -185,9 +185,9 @@ fn with_answers(
 fn read_with_options(
     table: &Table,
     roles: &Roles,
-    how: &How,
+    how: &CellFormat,
     items: Vec<Item>,
-    left: &mut LeftOut,
+    left: &mut Omissions,
     truths: &mut Truths,
 ) -> Result<(), String> {
     if items.is_empty() {
@@ -209,7 +209,9 @@ fn read_with_options(
     {
         match read.choices(&answer, &options.unwrap_or_default()) {
             Ok(choices) => truths.answered.push(Answered { row, text, choices }),
-            Err(problem) => left.add(Why::Bad, || format!("{}: {problem}", table.place(row))),
+            Err(problem) => left.add(OmissionReason::Bad, || {
+                format!("{}: {problem}", table.place(row))
+            }),
         }
     }
     Ok(())
@@ -217,7 +219,7 @@ fn read_with_options(
 
 /// How the answers of a column are read: in one way, in all rows.
 struct ColumnReading<'h> {
-    how: &'h How,
+    how: &'h CellFormat,
     reading: Reading,
     /// The number of rows that it fits.
     fit: usize,
@@ -231,7 +233,7 @@ impl<'h> ColumnReading<'h> {
     fn choose(
         table: &Table,
         column: &Column,
-        how: &'h How,
+        how: &'h CellFormat,
         items: &[(Item, String)],
     ) -> Result<Self, String> {
         let none = Offered::default();
@@ -250,8 +252,8 @@ impl<'h> ColumnReading<'h> {
             read
         };
         let read = match how {
-            How::Answer(reading) => by(*reading),
-            How::ByRule | How::Split(_) => {
+            CellFormat::Answer(reading) => by(*reading),
+            CellFormat::ByRule | CellFormat::Split(_) => {
                 let texts = is_own(table) && are_texts(table, column);
                 let texts = texts.then(|| by(Reading::Text));
                 // Of two readings that fit as many rows, the text is what this form has.
@@ -278,8 +280,8 @@ impl<'h> ColumnReading<'h> {
     /// The index of the option that an answer means.
     fn truth(&self, (answer, options): AnswerOf<'_>) -> Option<usize> {
         match self.how {
-            How::Answer(_) => self.reading.truth(answer, options),
-            How::ByRule | How::Split(_) => self.reading.by_rule(answer, options),
+            CellFormat::Answer(_) => self.reading.truth(answer, options),
+            CellFormat::ByRule | CellFormat::Split(_) => self.reading.by_rule(answer, options),
         }
     }
 
@@ -346,7 +348,7 @@ fn read_without_options(
     table: &Table,
     roles: &Roles,
     items: Vec<Item>,
-    left: &mut LeftOut,
+    left: &mut Omissions,
     truths: &mut Truths,
 ) -> Result<(), String> {
     if items.is_empty() {
@@ -370,7 +372,9 @@ fn read_without_options(
                 count += 1;
                 truths.answered.push(Answered { row, text, choices });
             }
-            Ok(_) | Err(_) => left.add(Why::Open, || format!("{:?}", excerpt(&answer, 60))),
+            Ok(_) | Err(_) => left.add(OmissionReason::Open, || {
+                format!("{:?}", excerpt(&answer, 60))
+            }),
         }
     }
     if count > 0 {

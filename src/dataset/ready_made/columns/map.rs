@@ -22,12 +22,12 @@ pub(in crate::dataset::ready_made) struct Entry {
     pub(in crate::dataset::ready_made) columns: Vec<String>,
     /// Text of `columns` before it was split at commas. A column with exactly this name takes precedence.
     pub(super) whole: String,
-    pub(in crate::dataset::ready_made) how: How,
+    pub(in crate::dataset::ready_made) how: CellFormat,
 }
 
 /// How the cells of a column are read.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::dataset::ready_made) enum How {
+pub(in crate::dataset::ready_made) enum CellFormat {
     /// By the default rules: no reading was given.
     ByRule,
     /// As options in one cell, separated by this text.
@@ -128,23 +128,23 @@ fn parse_entry(text: &str) -> Result<Entry, String> {
         .find(|role| role.name() == name)
         .ok_or_else(|| format!("no role {name:?}"))?;
     let (column, how) = match (role, value.rsplit_once(':')) {
-        (Role::Options | Role::Answer, Some((column, ""))) => (column, How::ByRule),
+        (Role::Options | Role::Answer, Some((column, ""))) => (column, CellFormat::ByRule),
         (Role::Options, Some((column, how))) => {
             let separator = how
                 .strip_prefix("split(")
                 .and_then(|how| how.strip_suffix(')'))
                 .filter(|separator| !separator.is_empty())
                 .ok_or("options=COLUMN:split(|) expected, with the signs between options")?;
-            (column, How::Split(separator.to_owned()))
+            (column, CellFormat::Split(separator.to_owned()))
         }
         (Role::Answer, Some((column, how))) => {
             let reading = Reading::from_name(how).ok_or_else(|| {
                 let names = Reading::ALL.map(Reading::name).join(", ");
                 format!("answer=COLUMN:HOW expected, with one of {names}")
             })?;
-            (column, How::Answer(reading))
+            (column, CellFormat::Answer(reading))
         }
-        _ => (value, How::ByRule),
+        _ => (value, CellFormat::ByRule),
     };
     let is_list = matches!(role, Role::Options | Role::Image) && !column.contains('{');
     let columns = if column.is_empty() {
@@ -180,11 +180,11 @@ mod tests {
         assert_eq!(columns(Role::Family), Vec::<String>::new());
         assert_eq!(
             map.entry(Role::Options).unwrap().how,
-            How::Split("|".into())
+            CellFormat::Split("|".into())
         );
         assert_eq!(
             map.entry(Role::Answer).unwrap().how,
-            How::Answer(Reading::Index1)
+            CellFormat::Answer(Reading::Index1)
         );
         assert_eq!(map.entry(Role::Hint), None);
     }
@@ -200,7 +200,7 @@ mod tests {
         let comma: Map = "options=all:split(,)".parse().unwrap();
         assert_eq!(
             comma.entry(Role::Options).unwrap().how,
-            How::Split(",".into())
+            CellFormat::Split(",".into())
         );
     }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 pub(in crate::dataset::ready_made) use super::column::Column;
-use super::map::{How, Map, flag};
+use super::map::{CellFormat, Map, flag};
 use super::names::{Role, known, plain};
 use super::template::Template;
 use crate::dataset::ready_made::cells::{Cell, Table, Turns};
@@ -122,8 +122,8 @@ impl Roles {
                 _ => InQuestion::Searched,
             },
             split_options: how.and_then(|entry| match &entry.how {
-                How::Split(signs) => Some(signs.clone()),
-                How::ByRule | How::Answer(_) => None,
+                CellFormat::Split(signs) => Some(signs.clone()),
+                CellFormat::ByRule | CellFormat::Answer(_) => None,
             }),
         })
     }

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::left_out::{LeftOut, Why};
+use super::left_out::{OmissionReason, Omissions};
 use crate::dataset::ready_made::cells::Table;
 use crate::dataset::ready_made::choices::Answered;
 use crate::dataset::ready_made::settings::SetArgs;
@@ -45,7 +45,7 @@ pub(in crate::dataset::ready_made) fn leave_out(
     table: &Table,
     args: &SetArgs,
     answered: &mut Vec<Answered>,
-    left: &mut LeftOut,
+    left: &mut Omissions,
     pairs: &[[usize; 2]],
 ) -> Result<(), String> {
     let mut wrong = BTreeSet::new();
@@ -53,7 +53,9 @@ pub(in crate::dataset::ready_made) fn leave_out(
         for at in pair {
             let is_new = wrong.insert(*at);
             if is_new {
-                left.add(Why::Bad, || contradiction(table, answered, *pair));
+                left.add(OmissionReason::Bad, || {
+                    contradiction(table, answered, *pair)
+                });
             }
         }
     }

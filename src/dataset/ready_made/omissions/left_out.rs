@@ -1,4 +1,4 @@
-//! Rows that cannot be asked, by the reason: [`LeftOut`].
+//! Rows that cannot be asked, by the reason: [`Omissions`].
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use crate::dataset::ready_made::settings::{SetArgs, SeveralImages};
 
 /// Why a row cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::dataset::ready_made) enum Why {
+pub(in crate::dataset::ready_made) enum OmissionReason {
     SeveralImages,
     NoImage,
     Open,
@@ -17,7 +17,7 @@ pub(in crate::dataset::ready_made) enum Why {
     Rotation,
 }
 
-impl Why {
+impl OmissionReason {
     /// The name in the manifest and in messages.
     pub(in crate::dataset::ready_made) fn name(self) -> &'static str {
         match self {
@@ -55,15 +55,15 @@ impl Why {
 
 /// The rows that are not asked: how many, and the place and problem of the first.
 #[derive(Debug, Default)]
-pub(in crate::dataset::ready_made) struct LeftOut {
-    counts: BTreeMap<Why, (usize, String)>,
+pub(in crate::dataset::ready_made) struct Omissions {
+    counts: BTreeMap<OmissionReason, (usize, String)>,
 }
 
-impl LeftOut {
+impl Omissions {
     /// Adds a row with its problem.
     pub(in crate::dataset::ready_made) fn add(
         &mut self,
-        why: Why,
+        why: OmissionReason,
         problem: impl FnOnce() -> String,
     ) {
         let entry = self.counts.entry(why).or_insert_with(|| (0, problem()));
@@ -71,13 +71,15 @@ impl LeftOut {
     }
 
     /// How many rows are left out, by the reason.
-    pub(in crate::dataset::ready_made) fn counts(&self) -> impl Iterator<Item = (Why, usize)> {
+    pub(in crate::dataset::ready_made) fn counts(
+        &self,
+    ) -> impl Iterator<Item = (OmissionReason, usize)> {
         self.counts.iter().map(|(why, (count, _))| (*why, *count))
     }
 
     /// The number of broken rows, and the problem of the first; `None` if there are none.
     pub(in crate::dataset::ready_made) fn bad(&self) -> Option<(usize, &str)> {
-        let (count, first) = self.counts.get(&Why::Bad)?;
+        let (count, first) = self.counts.get(&OmissionReason::Bad)?;
         Some((*count, first))
     }
 
@@ -94,13 +96,19 @@ impl LeftOut {
         for (why, (count, first)) in &self.counts {
             let (why, head) = (*why, format!("{count} of {rows} rows"));
             let head = match why {
-                Why::SeveralImages => format!("{head} show {first}"),
-                Why::NoImage => format!("no image in {head}"),
-                Why::Open => format!("no options in {head}, where the answer is e.g. {first}"),
-                Why::SeveralTruths => format!("{head} have several true options, e.g. {first}"),
-                Why::Bad | Why::Rotation => format!("{head} are broken; the first: {first}"),
+                OmissionReason::SeveralImages => format!("{head} show {first}"),
+                OmissionReason::NoImage => format!("no image in {head}"),
+                OmissionReason::Open => {
+                    format!("no options in {head}, where the answer is e.g. {first}")
+                }
+                OmissionReason::SeveralTruths => {
+                    format!("{head} have several true options, e.g. {first}")
+                }
+                OmissionReason::Bad | OmissionReason::Rotation => {
+                    format!("{head} are broken; the first: {first}")
+                }
             };
-            let skip = args.bad.filter(|_| why == Why::Bad);
+            let skip = args.bad.filter(|_| why == OmissionReason::Bad);
             if let Some(Err(problem)) = skip.map(|skip| skip.check(*count, rows, "rows", first)) {
                 problems.push(problem);
             } else if !why.is_left_out(args) {
@@ -109,11 +117,13 @@ impl LeftOut {
                     _ => "leaves them out",
                 };
                 let flag = match why {
-                    Why::Bad => SkipBad::enough(*count, rows).flag(),
+                    OmissionReason::Bad => SkipBad::enough(*count, rows).flag(),
                     why => why.flag().to_owned(),
                 };
                 let other = match why {
-                    Why::SeveralImages => ", --multi-image send shows all of them in one request",
+                    OmissionReason::SeveralImages => {
+                        ", --multi-image send shows all of them in one request"
+                    }
                     _ => "",
                 };
                 problems.push(format!("{head}; {flag} {verb}{other}"));
@@ -133,11 +143,11 @@ mod tests {
 
     #[test]
     fn nothing_is_left_out_without_a_word_of_the_user() {
-        let mut left = LeftOut::default();
+        let mut left = Omissions::default();
         assert!(left.check(40, &SetArgs::default()).is_ok());
-        left.add(Why::NoImage, String::new);
-        left.add(Why::SeveralImages, || "2 images".into());
-        left.add(Why::SeveralImages, || "3 images".into());
+        left.add(OmissionReason::NoImage, String::new);
+        left.add(OmissionReason::SeveralImages, || "2 images".into());
+        left.add(OmissionReason::SeveralImages, || "3 images".into());
         let problem = left.check(40, &SetArgs::default()).unwrap_err();
         assert!(problem.contains("2 of 40 rows show 2 images; --multi-image skip leaves them out, --multi-image send shows all of them in one request\n no image in 1 of 40 rows; --skip no-image leaves it out"), "{problem}");
         let args = SetArgs {
@@ -155,8 +165,8 @@ mod tests {
             bad: Some(SkipBad::default()),
             ..SetArgs::default()
         };
-        let mut left = LeftOut::default();
-        left.add(Why::Bad, || "a.csv, line 3: empty".into());
+        let mut left = Omissions::default();
+        left.add(OmissionReason::Bad, || "a.csv, line 3: empty".into());
         assert!(left.check(20, &args).is_ok());
         let problem = left.check(19, &args).unwrap_err();
         assert!(

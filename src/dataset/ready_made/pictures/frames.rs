@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::images::{CellPart, EmbeddedImage, ImagesAre, RowImage, images};
+use super::images::{CellPart, EmbeddedImage, ImageForm, RowImage, images};
 use crate::dataset::Root;
 use crate::dataset::image_source::ImageSource;
 use crate::dataset::ready_made::cells::{Cell, FileFacts, LONGEST_NAME, Step, Table};
@@ -45,7 +45,7 @@ pub(in crate::dataset::ready_made) struct Frames<'a> {
     /// The row of each file and id whose own cell holds an image.
     holders: HashMap<(usize, String), usize>,
     pub(super) roles: &'a Roles,
-    kind: ImagesAre,
+    kind: ImageForm,
     /// The part of the row that holds the image, by the column and the steps in its cell.
     parts: HashMap<(usize, Vec<Step>), Arc<CellPart>>,
     /// The name of each image in a cell.
@@ -64,7 +64,7 @@ impl<'a> Frames<'a> {
         archive: Option<&'a Arc<Archive>>,
         files: &'a [Arc<SetFile>],
         roles: &'a Roles,
-        kind: ImagesAre,
+        kind: ImageForm,
         several: Option<SeveralImages>,
     ) -> Self {
         let mut frames = Self {

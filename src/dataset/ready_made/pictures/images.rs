@@ -30,7 +30,7 @@ pub(in crate::dataset::ready_made) enum RowImage {
 
 /// The content of the image columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::dataset::ready_made) enum ImagesAre {
+pub(in crate::dataset::ready_made) enum ImageForm {
     /// Images, or the paths of files.
     Files,
     /// The names of frames of other data.
@@ -46,7 +46,7 @@ fn named_frames(row: &Row, roles: &Roles) -> Vec<RowImage> {
     names.take(1).map(RowImage::Frame).collect()
 }
 
-impl ImagesAre {
+impl ImageForm {
     /// The images of a row, in order.
     pub(in crate::dataset::ready_made) fn in_row(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
         match self {

@@ -11,6 +11,6 @@ pub(in crate::dataset) use frames::Series;
 pub(super) use ids::Ids;
 pub(super) use image_marks::ImageMarks;
 pub(in crate::dataset) use images::EmbeddedImage;
-pub(super) use images::{ImagesAre, images};
+pub(super) use images::{ImageForm, images};
 pub(in crate::dataset) use scenes::SceneNames;
 pub(super) use scenes::Scenes;

@@ -9,5 +9,5 @@ mod runtime_thread;
 mod search;
 
 pub(super) use library::PINNED;
-pub use runtime::{Install, Runtime, RuntimeSearch, forbid_telemetry};
+pub use runtime::{Install, Runtime, RuntimeSearch, disable_telemetry};
 pub(super) use runtime_thread::{Ended, JobLimits};

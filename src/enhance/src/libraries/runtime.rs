@@ -4,7 +4,7 @@
 //!
 //! Released builds send telemetry to Microsoft by default. The C API can disable telemetry only after the library has reported the start
 //! of the process and written an identifier to the user's cache folder (seen with 1.31.1 on Linux). The environment variable
-//! [`TELEMETRY_SWITCH`] takes effect earlier, so programs must call [`forbid_telemetry`] first.
+//! [`TELEMETRY_SWITCH`] takes effect earlier, so programs must call [`disable_telemetry`] first.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -61,7 +61,7 @@ const TELEMETRY_SWITCH: &str = "ORT_DISABLE_TELEMETRY";
     unsafe_code,
     reason = "there is no other way to switch off telemetry before ONNX Runtime starts"
 )]
-pub unsafe fn forbid_telemetry() {
+pub unsafe fn disable_telemetry() {
     // SAFETY: the caller guarantees that no other thread is running, so none can read the environment during the change.
     unsafe { std::env::set_var(TELEMETRY_SWITCH, "1") };
 }

@@ -2,7 +2,7 @@ use std::num::NonZeroUsize;
 
 use super::*;
 use crate::files::folder_access::FolderAccess;
-use crate::images::frames::{CameraOf, DegradedAt, SourceFrame};
+use crate::images::frames::{CameraScope, DegradeStage, SourceFrame};
 use crate::picture::Scaling;
 use crate::types::{Digest, EnhancerName, InputNote};
 use darkqa_enhance::SizeArgs;
@@ -96,9 +96,9 @@ fn every_part_of_what_decides_an_image_gives_another_key() {
         changed(|recipe| recipe.scaling = Scaling::LongerSide(4)),
         changed(|recipe| {
             recipe.scaling = Scaling::LongerSide(4);
-            recipe.degraded_at = DegradedAt::Resized;
+            recipe.degraded_at = DegradeStage::Resized;
         }),
-        changed(|recipe| recipe.camera_of = CameraOf::Episode),
+        changed(|recipe| recipe.camera_of = CameraScope::Episode),
         changed(|recipe| recipe.enhancers[0].1 = Digest::from_bytes(b"another file")),
         made_by("2", |_| {}),
         made_by("1", |sizes| sizes.tile = darkqa_enhance::Tiling::Whole),

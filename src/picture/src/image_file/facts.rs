@@ -4,9 +4,9 @@ use image::metadata::Orientation;
 
 use super::exr_layers::ExrFile;
 use super::format::FileFormat;
-use super::jpeg_markers::{self, JpegOutline};
+use super::jpeg_markers::{self, JpegProperties};
 use super::png_chunks::{self, PngFault, PngOutline};
-use super::tiff_tags::TiffOutline;
+use super::tiff_tags::TiffProperties;
 use super::webp_chunks::{self, WebpOutline};
 use crate::colour::ColourTag;
 use crate::reading_rule::ReadingRule;
@@ -87,7 +87,7 @@ impl FileFacts {
                 }
             }
             FileFormat::Jpeg => {
-                let outline = JpegOutline::parse(file);
+                let outline = JpegProperties::parse(file);
                 let form = if outline.is_adobe {
                     InkForm::Adobe
                 } else {
@@ -110,7 +110,7 @@ impl FileFacts {
                 }
             }
             FileFormat::Tiff => {
-                let outline = TiffOutline::parse(file);
+                let outline = TiffProperties::parse(file);
                 let stated = u8::try_from(outline.orientation).ok();
                 Self {
                     orientation: turn(stated.and_then(Orientation::from_exif)),
@@ -139,7 +139,7 @@ impl FileFacts {
 }
 
 /// Why a TIFF cannot be shown as it is; `None` if nothing is known before it is decoded.
-fn unshowable(outline: &TiffOutline<'_>) -> Option<String> {
+fn unshowable(outline: &TiffProperties<'_>) -> Option<String> {
     if outline.is_raw {
         let problem = "a camera's RAW file: only its preview could be read; develop it to a 16-bit TIFF or PNG first";
         return Some(problem.to_owned());

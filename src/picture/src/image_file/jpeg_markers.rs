@@ -1,4 +1,4 @@
-//! The facts of a JPEG file that its markers hold: [`JpegOutline`]; and whether it has its end: [`ends`].
+//! The facts of a JPEG file that its markers hold: [`JpegProperties`]; and whether it has its end: [`ends`].
 //!
 //! The decoder converts CMYK to RGB without regard to its profile, and fills the missing part of a truncated file with grey. Models
 //! would be asked about either as if it were the image.
@@ -22,7 +22,7 @@ const SAMPLES: u8 = 0xDA;
 
 /// The facts of a JPEG file in its headers (ITU-T T.81, annex B).
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct JpegOutline<'a> {
+pub(super) struct JpegProperties<'a> {
     /// The components of a pixel: 1 for grey, 3 for colour, 4 for CMYK or YCCK; `None` without a frame header.
     pub(super) components: Option<u8>,
     /// The EXIF data, a TIFF structure; `None` if there are none.
@@ -33,7 +33,7 @@ pub(super) struct JpegOutline<'a> {
     profile: Vec<(u8, &'a [u8])>,
 }
 
-impl<'a> JpegOutline<'a> {
+impl<'a> JpegProperties<'a> {
     /// Reads the markers one after another up to the samples; a truncated file is read up to its end.
     pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut outline = Self::default();
@@ -130,7 +130,7 @@ mod tests {
         let mut grey = HEAD;
         grey[11] = 1;
         let file = [&grey[..2], &inner[..], &grey[2..], &TAIL].concat();
-        let components = |file| JpegOutline::parse(file).components;
+        let components = |file| JpegProperties::parse(file).components;
         assert_eq!((components(&file), ends(&file)), (Some(1), true));
         for length in 0..file.len() {
             let expected = (length >= file.len() - TAIL.len()).then_some(1);
@@ -147,7 +147,7 @@ mod tests {
     fn a_wrong_length_ends_the_reading() {
         for length in [[0, 0], [0, 1], [0xFF, 0xFF]] {
             let file = [&[0xFF, 0xD8, 0xFF, 0xC0][..], &length, &TAIL].concat();
-            assert_eq!(JpegOutline::parse(&file), JpegOutline::default());
+            assert_eq!(JpegProperties::parse(&file), JpegProperties::default());
             assert!(!ends(&file));
         }
     }
@@ -157,8 +157,8 @@ mod tests {
         let exif = [0xFF, 0xE1, 0, 10, b'E', b'x', b'i', b'f', 0, 0, 7, 9];
         let other = [0xFF, 0xE1, 0, 6, b'h', b't', b't', b'p'];
         let file = [&HEAD[..2], &other, &exif, &HEAD[2..], &TAIL].concat();
-        assert_eq!(JpegOutline::parse(&file).exif, Some(&[7, 9][..]));
+        assert_eq!(JpegProperties::parse(&file).exif, Some(&[7, 9][..]));
         let late = [&HEAD[..], &TAIL[..5], &exif, &TAIL[5..]].concat();
-        assert_eq!(JpegOutline::parse(&late).exif, None);
+        assert_eq!(JpegProperties::parse(&late).exif, None);
     }
 }

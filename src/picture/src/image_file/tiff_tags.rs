@@ -1,4 +1,4 @@
-//! Parser for the tags of the first image in a TIFF file: [`TiffOutline`].
+//! Parser for the tags of the first image in a TIFF file: [`TiffProperties`].
 //!
 //! The decoder of the crate `tiff` is not enough here. It returns no tags if it cannot decode the first image (a camera's RAW file, a
 //! mask, a broken file). It returns no tag longer than 1 MiB, and some ICC profiles are longer. For some compressions it decodes
@@ -41,7 +41,7 @@ const FLOAT: u64 = 3;
 
 /// Properties of a TIFF file that decide how it is decoded.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct TiffOutline<'a> {
+pub(super) struct TiffProperties<'a> {
     /// Orientation, 1 to 8, as in EXIF; 0 without the tag.
     pub(super) orientation: u64,
     /// Number of pages. Reduced-resolution copies after the first page are not counted.
@@ -62,7 +62,7 @@ pub(super) struct TiffOutline<'a> {
     pub(super) end: u64,
 }
 
-impl<'a> TiffOutline<'a> {
+impl<'a> TiffProperties<'a> {
     /// Parses the tags. Fields whose tags cannot be read have default values.
     pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut outline = Self::default();
@@ -279,12 +279,12 @@ mod tests {
     #[test]
     fn a_circle_of_directories_ends() {
         let circle = file(&[(0, Some(1)), (0, Some(2)), (0, Some(1))]);
-        assert_eq!(TiffOutline::parse(&circle).pages, 3);
+        assert_eq!(TiffProperties::parse(&circle).pages, 3);
     }
 
     #[test]
     fn copies_and_masks_are_no_pages() {
         let masked = file(&[(0, Some(1)), (4, Some(2)), (1, None)]);
-        assert_eq!(TiffOutline::parse(&masked).pages, 1);
+        assert_eq!(TiffProperties::parse(&masked).pages, 1);
     }
 }

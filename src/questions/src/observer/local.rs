@@ -267,7 +267,7 @@ fn light_field(tiles: &Tiles, moments: &[[Moments; 3]], weights: &[f64]) -> Vec<
         })
         .collect();
     let fields = [0, 1, 2].map(|channel| {
-        let mut equations = Equations::<TERMS>::default();
+        let mut equations = NormalEquations::<TERMS>::default();
         for ((moments, terms), weight) in moments.iter().zip(&terms).zip(weights) {
             let moments = &moments[channel];
             equations.add(terms, weight * moments.power, weight * moments.product);
@@ -287,12 +287,12 @@ fn light_field(tiles: &Tiles, moments: &[[Moments; 3]], weights: &[f64]) -> Vec<
 
 /// Normal equations of a weighted linear regression on `N` terms; the first term is constant.
 #[derive(Debug, Clone)]
-pub(super) struct Equations<const N: usize> {
+pub(super) struct NormalEquations<const N: usize> {
     matrix: [[f64; N]; N],
     right: [f64; N],
 }
 
-impl<const N: usize> Default for Equations<N> {
+impl<const N: usize> Default for NormalEquations<N> {
     fn default() -> Self {
         Self {
             matrix: [[0.0; N]; N],
@@ -301,7 +301,7 @@ impl<const N: usize> Default for Equations<N> {
     }
 }
 
-impl<const N: usize> Equations<N> {
+impl<const N: usize> NormalEquations<N> {
     /// Adds observations that share these terms: `power` is the sum of their squared predictors, `product` the sum of predictor ×
     /// response.
     pub(super) fn add(&mut self, terms: &[f64; N], power: f64, product: f64) {

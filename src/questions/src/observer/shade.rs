@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use super::channel::{ChannelFit, Fit, ROUNDING};
-use super::local::{Equations, MIN_GAIN};
+use super::local::{MIN_GAIN, NormalEquations};
 use super::outlines::PatchSums;
 use super::tiles::Tiles;
 use crate::colors::{Color, Palette};
@@ -173,7 +173,7 @@ impl<'a> Light<'a> {
         });
         let rows = self.tiles.len().div_ceil(self.tiles.columns);
         let width = rows.max(self.tiles.columns) as f64 * SMOOTHED;
-        let mut equations = [0, 1, 2].map(|_| Equations::<3>::default());
+        let mut equations = [0, 1, 2].map(|_| NormalEquations::<3>::default());
         for piece in self.pieces.iter().filter(|piece| piece.mask != mask) {
             let terms = linear_terms(piece.place, middle);
             let distance = (terms[1] * terms[1] + terms[2] * terms[2]) / (width * width);
@@ -189,7 +189,7 @@ impl<'a> Light<'a> {
         }
         LightField {
             middle,
-            channels: equations.map(Equations::solve),
+            channels: equations.map(NormalEquations::solve),
         }
     }
 }

@@ -29,7 +29,7 @@ use crate::text::words::counted;
 use crate::types::Decides;
 use crate::types::Question;
 use darkqa_light::LightSettings;
-use darkqa_score::tested_sentences::AskedSets;
+use darkqa_score::tested_sentences::RunContents;
 
 use findings::{Finding, Findings, Mark, lines};
 use images::Depth;
@@ -149,7 +149,7 @@ fn data(
     }
     if args.job.models.is_empty() {
         // With a model, this line is among what a run would take.
-        let sets = AskedSets {
+        let sets = RunContents {
             models: 1,
             enhancers: args.job.enhancers.llie.len() + args.job.enhancers.enhanced.len(),
             lights: 1,

@@ -25,7 +25,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     };
     plan.windows(&sides(wall), width, 0.85, dressing);
     if let Some(pose) = plan.maybe_stand(0.6, dresser) {
-        plan.focus_things.push(plan.scene.things.len() - 1);
+        plan.camera_targets.push(plan.scene.things.len() - 1);
         if plan.dice.chance(0.5) {
             let piece = walls::mirror(0.6, 0.7, &mut plan.dice);
             plan.hang_above(&pose, piece, 1.1);
@@ -61,7 +61,7 @@ fn bed(plan: &mut FloorPlan, wall: Wall) {
     let along = span / 2.0 + plan.dice.between(-0.3, 0.3);
     let size = set.size;
     plan.focus_on_next();
-    let Some(pose) = plan.stand_at(set, wall, along) else {
+    let Some(pose) = plan.try_place_at_wall(set, wall, along) else {
         return;
     };
     let foot = at(pose.to_room(vec3(0.0, 0.0, size.z * 0.75)), pose.angle);
@@ -72,7 +72,7 @@ fn bed(plan: &mut FloorPlan, wall: Wall) {
             let set = FurnitureSet::from_piece(stand);
             let top = set.size.y;
             let place = along + side * (size.x / 2.0 + set.size.x / 2.0 + 0.06);
-            if let Some(pose) = plan.stand_at(set, wall, place)
+            if let Some(pose) = plan.try_place_at_wall(set, wall, place)
                 && plan.dice.chance(0.75)
             {
                 plan.add_part(&pose, "table lamp", vec3(0.0, top, 0.05));

@@ -32,7 +32,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
             .stand(&FurnitureSet::from_piece(piece), &WALLS)
             .is_some()
         {
-            plan.focus_things.push(plan.scene.things.len() - 1);
+            plan.camera_targets.push(plan.scene.things.len() - 1);
         }
     }
     plan.maybe_stand(0.3, super::shared::dresser);
@@ -41,7 +41,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
         .maybe_stand(0.45, |dice| parts::piece("fireplace", dice))
         .is_some()
     {
-        plan.focus_things.push(plan.scene.things.len() - 1);
+        plan.camera_targets.push(plan.scene.things.len() - 1);
     }
     plan.maybe_stand(0.2, low_stool);
     plan.plant(0.6);
@@ -85,7 +85,7 @@ fn table(plan: &mut FloorPlan) {
     plan.add(piece, pose);
     // The chairs belong to the table: they are added without a check, and the floor under them is reserved.
     let around = at(middle, angle);
-    plan.keep_free(
+    plan.reserve_floor(
         &at(around.to_room(vec3(0.0, 0.0, -depth / 2.0 - 0.5)), angle),
         vec3(length + 0.9, 0.0, depth + 1.0),
         0.0,

@@ -51,10 +51,10 @@ fn kitchen_row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
     if fridge {
         plan.focus_on_next();
         let set = FurnitureSet::from_piece(style.appliance("refrigerator", &mut plan.dice));
-        plan.stand_at(set, wall, next(0.74));
+        plan.try_place_at_wall(set, wall, next(0.74));
     }
     let cabinets = base_cabinets(first - 0.05, false, style, &mut plan.dice);
-    if let Some(pose) = plan.stand_at(cabinets, wall, next(first - 0.05)) {
+    if let Some(pose) = plan.try_place_at_wall(cabinets, wall, next(first - 0.05)) {
         if plan.dice.chance(0.6) {
             let piece = style.appliance("microwave", &mut plan.dice);
             plan.add_relative(&pose, piece, vec3(0.0, COUNTER, 0.1), 0.0);
@@ -63,13 +63,13 @@ fn kitchen_row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
     }
     plan.focus_on_next();
     let stove = style.appliance("stove", &mut plan.dice);
-    if let Some(pose) = plan.stand_at(FurnitureSet::from_piece(stove), wall, next(0.63)) {
+    if let Some(pose) = plan.try_place_at_wall(FurnitureSet::from_piece(stove), wall, next(0.63)) {
         let hood = parts::piece("range hood", &mut plan.dice);
         plan.hang_above(&pose, hood, 1.6);
     }
     plan.focus_on_next();
     let cabinets = base_cabinets(second - 0.05, sinks, style, &mut plan.dice);
-    if let Some(pose) = plan.stand_at(cabinets, wall, next(second - 0.05)) {
+    if let Some(pose) = plan.try_place_at_wall(cabinets, wall, next(second - 0.05)) {
         plan.hang_above(&pose, wall_cabinets(second - 0.05, style), 1.48);
     }
 }
@@ -84,10 +84,10 @@ fn eating(plan: &mut FloorPlan, wall: Wall) {
     let far = plan.dice.between(2.2, 2.5);
     let place = before.to_room(vec3(side, 0.0, far));
     let table = tables::round(kind("table", "table"), 0.42, 0.75, &mut plan.dice);
-    let Some(pose) = plan.stand_free(FurnitureSet::from_piece(table), place, 0.0) else {
+    let Some(pose) = plan.place_away_from_walls(FurnitureSet::from_piece(table), place, 0.0) else {
         return;
     };
-    plan.focus_things.push(plan.scene.things.len() - 1);
+    plan.camera_targets.push(plan.scene.things.len() - 1);
     let paint = Paint::random(&USUAL, &mut plan.dice);
     let stools = plan.dice.chance(0.4);
     let start = plan.dice.between(0.0, 6.0);
@@ -102,7 +102,7 @@ fn eating(plan: &mut FloorPlan, wall: Wall) {
         // Each faces the table: its front is z, which a rotation about y moves to (sin, cos).
         let back = vec3(place.x, 0.0, place.z) - vec3(out.y, 0.0, out.x) * 0.85;
         let set = FurnitureSet::from_piece(piece);
-        plan.stand_free(set, back + vec3(out.y, 0.0, out.x) * 0.2, angle);
+        plan.place_away_from_walls(set, back + vec3(out.y, 0.0, out.x) * 0.2, angle);
     }
     if plan.dice.chance(0.5) {
         let top = vec3(0.0, 0.75, 0.3);

@@ -44,7 +44,7 @@ fn sofa_group(plan: &mut FloorPlan, wall: Wall) {
     let size = set.size;
     let along = plan.width(wall) / 2.0 + plan.dice.between(-0.4, 0.4);
     plan.focus_on_next();
-    let Some(pose) = plan.stand_at(set, wall, along) else {
+    let Some(pose) = plan.try_place_at_wall(set, wall, along) else {
         return;
     };
     if plan.dice.chance(0.6) {
@@ -61,14 +61,14 @@ fn sofa_group(plan: &mut FloorPlan, wall: Wall) {
             tables::table(name, vec3(1.0, 0.42, 0.55), &mut plan.dice)
         };
         let piece = FurnitureSet::from_piece(piece);
-        plan.focus_things.push(plan.scene.things.len());
-        plan.stand_free(piece, before, pose.angle);
+        plan.camera_targets.push(plan.scene.things.len());
+        plan.place_away_from_walls(piece, before, pose.angle);
     }
     if plan.dice.chance(0.55) {
         let side = if plan.dice.chance(0.5) { -1.0 } else { 1.0 };
         let place = pose.to_room(vec3(side * (size.x / 2.0 + 0.3), 0.0, 1.75));
         let piece = FurnitureSet::from_piece(seats::armchair(&mut plan.dice));
-        plan.stand_free(piece, place, pose.angle - side * 1.9);
+        plan.place_away_from_walls(piece, place, pose.angle - side * 1.9);
     }
     if plan.dice.chance(0.5) {
         let piece = FurnitureSet::from_piece(tables::round(
@@ -78,7 +78,7 @@ fn sofa_group(plan: &mut FloorPlan, wall: Wall) {
             &mut plan.dice,
         ));
         let place = along + size.x / 2.0 + 0.32;
-        if let Some(pose) = plan.stand_at(piece, wall, place) {
+        if let Some(pose) = plan.try_place_at_wall(piece, wall, place) {
             plan.add_part(&pose, "table lamp", vec3(0.0, 0.5, 0.1));
         }
     }
@@ -90,7 +90,7 @@ fn opposite_sofa(plan: &mut FloorPlan, wall: Wall) {
     plan.focus_on_next();
     if plan.dice.chance(0.5) {
         let piece = FurnitureSet::from_piece(parts::piece("fireplace", &mut plan.dice));
-        if let Some(pose) = plan.stand_at(piece, wall, along)
+        if let Some(pose) = plan.try_place_at_wall(piece, wall, along)
             && plan.dice.chance(0.5)
         {
             let piece = walls::mirror(0.8, 0.6, &mut plan.dice);
@@ -105,10 +105,10 @@ fn opposite_sofa(plan: &mut FloorPlan, wall: Wall) {
         3,
         &mut plan.dice,
     );
-    if let Some(pose) = plan.stand_at(FurnitureSet::from_piece(cabinet), wall, along) {
+    if let Some(pose) = plan.try_place_at_wall(FurnitureSet::from_piece(cabinet), wall, along) {
         let screen = plan.dice.between(1.0, 1.25);
         let tv = walls::television(screen, true);
         let top = plan.add_relative(&pose, tv, vec3(0.0, 0.5, 0.06), 0.0);
-        plan.focus_things.push(top);
+        plan.camera_targets.push(top);
     }
 }

@@ -25,7 +25,7 @@ pub(super) fn furnish(mut dice: Dice) -> FloorPlan {
     ]);
     plan.windows(&sides(wall), width, 0.9, dressing);
     if plan.maybe_stand(0.8, storage::bookshelf).is_some() {
-        plan.focus_things.push(plan.scene.things.len() - 1);
+        plan.camera_targets.push(plan.scene.things.len() - 1);
     }
     plan.maybe_stand(0.35, super::shared::dresser);
     plan.maybe_stand(0.35, |dice| {
@@ -48,7 +48,7 @@ fn desk(plan: &mut FloorPlan, wall: Wall) {
     let size = set.size;
     let along = plan.width(wall) / 2.0 + plan.dice.between(-0.5, 0.5);
     plan.focus_on_next();
-    let Some(pose) = plan.stand_at(set, wall, along) else {
+    let Some(pose) = plan.try_place_at_wall(set, wall, along) else {
         return;
     };
     let top = size.y;
@@ -68,5 +68,5 @@ fn desk(plan: &mut FloorPlan, wall: Wall) {
     let place = pose.to_room(vec3(aside, 0.0, size.z + 0.32));
     let chair = FurnitureSet::from_piece(parts::piece("office chair", &mut plan.dice));
     plan.focus_on_next();
-    plan.stand_free(chair, place, turned);
+    plan.place_away_from_walls(chair, place, turned);
 }

@@ -11,7 +11,7 @@ use super::super::shell::{WALLS, Wall};
 impl FloorPlan {
     /// Marks the next thing that is added as one that the camera should look at.
     pub(super) fn focus_on_next(&mut self) {
-        self.focus_things.push(self.scene.things.len());
+        self.camera_targets.push(self.scene.things.len());
     }
 
     /// Places a piece at a wall, with this probability; `None` if it is not placed.

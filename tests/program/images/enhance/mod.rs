@@ -19,7 +19,7 @@ use darkqa_ground::types::Rgb;
 use tempfile::TempDir;
 
 fn runtime() -> Runtime {
-    crate::support::forbid_telemetry();
+    crate::support::disable_telemetry();
     let search = RuntimeSearch {
         library: std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from),
         install: Install::Allowed,
