@@ -212,7 +212,7 @@ impl<I: Item> ReplySink<'_, I> {
             }
             let state = match in_flight.len() {
                 0 => Some(TimedStep::Idle),
-                _ if lanes.is_full() => Some(TimedStep::Full),
+                _ if lanes.has_waiting() => Some(TimedStep::Full),
                 _ => None,
             };
             let since = Instant::now();

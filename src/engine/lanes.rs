@@ -211,7 +211,7 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// True if trials are waiting. Once [`Self::next`] has returned `None`, none of them may be sent now.
-    pub(crate) fn is_full(&self) -> bool {
+    pub(crate) fn has_waiting(&self) -> bool {
         !self.is_empty()
     }
 

@@ -12,6 +12,7 @@
 mod answers;
 mod apart;
 mod baseline;
+mod below_blind;
 mod confidence;
 mod darkness;
 mod format;
@@ -24,7 +25,6 @@ mod real;
 mod sample;
 mod self_agreement;
 mod sentence;
-mod words_alone;
 
 pub(crate) use baseline::{against_baseline, no_verdict};
 pub(crate) use models::dark_levels;
@@ -69,7 +69,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(darkness::darkness(findings));
     sentences.extend(real::real(findings));
     sentences.extend(in_each_light(findings, about_light));
-    sentences.extend(words_alone::untouched(findings));
+    sentences.extend(below_blind::untouched(findings));
     sentences.extend(about_clean(findings));
     sentences.extend(models::best(findings));
     sentences.extend(apart::apart(findings));
@@ -100,9 +100,9 @@ fn about_light(findings: &Findings<'_>, variant: &Variant) -> Vec<Sentence> {
         unit,
     ));
     let blind = of(PooledKind::Blind);
-    sentences.extend(words_alone::pooled(&blind, unit));
-    let by_family = words_alone::by_family(findings, variant);
-    sentences.extend(words_alone::in_a_family(&by_family, &blind, unit));
+    sentences.extend(below_blind::pooled(&blind, unit));
+    let by_family = below_blind::by_family(findings, variant);
+    sentences.extend(below_blind::in_a_family(&by_family, &blind, unit));
     sentences
 }
 

@@ -37,7 +37,7 @@ impl Price {
 
     /// The maximum cost of a request within a token bound, in dollars.
     #[must_use]
-    pub(crate) fn most(&self, bound: TokenBound) -> f64 {
+    pub(crate) fn max_cost(&self, bound: TokenBound) -> f64 {
         let input = self.input.max(self.cached_input.unwrap_or(self.input));
         (bound.prompt as f64 * input + bound.reply as f64 * self.output) / 1e6
     }

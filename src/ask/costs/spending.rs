@@ -120,7 +120,7 @@ impl PricedRequest {
 
     /// The most that the request can cost, in US dollars.
     pub(crate) fn most(&self) -> f64 {
-        self.price.most(self.current_bound())
+        self.price.max_cost(self.current_bound())
     }
 }
 
@@ -180,7 +180,7 @@ impl Spending {
     /// A reservation for a request, if the limit allows it beside all others.
     pub(crate) fn reserve(self: &Arc<Self>, request: PricedRequest) -> Option<Reservation> {
         let bound = request.current_bound();
-        let most = request.price.most(bound);
+        let most = request.price.max_cost(bound);
         let mut dollars = self.dollars();
         if dollars.waiting > 0 || !self.fits(&dollars, most) {
             return None;
@@ -249,7 +249,7 @@ impl Reservation {
                     return true;
                 }
                 let bound = self.request.current_bound();
-                let most = self.request.price.most(bound);
+                let most = self.request.price.max_cost(bound);
                 let mut dollars = self.spending.dollars();
                 if self.spending.fits(&dollars, most) {
                     dollars.reserve(most);
@@ -298,7 +298,7 @@ impl Reservation {
         if reply > limit {
             self.request.excess.note(reply, limit);
         }
-        let charged = price.charged(stated) + price.most(missing);
+        let charged = price.charged(stated) + price.max_cost(missing);
         self.settle(bound, charged);
     }
 
@@ -310,7 +310,7 @@ impl Reservation {
 
     fn settle(&self, bound: TokenBound, charged: f64) {
         let mut dollars = self.spending.dollars();
-        dollars.release(self.request.price.most(bound));
+        dollars.release(self.request.price.max_cost(bound));
         dollars.spent += charged;
         drop(dollars);
         self.spending.released.notify_waiters();

@@ -16,7 +16,7 @@ pub(in crate::ask) fn check_owner(
     vendors: VendorTable,
 ) -> Result<()> {
     match vendors.by_key(key.expose()) {
-        Some(owner) if !base.is_loopback() && !owner.is_of(base.host()) => Err(Error::usage(
+        Some(owner) if !base.is_loopback() && !owner.owns_host(base.host()) => Err(Error::usage(
             "--base-url",
             format_args!(
                 "{base}: the key looks like one of {}, and this address is another's; name the key of this address with --api-key-env NAME, \

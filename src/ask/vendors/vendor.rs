@@ -112,7 +112,7 @@ static VENDORS: LazyLock<Vendors> = LazyLock::new(|| {
 impl Vendor {
     /// Finds the vendor of a host; `None` if the built-in table lacks the host.
     pub(crate) fn at_host(host: &str) -> Option<&'static Self> {
-        VENDORS.vendor.iter().find(|vendor| vendor.is_of(host))
+        VENDORS.vendor.iter().find(|vendor| vendor.owns_host(host))
     }
 
     /// Finds the vendor in the built-in table that uses keys of this form; `None` if several vendors do, or if that is unknown.
@@ -137,7 +137,7 @@ impl Vendor {
     }
 
     /// True if the host belongs to this vendor.
-    pub(in crate::ask) fn is_of(&self, host: &str) -> bool {
+    pub(in crate::ask) fn owns_host(&self, host: &str) -> bool {
         self.hosts
             .iter()
             .any(|suffix| matches_host_suffix(host, suffix))

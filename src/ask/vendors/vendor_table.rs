@@ -65,7 +65,7 @@ impl VendorTable {
     pub(in crate::ask) fn at_host(self, host: &str) -> Option<&'static Vendor> {
         self.0
             .iter()
-            .find(|vendor| vendor.is_of(host))
+            .find(|vendor| vendor.owns_host(host))
             .or_else(|| Vendor::at_host(host))
     }
 

@@ -79,7 +79,7 @@ impl Likelihood {
                 at: [shape, log_scale],
                 step: [0.05, 0.1],
             };
-            simplex::least(start, &loss)
+            simplex::minimize(start, &loss)
         };
         let (first, second) = (from(-0.1), from(0.1));
         let best = if first.1 <= second.1 {

@@ -22,7 +22,7 @@ type Vertex = ([f64; 2], f64);
 /// the point and the value there.
 ///
 /// The function may return infinity to exclude a point from the search.
-pub(super) fn least(start: Start, function: &impl Fn([f64; 2]) -> f64) -> Vertex {
+pub(super) fn minimize(start: Start, function: &impl Fn([f64; 2]) -> f64) -> Vertex {
     let evaluate = |at: [f64; 2]| (at, function(at));
     let [x, y] = start.at;
     let mut simplex = [
@@ -85,7 +85,7 @@ mod tests {
             at: [-1.2, 1.0],
             step: [0.5, 0.5],
         };
-        let ([x, y], value) = least(start, &valley);
+        let ([x, y], value) = minimize(start, &valley);
         assert!((x - 1.0).abs() < 1e-5 && (y - 1.0).abs() < 1e-5, "{x}, {y}");
         assert!(value < 1e-10);
         // With x > 0.5 excluded, the search ends at the boundary.
@@ -96,7 +96,7 @@ mod tests {
                 valley([x, y])
             }
         };
-        let ([x, _], _) = least(start, &walled);
+        let ([x, _], _) = minimize(start, &walled);
         assert!(x <= 0.5 && x > 0.49, "{x}");
     }
 }

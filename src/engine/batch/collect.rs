@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use jiff::Timestamp;
 use tokio::time::sleep;
 
-use super::driver::{Driver, Step, Until};
+use super::driver::{Driver, Goal, Step};
 use super::event::Event;
 use super::take_over::for_each_line;
 use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
@@ -26,14 +26,14 @@ const DELETIONS: usize = 3;
 
 impl<D: Detail> Driver<'_, D> {
     /// Looks at the batch of a part, once between two waits.
-    pub(super) async fn look_at(&mut self, part: usize) -> Result<Step> {
+    pub(super) async fn check_batch(&mut self, part: usize) -> Result<Step> {
         let Some(id) = self.part(part).batch.clone() else {
             return Ok(Step::Waiting);
         };
         if !self.notes.looked_at.insert(part) {
             return Ok(Step::Waiting);
         }
-        if self.until == Until::Cancelled && !self.part(part).cancelled {
+        if self.until == Goal::Cancelled && !self.part(part).cancelled {
             self.cancel(part, &id).await?;
         }
         let looked = self.server(part)?.batch(&id).await;
@@ -148,7 +148,7 @@ impl<D: Detail> Driver<'_, D> {
             return Ok(None);
         };
         let waiting = self.store.pending_in_batches()?;
-        if self.until == Until::Cancelled || !keys.iter().any(|key| waiting.contains(key)) {
+        if self.until == Goal::Cancelled || !keys.iter().any(|key| waiting.contains(key)) {
             return Ok(None);
         }
         let server = self.server(part)?;
@@ -194,10 +194,10 @@ impl<D: Detail> Driver<'_, D> {
         let has_ended = *looks >= MOST_INCOMPLETE;
         let name = self.part(part).name.clone();
         let text = format!("{name}: batch {}: {problem}", batch.id);
-        if self.until == Until::Cancelled {
+        if self.until == Goal::Cancelled {
             return self.fetched_all(part, batch);
         }
-        if self.until == Until::LookedAt {
+        if self.until == Goal::LookedAt {
             self.warn_once(format!(
                 "{text}; nothing is imported, asked again or deleted; look again later"
             ));

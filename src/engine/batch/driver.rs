@@ -50,7 +50,7 @@ pub(super) enum Step {
 
 /// Goal of a driver: how far it advances the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Until {
+pub(super) enum Goal {
     /// All replies are in the records.
     TakenOver,
     /// The batches are created, as far as the server accepts them.
@@ -82,7 +82,7 @@ pub(super) struct Driver<'a, D> {
     /// Cost limits; `None` if nothing is submitted.
     pub(super) money: Option<&'a MoneySettings>,
     pub(super) progress: &'a Progress,
-    pub(super) until: Until,
+    pub(super) until: Goal,
     /// Trials that the server refused and would refuse again.
     pub(super) refused: &'a mut BTreeSet<TrialKey>,
     /// Models whose parts are left as they are.
@@ -181,7 +181,7 @@ impl<D: Detail> Driver<'_, D> {
         }
         match &self.part(part).stage {
             Stage::Written | Stage::Uploading | Stage::Uploaded
-                if self.until == Until::Cancelled =>
+                if self.until == Goal::Cancelled =>
             {
                 self.withdraw(part).await
             }
@@ -189,7 +189,7 @@ impl<D: Detail> Driver<'_, D> {
             Stage::Uploading => self.find_file(part).await,
             Stage::Uploaded => self.create(part).await,
             Stage::Creating => self.find_batch(part).await,
-            Stage::Created => self.look_at(part).await,
+            Stage::Created => self.check_batch(part).await,
             Stage::Fetched { .. } => self.take_over(part),
             Stage::TakenOver => self.delete_files(part).await,
             Stage::Ended => Ok(Step::Waiting),
@@ -207,9 +207,9 @@ impl<D: Detail> Driver<'_, D> {
             return Ok(true);
         }
         Ok(match self.until {
-            Until::TakenOver | Until::Cancelled => false,
-            Until::LookedAt => true,
-            Until::Submitted => {
+            Goal::TakenOver | Goal::Cancelled => false,
+            Goal::LookedAt => true,
+            Goal::Submitted => {
                 let mut nothing_to_submit = true;
                 for (index, part) in self.journal.parts.iter().enumerate() {
                     let is_submitted = part.stage == Stage::Created || is_final(index);
@@ -222,7 +222,7 @@ impl<D: Detail> Driver<'_, D> {
 
     /// True if the command only checks or cancels batches, and no flag names the server of this part.
     fn is_left_alone(&self, part: usize) -> bool {
-        let submits_nothing = matches!(self.until, Until::LookedAt | Until::Cancelled);
+        let submits_nothing = matches!(self.until, Goal::LookedAt | Goal::Cancelled);
         let part = self.part(part);
         submits_nothing && part.stage != Stage::Ended && !self.servers.has(&part.facts.base)
     }
@@ -273,14 +273,14 @@ impl<D: Detail> Driver<'_, D> {
     /// Handles a failed check of a part: it is repeated later, and counted if the failure is permanent.
     ///
     /// # Errors
-    /// If the last [`MAX_REFUSED_CHECKS`] checks of the part failed permanently, or one did under [`Until::LookedAt`]: the key or the
+    /// If the last [`MAX_REFUSED_CHECKS`] checks of the part failed permanently, or one did under [`Goal::LookedAt`]: the key or the
     /// address is wrong.
     pub(super) fn look_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
         tracing::debug!("{}: {failure}", self.part(part).name);
         if failure.is_permanent() {
             let refused = self.notes.refused_looks.entry(part).or_default();
             *refused += 1;
-            if *refused >= MAX_REFUSED_CHECKS || self.until == Until::LookedAt {
+            if *refused >= MAX_REFUSED_CHECKS || self.until == Goal::LookedAt {
                 return Err(self.fatal(part, failure));
             }
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use tokio::runtime;
 
-use super::driver::{Driver, Notes, Until};
+use super::driver::{Driver, Goal, Notes};
 use super::journal::Journal;
 use super::part::Stage;
 use super::recover::recover;
@@ -149,8 +149,8 @@ impl<'a> FolderBatches<'a> {
             money: None,
             progress,
             until: match task {
-                FolderTask::Fetch => Until::LookedAt,
-                FolderTask::Cancel => Until::Cancelled,
+                FolderTask::Fetch => Goal::LookedAt,
+                FolderTask::Cancel => Goal::Cancelled,
             },
             refused: &mut BTreeSet::new(),
             stopped: &mut stopped,

@@ -1,6 +1,6 @@
 //! Runs through the files of a Batch API, which takes a day and costs half.
 //!
-//! The remaining requests are written as input files into `RUN/batch/`, with the records of their trials, still without an outcome. Until
+//! The remaining requests are written as input files into `RUN/batch/`, with the records of their trials, still without an outcome. Goal
 //! their replies are there, the run does not ask those trials. Either the user uploads the files to the API and imports its output; or
 //! the program does ([`run`]): each file is a [`part`] then, a [`driver`] moves the parts on, and a [`journal`] holds how far they are.
 

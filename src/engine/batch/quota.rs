@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use super::driver::{Driver, Step, Until};
+use super::driver::{Driver, Goal, Step};
 use super::event::{Event, PartFacts};
 use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
@@ -29,7 +29,7 @@ impl<D: Detail> Driver<'_, D> {
         if !of.is_unsubmitted() {
             return Ok(false);
         }
-        if matches!(self.until, Until::LookedAt | Until::Cancelled) {
+        if matches!(self.until, Goal::LookedAt | Goal::Cancelled) {
             return Ok(true);
         }
         let place = of.facts.place();
@@ -63,7 +63,7 @@ impl<D: Detail> Driver<'_, D> {
     /// Into how many pieces a part must be divided, because it is larger than what may wait or than what `--max-cost` allows, or was
     /// refused several times although nothing of this run waits; `None` if it may stay.
     pub(super) fn too_large(&self, part: usize) -> Result<Option<usize>> {
-        if matches!(self.until, Until::LookedAt | Until::Cancelled) {
+        if matches!(self.until, Goal::LookedAt | Goal::Cancelled) {
             return Ok(None);
         }
         let of = self.part(part);

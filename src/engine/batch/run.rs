@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use tokio::runtime;
 
 use super::BatchFileArgs;
-use super::driver::{Driven, Driver, Notes, Until};
+use super::driver::{Driven, Driver, Goal, Notes};
 use super::export;
 use super::file::RequestCost;
 use super::journal::Journal;
@@ -313,9 +313,9 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             money: Some(&experiment.settings().money),
             progress: self.run.progress,
             until: if self.args.detach {
-                Until::Submitted
+                Goal::Submitted
             } else {
-                Until::TakenOver
+                Goal::TakenOver
             },
             refused: &mut self.refused,
             stopped: &mut self.stopped,

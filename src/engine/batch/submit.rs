@@ -1,6 +1,6 @@
 //! The steps of a part until its batch is made: upload, creation, and the search for what a killed process may have made.
 
-use super::driver::{Driver, Step, Until};
+use super::driver::{Driver, Goal, Step};
 use super::event::Event;
 use crate::ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
 use crate::ask::{AskError, BatchInterface};
@@ -133,7 +133,7 @@ impl<D: Detail> Driver<'_, D> {
         let listed = self.server(part)?.batches().await;
         let batches = match listed {
             Ok(batches) => batches,
-            Err(failure) if failure.is_unsupported() && self.until == Until::Cancelled => {
+            Err(failure) if failure.is_unsupported() && self.until == Goal::Cancelled => {
                 return self.withdraw(part).await;
             }
             Err(failure) if failure.is_unsupported() => return Err(self.unknown(part)),

@@ -131,7 +131,7 @@ impl Budget {
         let unstated = stored.iter().filter_map(|record| {
             let price = answering.price(money, &record.model)?;
             let unstated = record.lost()?.unstated;
-            let dollars = share(money, record.via) * price.most(bound(unstated));
+            let dollars = share(money, record.via) * price.max_cost(bound(unstated));
             Some((unstated.requests, dollars))
         });
         Ok(Self {
@@ -277,7 +277,7 @@ fn charged(price: Price, record: &StoredTrial) -> f64 {
     let others = record.lost();
     reply
         + others.map_or(0.0, |lost| {
-            price.charged(lost.usage) + price.most(bound(lost.unstated))
+            price.charged(lost.usage) + price.max_cost(bound(lost.unstated))
         })
 }
 

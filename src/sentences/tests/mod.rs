@@ -1,13 +1,13 @@
 //! Golden sentences of each kind and verdict, and the check that each number in a sentence is one of its values.
 
+mod below_blind;
 mod confidence;
 mod hallucination;
 mod made;
 mod simulation;
-mod words_alone;
 
 use super::sentence::{Sentence, level_runs};
-use super::{darkness, pooled, sample, words_alone as below};
+use super::{below_blind as below, darkness, pooled, sample};
 use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, EnhancerName, Severity, Variant};
 use darkqa_score::cluster::ClusterUnit;
@@ -358,7 +358,7 @@ fn no_sentence_says_more_than_its_test() {
         include_str!("../models.rs"),
         include_str!("../answers.rs"),
         include_str!("../hallucination.rs"),
-        include_str!("../words_alone.rs"),
+        include_str!("../below_blind.rs"),
     ];
     for text in source {
         for word in [

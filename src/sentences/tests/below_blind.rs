@@ -1,7 +1,7 @@
 //! Golden sentences about models that are less often right than without images.
 
 use super::{checked, finding};
-use crate::sentences::words_alone;
+use crate::sentences::below_blind;
 use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Family, Severity, Variant};
 use darkqa_score::cluster::ClusterUnit;
@@ -76,7 +76,7 @@ fn a_family_below_the_words_alone_is_said_once() {
     ];
     let say = |all: &[Comparison], pooled: &[&PooledFinding]| {
         let all: Vec<&Comparison> = all.iter().collect();
-        let said = words_alone::in_a_family(&all, pooled, ClusterUnit::Scene);
+        let said = below_blind::in_a_family(&all, pooled, ClusterUnit::Scene);
         said.as_ref().map(checked)
     };
     assert_eq!(
@@ -119,7 +119,7 @@ fn below_whose_words_is_said() {
         let mut finding = finding(PooledKind::Blind, 5, -0.2, Worse);
         let [models, blind] = [models, blind].map(|names| names.iter().map(|&n| n.to_owned()));
         (finding.models, finding.blind_models) = (models.collect(), blind.collect());
-        let said = words_alone::pooled(&[&finding], ClusterUnit::Scene);
+        let said = below_blind::pooled(&[&finding], ClusterUnit::Scene);
         said.unwrap().text
     };
     let rows: [(&[&str], &[&str], &str); 4] = [
