@@ -41,7 +41,7 @@
 //! # Ok::<(), darkqa_eval::Error>(())
 //! ```
 //!
-//! Read a reply and score it. The strict reading takes the exact words of a choice alone, the lenient one finds them in a sentence:
+//! Read a reply and score it. The strict parsing takes the exact words of a choice alone, the lenient one finds them in a sentence:
 //!
 //! ```
 //! use darkqa_eval::score::choice::readings;

@@ -6,7 +6,7 @@ use crate::types::{ChoiceDetail, Record};
 use darkqa_score::answers::record::reread;
 use darkqa_score::choice::LENIENT_VERSION;
 
-/// How the lenient reading of stored replies changes.
+/// How the lenient parsing of stored replies changes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct LenientChange {
     /// The version by which the replies were read.

@@ -86,7 +86,7 @@ fn axis_table(
         format!("Accuracy in %{of}{what}")
     });
     table.latex = Some(format!(
-        "Accuracy in \\%{of} (strict reading) with 95\\,\\% intervals by {}; {} items.",
+        "Accuracy in \\%{of} (strict parsing) with 95\\,\\% intervals by {}; {} items.",
         findings.unit,
         findings.grid.items.len()
     ));

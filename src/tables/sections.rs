@@ -120,7 +120,7 @@ pub(crate) const SECTIONS: [Section; 15] = [
     (
         "health",
         "Parse health",
-        "What became of the trials besides right and wrong, by the strict reading. Replies that cannot be read count as wrong; \
+        "What became of the trials besides right and wrong, by the strict parsing. Replies that cannot be read count as wrong; \
          failed trials do not count.",
         &[],
     ),

@@ -35,7 +35,7 @@ pub(crate) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
             .to_owned(),
     );
     all.latex = Some(format!(
-        "Groups of which all questions are right, in \\% of the complete groups (strict reading), with 95\\,\\% intervals; {}.",
+        "Groups of which all questions are right, in \\% of the complete groups (strict parsing), with 95\\,\\% intervals; {}.",
         counted(score.groups, "group")
     ));
     all.foot = foot(score);

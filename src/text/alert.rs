@@ -41,7 +41,7 @@ pub enum AlertKind {
     Unread,
     /// Answers of people that are no choice of their question.
     NoChoice,
-    /// Replies that the lenient reading of this version reads differently.
+    /// Replies that the lenient parsing of this version reads differently.
     Reading,
     /// Fewer clusters than an interval needs.
     Clusters,

@@ -29,7 +29,7 @@ impl NoiseProfiles {
             return None;
         };
         Some(format!(
-            "One reading of the paper was run ({only}). Whether the findings hold under another is not known: --profile all \
+            "One noise profile was run ({only}). Whether the findings hold under another is not known: --profile all \
              --resume DIR, with the flags of the run, asks the missing trials."
         ))
     }
@@ -55,7 +55,7 @@ mod tests {
         };
         let one = of(&["L0", "L3-ev", "L3-noise@eld", "L5-noise@eld+lift"]);
         let said = one.open_question().unwrap();
-        assert!(said.starts_with("One reading of the paper was run (eld). "));
+        assert!(said.starts_with("One noise profile was run (eld). "));
         for conditions in [&["L0", "L3-ev"][..], &["L3-noise", "L3-noise@physical"]] {
             assert_eq!(of(conditions).open_question(), None, "{conditions:?}");
         }

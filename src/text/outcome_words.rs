@@ -2,7 +2,7 @@
 
 use crate::types::{FailureKind, Record, TrialOutcome, UnreadReason};
 
-/// The outcome of a trial of a question with choices, by the strict reading: `✓ right`, `not read (cut at the token limit)`.
+/// The outcome of a trial of a question with choices, by the strict parsing: `✓ right`, `not read (cut at the token limit)`.
 pub(crate) fn outcome(record: &Record) -> String {
     match record.detail.outcome {
         TrialOutcome::Right => "✓ right".to_owned(),
@@ -20,7 +20,7 @@ pub(crate) fn outcome(record: &Record) -> String {
     }
 }
 
-/// Why the strict reading found no choice in a reply.
+/// Why the strict parsing found no choice in a reply.
 pub(crate) fn unread(why: UnreadReason) -> &'static str {
     match why {
         UnreadReason::Empty => "the reply is empty",

@@ -135,7 +135,7 @@ pub enum TableCell {
     Below(Estimate),
     /// Expected accuracy of guessing.
     Guess(Estimate),
-    /// Accuracy in the strict reading, and its value in the lenient reading.
+    /// Accuracy in the strict parsing, and its value in the lenient parsing.
     Strict(Estimate, f64),
     /// A score, and its difference from the score on the clean frames, if that is known.
     Changed(Estimate, Option<f64>),

@@ -2,7 +2,7 @@
 //!
 //! Two readings are always reported together. [`ReadingMode::Strict`] accepts a reply that is an answer and nothing else.
 //! [`ReadingMode::Lenient`] also finds an answer inside a reply; if two choices are possible, it accepts neither. No choice
-//! is ever guessed. If the strict reading finds a choice, the lenient reading finds the same.
+//! is ever guessed. If the strict parsing finds a choice, the lenient parsing finds the same.
 //!
 //! A reply passes through `clean` (which removes hidden reasoning, invisible characters and leaked tokens), then `strict`,
 //! then the steps of `lenient`, in the order of its functions `steps` and `read_plain`.
@@ -36,8 +36,8 @@ use darkqa_ground::types::replies::{Finish, Reply};
 use rules::{lenient, strict};
 use text::clean;
 
-/// The version of the lenient reading, raised whenever any reply may read differently. Records of another version are read again by
-/// `report --rescore`. The strict reading changed with `lenient/4` alone: marks of reasoning, and full-width signs around letters.
+/// The version of the lenient parsing, raised whenever any reply may read differently. Records of another version are read again by
+/// `report --rescore`. The strict parsing changed with `lenient/4` alone: marks of reasoning, and full-width signs around letters.
 pub const LENIENT_VERSION: &str = "lenient/4";
 
 /// How much text a reply may have around the answer.
@@ -98,7 +98,7 @@ pub fn read(reply: &str, choices: &Choices, mode: ReadingMode) -> Answer {
     }
 }
 
-/// The strict and the lenient reading of a reply, in this order, considering how the reply ended.
+/// The strict and the lenient parsing of a reply, in this order, considering how the reply ended.
 ///
 /// The exact words of a choice count in any case. Otherwise a separate refusal, a content filter and the token limit
 /// decide, in this order. A truncated explanation is not read leniently, because it could still have ended in another

@@ -77,7 +77,7 @@ impl Overview<'_> {
             self.light(&variant, None)
         );
         let (caption, mut chart) = self.chart("share of replies in %", panels, 2, &caption)?;
-        "shares of all replies, strict reading; what the answers are is in collapse.csv"
+        "shares of all replies, strict parsing; what the answers are is in collapse.csv"
             .clone_into(&mut chart.note);
         Some((caption, chart))
     }

@@ -52,7 +52,7 @@ impl Overview<'_> {
                        accuracy of the same replies, by level.";
         let (caption, mut chart) = self.chart("%", panels, 2, caption)?;
         chart.note = format!(
-            "bands and bars are 95 % intervals by {}; strict reading",
+            "bands and bars are 95 % intervals by {}; strict parsing",
             self.findings.unit
         );
         Some((caption, chart))

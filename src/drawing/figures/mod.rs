@@ -176,7 +176,7 @@ impl<'a> Overview<'a> {
             .any(|subject| subject.level == Some(AxisLevel::L0) && subject.enhancer.is_some())
     }
 
-    /// Accuracy of a subject on a family, in the strict reading.
+    /// Accuracy of a subject on a family, in the strict parsing.
     fn accuracy_of(&self, subject: &ModelInCondition, family: Option<&Family>) -> Option<Estimate> {
         let cell = self
             .findings
@@ -313,7 +313,7 @@ impl<'a> Overview<'a> {
     /// Note on the number of items and on the intervals.
     fn note(&self) -> String {
         format!(
-            "n = {}; bands and bars are 95 % intervals by {}; strict reading",
+            "n = {}; bands and bars are 95 % intervals by {}; strict parsing",
             self.items(),
             self.findings.unit
         )
@@ -419,7 +419,7 @@ impl<'a> Overview<'a> {
         let (caption, mut chart) = self.chart(ACCURACY, panels, 1, caption)?;
         if models.len() > 1 {
             chart.note = format!(
-                "bands are the range of the {} models, not intervals; strict reading",
+                "bands are the range of the {} models, not intervals; strict parsing",
                 models.len()
             );
         }

@@ -68,7 +68,7 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
         variant,
         enhancer,
         // The caption of each panel states what its bands are.
-        note: format!("n = {}; strict reading{training}", overview.items()),
+        note: format!("n = {}; strict parsing{training}", overview.items()),
     }
 }
 

@@ -58,7 +58,7 @@ impl Overview<'_> {
         let chart = BarChart {
             panels: panels.filter(|panel| !panel.bars.is_empty()).collect(),
             note: format!(
-                "lines are 95 % intervals by {}; strict reading",
+                "lines are 95 % intervals by {}; strict parsing",
                 findings.unit
             ),
         };

@@ -83,7 +83,7 @@ impl Overview<'_> {
     fn basis(&self) -> String {
         let (grid, unit) = (&self.findings.grid, self.findings.unit);
         format!(
-            "Strict reading; below each number its 95 % interval by {unit}; {} items in {} {unit}s.",
+            "Strict parsing; below each number its 95 % interval by {unit}; {} items in {} {unit}s.",
             grid.items.len(),
             grid.clusters
         )

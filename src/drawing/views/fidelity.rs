@@ -61,7 +61,7 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
         panels,
         columns: 3,
         note: format!(
-            "{models}; the band of an AUC is its 95 % interval by {}; strict reading",
+            "{models}; the band of an AUC is its 95 % interval by {}; strict parsing",
             findings.unit
         ),
     };

@@ -73,7 +73,7 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
     let chart = BarChart {
         panels,
         note: format!(
-            "lines are 95 % intervals by {}; strict reading",
+            "lines are 95 % intervals by {}; strict parsing",
             findings.unit
         ),
     };

@@ -62,7 +62,7 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
     let chart = ReliabilityChart {
         panels,
         note: format!(
-            "bins of about as many replies each, ten at most; bars are 95 % intervals by {}; strict reading{dark}",
+            "bins of about as many replies each, ten at most; bars are 95 % intervals by {}; strict parsing{dark}",
             findings.unit
         ),
     };

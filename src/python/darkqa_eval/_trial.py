@@ -116,7 +116,7 @@ def add_question(record: Record, question: Record) -> None:
 
 
 def add_readings(record: Record) -> None:
-    """Add the choices as texts, and what the strict and the lenient reading found in the reply."""
+    """Add the choices as texts, and what the strict and the lenient parsing found in the reply."""
     choices, truth = record["choices"], record["truth"]
     record.setdefault("repeat", 0)
     record.setdefault("shown_frame", None)

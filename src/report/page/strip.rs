@@ -241,7 +241,7 @@ impl Seen<'_> {
         Some(self.grid.result(self.grid.stand_in(&subject)?, self.item))
     }
 
-    /// Whether the strict reading of the reply is right, that at L0 without an enhancer; `None` without a reply or a true choice.
+    /// Whether the strict parsing of the reply is right, that at L0 without an enhancer; `None` without a reply or a true choice.
     fn is_right(self) -> Option<bool> {
         let enhancer = self.row.enhancer.filter(|_| self.level != AxisLevel::L0);
         let reading = self.result(enhancer)?.reading(ReadingMode::Strict)?;

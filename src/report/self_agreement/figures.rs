@@ -20,7 +20,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
         return Ok(Vec::new());
     }
     let note = format!(
-        "n = {} items in {} {unit}s; bands and bars are 95 % intervals by {unit}; strict reading",
+        "n = {} items in {} {unit}s; bands and bars are 95 % intervals by {unit}; strict parsing",
         found.items(),
         found.grid.clusters,
         unit = found.unit

@@ -212,7 +212,7 @@ fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, Agreeme
         "Agreement with its own answer at L0 by {by}, in % (κ and entropy from 0 to 1); {first}; 95 %: how far the widest interval of the row reaches down and up"
     ));
     table.latex = Some(format!(
-        "Agreement of each model with its own answer at L0 by {by} (strict reading), not with the truth; intervals by {}.",
+        "Agreement of each model with its own answer at L0 by {by} (strict parsing), not with the truth; intervals by {}.",
         found.unit
     ));
     table

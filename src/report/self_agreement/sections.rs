@@ -55,7 +55,7 @@ pub(super) const SECTIONS: [Section; 8] = [
     (
         "health",
         "Parse health",
-        "What became of the trials, by the strict reading. A reply that cannot be read does not agree; failed trials do not count.",
+        "What became of the trials, by the strict parsing. A reply that cannot be read does not agree; failed trials do not count.",
         &[],
     ),
 ];

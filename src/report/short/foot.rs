@@ -67,7 +67,7 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
         } else {
             "replies are"
         };
-        let line = format!("{lenient} more {replies} read by the lenient reading alone: --full");
+        let line = format!("{lenient} more {replies} read by the lenient parsing alone: --full");
         text += &wrapped(" ", &line, " ");
     }
     if !parts.is_empty() {

@@ -1,11 +1,11 @@
-//! Replies that were read by another version of the lenient reading: [`reading_alerts`].
+//! Replies that were read by another version of the lenient parsing: [`reading_alerts`].
 
 use crate::run_reports::combine::Combined;
 use crate::run_reports::rereading::LenientChange;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::TrialRef;
 
-/// How the lenient reading of each run would change by the rules of this version.
+/// How the lenient parsing of each run would change by the rules of this version.
 pub(super) fn reading_alerts(combined: &Combined) -> Vec<Alert> {
     combined
         .runs

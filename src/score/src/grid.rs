@@ -24,9 +24,9 @@ pub enum TrialResult {
     Failed,
     /// The model replied. Each reading is the index of the choice read from the reply, or `None` if it is unreadable.
     Read {
-        /// Choice in the strict reading.
+        /// Choice in the strict parsing.
         strict: Option<u8>,
-        /// Choice in the lenient reading.
+        /// Choice in the lenient parsing.
         lenient: Option<u8>,
     },
 }
@@ -215,7 +215,7 @@ impl<'a> Grid<'a> {
         self.trials.get(place as usize)
     }
 
-    /// True if the strict and the lenient reading of any reply of a subject differ.
+    /// True if the strict and the lenient parsing of any reply of a subject differ.
     #[must_use]
     pub fn parsings_differ(&self, subject: usize) -> bool {
         self.row(subject).iter().any(

@@ -136,7 +136,7 @@ fn one_light_reading_is_named_with_what_it_leaves_open() {
         } else {
             "paper"
         };
-        let said = format!("One reading of the paper was run ({reading}).");
+        let said = format!("One noise profile was run ({reading}).");
         let levels = if more.ends_with("single") {
             "--levels L0,L3"
         } else {

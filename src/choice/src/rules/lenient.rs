@@ -3,7 +3,7 @@
 //! 1. A letter with the text of another choice is a contradiction, wherever it stands.
 //! 2. JSON with an answer key, `\boxed{}`, `<answer>`.
 //! 3. Ticks and task lists.
-//! 4. The strict reading of the text without markup.
+//! 4. The strict parsing of the text without markup.
 //! 5. The last stated answer: "the answer is B", "which leaves B".
 //! 6. The first line alone, if it reads strictly; a leading "yes" or "no".
 //! 7. The letters that are left, then the texts that are left.
@@ -24,7 +24,7 @@ use crate::text::{clean, declines, fold, plain};
 use crate::view::ReplyView;
 use darkqa_ground::types::questions::{Answer, Choices, UnreadReason};
 
-/// The lenient reading of a reply without its reasoning.
+/// The lenient parsing of a reply without its reasoning.
 pub(crate) fn read(text: &str, choices: &Choices) -> Answer {
     let choices = ChoiceViews::new(choices);
     let tidy = clean::tidy(text);

@@ -1,4 +1,4 @@
-//! Rules of reading: the strict reading, and the steps of the lenient one.
+//! Rules of reading: the strict parsing, and the steps of the lenient one.
 
 mod contradiction;
 mod first_line;

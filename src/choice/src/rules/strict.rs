@@ -1,4 +1,4 @@
-//! The strict reading: a choice's text, its letter, or its letter with its text.
+//! The strict parsing: a choice's text, its letter, or its letter with its text.
 
 use crate::names::index_of;
 use darkqa_ground::types::questions::{Answer, UnreadReason};

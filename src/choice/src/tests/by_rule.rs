@@ -1,4 +1,4 @@
-//! The rules of the lenient reading, each on replies that it must not read and on replies that it must.
+//! The rules of the lenient parsing, each on replies that it must not read and on replies that it must.
 
 use std::collections::BTreeMap;
 
@@ -69,7 +69,7 @@ fn each_rule_reads_what_a_person_reads_and_nothing_else() {
     }
 }
 
-/// A reply whose strict reading is a choice has that choice in the lenient reading as well, whatever the rules.
+/// A reply whose strict parsing is a choice has that choice in the lenient parsing as well, whatever the rules.
 #[test]
 fn the_strict_reading_is_not_changed_by_any_rule() {
     for (reply, set, index) in [

@@ -1,4 +1,4 @@
-//! Properties of the lenient reading that hold for any reply.
+//! Properties of the lenient parsing that hold for any reply.
 
 use std::time::{Duration, Instant};
 

@@ -47,7 +47,7 @@ impl AccuracyCell {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AccuracySummary {
     pub cells: Vec<AccuracyCell>,
-    /// Number of replies that the strict reading could not read, by reason.
+    /// Number of replies that the strict parsing could not read, by reason.
     pub unread: BTreeMap<UnreadReason, usize>,
     /// Chance with each question once, if several orders of its choices are asked and this changes chance.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -107,7 +107,7 @@ pub(crate) fn summarize(
     }
 }
 
-/// Counts of unreadable replies by reason, in the strict reading.
+/// Counts of unreadable replies by reason, in the strict parsing.
 fn unread(health: &[Health]) -> BTreeMap<UnreadReason, usize> {
     let mut unread = BTreeMap::new();
     for (reason, count) in health.iter().flat_map(|health| &health.unread) {

@@ -13,11 +13,11 @@ pub struct Health {
     pub subject: ModelInCondition,
     /// Number of trials with a reply.
     pub replies: usize,
-    /// Number of replies in which the strict reading found a choice.
+    /// Number of replies in which the strict parsing found a choice.
     pub read: usize,
-    /// Number of replies in which only the lenient reading found a choice.
+    /// Number of replies in which only the lenient parsing found a choice.
     pub lenient_only: usize,
-    /// Number of replies in which the strict reading found no choice, by reason.
+    /// Number of replies in which the strict parsing found no choice, by reason.
     pub unread: BTreeMap<UnreadReason, usize>,
     /// Number of trials without a reply, by kind of failure.
     pub failed: BTreeMap<FailureKind, usize>,

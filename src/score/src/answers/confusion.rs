@@ -13,7 +13,7 @@ use darkqa_ground::types::{AxisLevel, Family};
 /// Maximum number of different answers of a family that gets a confusion table.
 const MAX_LABELS: usize = 26;
 
-/// Confusion table of one subject on one family, in the strict reading.
+/// Confusion table of one subject on one family, in the strict parsing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Confusion {
     pub subject: ModelInCondition,

@@ -29,7 +29,7 @@ pub struct LitReply {
     pub choices: usize,
     /// Index of the true choice.
     pub truth: usize,
-    /// Index of the choice in the lenient reading.
+    /// Index of the choice in the lenient parsing.
     pub chosen: usize,
 }
 

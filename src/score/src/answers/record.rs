@@ -21,7 +21,7 @@ pub trait Detail: StoredDetail {
     /// If the choices of the detail are not valid.
     fn read(&mut self, reply: &Reply) -> Result<()>;
 
-    /// Index of the choice in the lenient reading; `None` if none was read.
+    /// Index of the choice in the lenient parsing; `None` if none was read.
     fn chosen(&self) -> Option<usize>;
 
     /// Parses the line of a record. Each kind has its own function, so that this crate compiles it, for speed, and not the caller.
@@ -34,7 +34,7 @@ pub trait Detail: StoredDetail {
 impl Detail for ChoiceDetail {
     const REPLY_READING: Option<&'static str> = Some(LENIENT_VERSION);
 
-    /// Stores both readings of a reply, and the outcome, which follows from the strict reading.
+    /// Stores both readings of a reply, and the outcome, which follows from the strict parsing.
     fn read(&mut self, reply: &Reply) -> Result<()> {
         let why = self.strict.and_then(|strict| strict.why);
         if why == Some(UnreadReason::CannotTell) && reply.text.is_empty() {

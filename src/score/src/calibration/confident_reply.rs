@@ -17,7 +17,7 @@ pub(super) struct ConfidentReply {
     pub(super) cluster: u32,
     /// The greatest probability of a choice.
     pub(super) confidence: f64,
-    /// Whether the strict reading is the true choice.
+    /// Whether the strict parsing is the true choice.
     pub(super) right: bool,
     /// Brier score: the sum over the choices of (p − truth)².
     pub(super) brier: f64,

@@ -1,7 +1,7 @@
 //! How far the confidence of models goes with their accuracy: [`calibrations`].
 //!
 //! The confidence of a reply is the greatest probability of a choice. Only replies with such probabilities are in these figures, and
-//! of these only those without reasoning before the answer; the others are counted. Right is by the strict reading.
+//! of these only those without reasoning before the answer; the others are counted. Right is by the strict parsing.
 
 mod blind_shift;
 mod confident_reply;

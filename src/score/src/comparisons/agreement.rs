@@ -7,7 +7,7 @@ use crate::grid::Grid;
 use crate::subject::ModelInCondition;
 use darkqa_statistics::quantiles::{degrees_of_freedom, student};
 
-/// Agreement of two models in one condition, in the strict reading.
+/// Agreement of two models in one condition, in the strict parsing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Agreement {
     pub first: ModelInCondition,

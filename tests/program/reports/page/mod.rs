@@ -313,7 +313,7 @@ fn deep_link(browser: &mut Browser, url: &str) {
     let title = browser.evaluate("document.querySelector('#r-title').textContent");
     assert_eq!(title, format!("Reply of {SAID} at L5-noise"));
     let reading = browser.evaluate("document.querySelector('#r-reading').textContent");
-    assert_eq!(reading, "strict reading: A · lenient: A");
+    assert_eq!(reading, "strict parsing: A · lenient: A");
     let mark = browser.evaluate("document.querySelector('#r-mark').textContent");
     assert_eq!(mark, "✗ A, wrong");
     // A link to nowhere shows the page all the same.

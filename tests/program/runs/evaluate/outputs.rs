@@ -18,7 +18,7 @@ fn a_record_and_a_row_keep_the_contract() {
     ));
     assert!(
         table.contains("(66.7)"),
-        "the lenient reading differs: {table}"
+        "the lenient parsing differs: {table}"
     );
     let records = records(&bench.path("run"));
     let record = records
@@ -79,7 +79,7 @@ fn a_record_and_a_row_keep_the_contract() {
         "model,view,level,variant,enhancer,family,mode,n,right,unparsed,failed,value,low,high,reading"
     );
     let all: Vec<&str> = lines.filter(|line| line.contains(",all,")).collect();
-    // a1 is right both times; a2 and b1 say **A**, which is not strict: b1's A is right in the lenient reading.
+    // a1 is right both times; a2 and b1 say **A**, which is not strict: b1's A is right in the lenient parsing.
     assert!(
         all.iter()
             .any(|line| line.contains(",L0,none,,all,strict,3,1,2,0,0.333")),

@@ -186,7 +186,7 @@ pub struct RunPart {
     pub trials: Vec<usize>,
 }
 
-/// The version of the lenient reading in runs whose manifest names none.
+/// The version of the lenient parsing in runs whose manifest names none.
 pub const FIRST_REPLY_READING: &str = "lenient/1";
 
 /// The settings that all trials of a run share and no column tells apart, by flag.
@@ -236,7 +236,7 @@ pub struct RunManifest {
     /// The flags that decide the images, as the user wrote them; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub images: BTreeMap<String, Value>,
-    /// The version of the rules by which the lenient reading in the records was made, as `lenient/4`; `None` in runs of open questions,
+    /// The version of the rules by which the lenient parsing in the records was made, as `lenient/4`; `None` in runs of open questions,
     /// and in runs of earlier versions, which read by `lenient/1`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reply_reading: Option<String>,

@@ -91,9 +91,9 @@ details! {
         /// How many times the same question was asked before; not in the file if 0.
         #[serde(default, skip_serializing_if = "is_first")]
         repeat: u32,
-        /// The strict reading of the reply; `None` if no reply came.
+        /// The strict parsing of the reply; `None` if no reply came.
         strict: Option<AnswerReading>,
-        /// The lenient reading of the reply; `None` if no reply came.
+        /// The lenient parsing of the reply; `None` if no reply came.
         lenient: Option<AnswerReading>,
         /// How the trial ended.
         outcome: TrialOutcome,
@@ -192,7 +192,7 @@ pub struct WalkFacts {
     pub exposure: Option<ExposureFacts>,
 }
 
-/// The result of a trial in the strict reading.
+/// The result of a trial in the strict parsing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TrialOutcome {
@@ -208,7 +208,7 @@ pub enum TrialOutcome {
     Failed,
 }
 
-/// The answer that the strict or the lenient reading finds in a reply.
+/// The answer that the strict or the lenient parsing finds in a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AnswerReading {
     /// The index of the choice; `None` if none was read.

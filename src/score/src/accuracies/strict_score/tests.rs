@@ -53,7 +53,7 @@ fn score(records: &[Record], questions: &[RunQuestion]) -> StrictScore {
     with_grid(records, |grid| StrictScore::new(grid, questions)).unwrap()
 }
 
-/// The cell of all groups of a condition, in the strict reading.
+/// The cell of all groups of a condition, in the strict parsing.
 fn strict<'s>(score: &'s StrictScore, condition: &str) -> &'s GroupCell {
     score
         .cells

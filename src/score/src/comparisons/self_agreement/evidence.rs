@@ -141,7 +141,7 @@ pub struct EvidenceCurve {
     pub threshold: Result<Threshold, NoHalf>,
 }
 
-/// The curves of a model, over all families, in the strict reading. The agreement falls from the ceiling at L0, and half of the evidence
+/// The curves of a model, over all families, in the strict parsing. The agreement falls from the ceiling at L0, and half of the evidence
 /// is lost half-way between ceiling and floor: the crossing of other reports, with the floor in the place of chance.
 pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
     let mode = ReadingMode::Strict;

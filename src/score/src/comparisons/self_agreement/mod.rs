@@ -55,9 +55,9 @@ pub struct SelfAgreement<'a> {
     pub light: Vec<LightReplies>,
     /// The agreement of each subject with its model's answers in the light. The cell of L0 is that of the questions asked again.
     pub cells: Vec<AgreementCell>,
-    /// Every question of the bank, for each model, in the strict reading.
+    /// Every question of the bank, for each model, in the strict parsing.
     pub questions: Vec<QuestionInLight>,
-    /// Paired differences between the conditions of one model, in the strict reading: which of them agrees with L0.
+    /// Paired differences between the conditions of one model, in the strict parsing: which of them agrees with L0.
     pub comparisons: Vec<Comparison>,
     /// The exposure drop at which half of the evidence is lost.
     pub curves: Vec<EvidenceCurve>,
@@ -161,13 +161,13 @@ impl<'a> SelfAgreement<'a> {
             .count()
     }
 
-    /// Counts of a model's replies in the light, in the strict reading.
+    /// Counts of a model's replies in the light, in the strict parsing.
     pub fn light_of(&self, model: &str) -> Option<&LightReplies> {
         let mut light = self.light.iter();
         light.find(|light| light.model == model && light.mode == ReadingMode::Strict)
     }
 
-    /// The cells of all families together in the strict reading.
+    /// The cells of all families together in the strict parsing.
     pub fn whole(&self) -> impl Iterator<Item = &AgreementCell> + Clone {
         self.cells
             .iter()

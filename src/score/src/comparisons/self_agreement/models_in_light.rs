@@ -10,7 +10,7 @@ use crate::estimate::Estimate;
 use crate::grid::Grid;
 use darkqa_ground::types::{ChoiceDetail, Trials};
 
-/// Agreement of two models at L0, in the strict reading, on the items that both answered readably. Each model has its own reference, so
+/// Agreement of two models at L0, in the strict parsing, on the items that both answered readably. Each model has its own reference, so
 /// that their agreements with themselves in the dark compare only as far as they agree here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelsInLight {

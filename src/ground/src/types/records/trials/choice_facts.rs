@@ -145,12 +145,12 @@ impl ChoiceTables {
 }
 
 impl ChoiceFacts {
-    /// The strict reading of the reply; `None` if no reply came.
+    /// The strict parsing of the reply; `None` if no reply came.
     pub(super) fn strict(self) -> Option<AnswerReading> {
         self.strict.map(AnswerReading::from)
     }
 
-    /// The lenient reading of the reply; `None` if no reply came.
+    /// The lenient parsing of the reply; `None` if no reply came.
     pub(super) fn lenient(self) -> Option<AnswerReading> {
         self.lenient.map(AnswerReading::from)
     }

@@ -250,13 +250,13 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
         self.item().truth
     }
 
-    /// The strict reading of the reply; `None` if no reply came.
+    /// The strict parsing of the reply; `None` if no reply came.
     #[must_use]
     pub fn strict(self) -> Option<AnswerReading> {
         self.facts().facts.strict()
     }
 
-    /// The lenient reading of the reply; `None` if no reply came.
+    /// The lenient parsing of the reply; `None` if no reply came.
     #[must_use]
     pub fn lenient(self) -> Option<AnswerReading> {
         self.facts().facts.lenient()
