@@ -56,12 +56,13 @@ struct FfmpegLog {
     damages: usize,
 }
 
-/// Parts of the words of ffmpeg's lines about damage.
-const DAMAGE_WORDS: [&str; 4] = ["rror", "nvalid", "orrupt", "runcat"];
+/// Words in ffmpeg's lines about damage, in lower case.
+const DAMAGE_WORDS: [&str; 4] = ["error", "invalid", "corrupt", "truncating"];
 
 impl FfmpegLog {
     fn add(&mut self, line: &str) {
-        if DAMAGE_WORDS.iter().any(|word| line.contains(word)) {
+        let words = line.to_lowercase();
+        if DAMAGE_WORDS.iter().any(|word| words.contains(word)) {
             self.damages += 1;
             self.first_damage.get_or_insert_with(|| line.to_owned());
         }

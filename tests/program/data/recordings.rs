@@ -259,11 +259,11 @@ fn topics_with_other_clocks_are_sampled_alike() {
 #[test]
 fn a_topic_without_messages_keeps_the_frames_of_others() {
     let bench = with_recording(drive(4, Compression::None));
-    let called = import(&bench, "--topic /front/image_raw --topic /fornt --out out").ended(1);
+    let called = import(&bench, "--topic /front/image_raw --topic /middle --out out").ended(1);
     assert!(
         called
             .stderr
-            .contains("no messages of /fornt; topics with images: /front/image_raw, /rear/"),
+            .contains("no messages of /middle; topics with images: /front/image_raw, /rear/"),
         "{called:?}"
     );
     assert_eq!(frames(&bench).len(), 2);
