@@ -131,6 +131,7 @@ fn image_input<'a>(
             let name = port.name.to_lowercase();
             port.layout(channels.count()).is_some()
                 && !ATTENTION.iter().any(|word| name.contains(word))
+                && !(name == "z" || name.contains("noise"))
         })
         .or(images.first())
         .copied()

@@ -63,6 +63,8 @@ fn sizes_in(shape: &[usize]) -> Vec<[usize; 2]> {
 fn shapes(model: &[u8]) -> Vec<Vec<usize>> {
     let mut constants: HashMap<Vec<u8>, Vec<usize>> = HashMap::new();
     let mut used = Vec::new();
+    // PyTorch writes the sizes of a resize as batch and channels, joined with height and width.
+    let mut joined: HashMap<Vec<u8>, Range<usize>> = HashMap::new();
     for graph in parts(model, 0..model.len(), 7) {
         for tensor in parts(model, graph.clone(), 5) {
             let (name, values) = tensor_of(model, tensor);
@@ -81,6 +83,12 @@ fn shapes(model: &[u8]) -> Vec<Vec<usize>> {
                         constants.insert(model[name.clone()].to_vec(), values);
                     }
                 }
+                Some(b"Concat") => {
+                    let outputs = parts(model, node, 2);
+                    if let (Some(last), Some(name)) = (inputs.last(), outputs.first()) {
+                        joined.insert(model[name.clone()].to_vec(), last.clone());
+                    }
+                }
                 Some(b"Reshape" | b"Expand") => used.extend(inputs.get(1).cloned()),
                 Some(b"Resize") => used.extend(inputs.get(3).cloned()),
                 _ => {}
@@ -88,9 +96,14 @@ fn shapes(model: &[u8]) -> Vec<Vec<usize>> {
         }
     }
     used.into_iter()
-        .filter_map(|name| constants.get(&model[name]))
+        .filter_map(|name| {
+            let shape = constants.get(&model[name.clone()]).cloned();
+            shape.or_else(|| {
+                let last = constants.get(&model[joined.get(&model[name])?.clone()])?;
+                (last.len() == 2).then(|| [&[1], &last[..]].concat())
+            })
+        })
         .filter(|shape| !shape.is_empty())
-        .cloned()
         .collect()
 }
 

@@ -102,7 +102,13 @@ impl RuntimeThread {
             Err(RecvTimeoutError::Disconnected) => Err(thread_ended()),
             Err(RecvTimeoutError::Timeout) => {
                 self.stuck.store(true, Ordering::SeqCst);
-                Err(stuck())
+                Err(match ended {
+                    Ended::TooLarge => Error::Runtime(format!(
+                        "an enhancer took more memory than --llie-options max-memory allows, and did not end within {} s, although it was stopped; no further image is enhanced, and finished trials are saved. Allow more memory, or use a smaller model",
+                        GRACE.as_secs()
+                    )),
+                    _ => stuck(),
+                })
             }
         }
     }

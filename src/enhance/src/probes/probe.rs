@@ -314,7 +314,7 @@ fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
             "If its output has blue first, state in MODEL.onnx.toml beside it: `color_out = \"bgr\"` (or \"rgb\", if that is stated)"
         }
         (Flaw::Inverted, _) => {
-            "Perhaps another output is the image, or its authors subtract it from white: `image = \"1 - output\"` in MODEL.onnx.toml beside it"
+            "Perhaps another output is the image, or its authors subtract it from white: `image = \"1 - OUTPUT\"`, or divide the input by it: `image = \"input / OUTPUT\"`, in MODEL.onnx.toml beside it"
         }
         (Flaw::Shuffled, _) => {
             "Perhaps another output is the image, or the dimensions have another order: `layout_in`, `layout_out` and `output` in MODEL.onnx.toml beside it"

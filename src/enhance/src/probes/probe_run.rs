@@ -93,7 +93,13 @@ impl Enhancer {
             }
             _ => None,
         };
-        let problem = problem.or_else(|| probe.problem());
+        let name = match &self.graph().convention.image {
+            Some(image) => format!("({image})"),
+            None => in_expression(&self.graph().signature.outputs[0].port.name),
+        };
+        let problem = problem
+            .or_else(|| probe.problem())
+            .map(|problem| problem.replace("OUTPUT", &name));
         let unread = self
             .graph()
             .unread_images()

@@ -23,7 +23,7 @@ const LEAST_CONTEXT: usize = 8;
 pub(crate) const FREE_SIDE: usize = 128;
 
 /// Steps of pixels that tiles may have to start at, the smallest first: networks that halve an image up to five times.
-const ALIGNMENTS: [usize; 6] = [1, 2, 4, 8, 16, 32];
+const ALIGNMENTS: [usize; 16] = [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32];
 
 /// Largest difference of outputs of 0..1 that count as the same; a tenth of a code. Chosen: above the rounding of other sums.
 const SAME: f32 = 4e-4;

@@ -6,8 +6,10 @@ use crate::failure::{RunFailure, by};
 use crate::graphs::{Graph, RunResult};
 use darkqa_ground::error::Result;
 
-/// Multiples of sides that are tried, in this order.
-pub(crate) const MULTIPLES: [usize; 12] = [1, 4, 8, 12, 16, 20, 24, 32, 48, 64, 96, 128];
+/// Multiples of sides that are tried, in this order: those of networks that halve an image, and those of patches of 14 pixels.
+pub(crate) const MULTIPLES: [usize; 17] = [
+    1, 4, 8, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 96, 112, 128,
+];
 
 /// Least side of a trial image, in pixels; chosen: enough for networks that halve the image five times.
 const LEAST_SIDE: usize = 64;
@@ -152,10 +154,13 @@ pub(crate) fn not_found(failure: &RunFailure, search: &SizeSearch) -> String {
     } else {
         ", and the sizes in its constants"
     };
+    let tried = MULTIPLES[1..]
+        .iter()
+        .map(ToString::to_string)
+        .collect::<Vec<_>>()
+        .join(", ");
     format!(
-        "{words}. Multiples of {} up to {}{traced} were tried and do not help: export it for any size (dynamic_axes), without int(x.shape[..]) in its code, or for the size of the images",
-        MULTIPLES[1],
-        MULTIPLES[MULTIPLES.len() - 1]
+        "{words}. The multiples {tried}{traced} were tried and do not help: export it for any size (dynamic_axes), without int(x.shape[..]) in its code, or for the size of the images"
     )
 }
 

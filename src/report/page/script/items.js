@@ -322,7 +322,7 @@ const reply = (subject, i) => {
   $("r-mark").textContent = (sign ? sign + ", " : "") + word;
   $("r-mark").className = name;
   const said = (code) => code < UNREAD ? letter(code) : "nothing";
-  $("r-reading").textContent = lenient < FAILED ? `strict reading: ${said(chosen(subject, i))} · lenient: ${said(lenient)}` : "";
+  $("r-reading").textContent = lenient < FAILED ? `strict parsing: ${said(chosen(subject, i))} · lenient: ${said(lenient)}` : "";
 };
 
 const draw = () => {
