@@ -68,6 +68,17 @@ fn refusal(line: &Value) -> Option<(u16, String)> {
     refused.then_some((status, text(response.get("body")?)))
 }
 
+/// Whether an error states nothing: some servers write one beside each reply.
+fn is_empty(error: &Value) -> bool {
+    match error {
+        Value::Null | Value::Bool(false) => true,
+        Value::String(text) => text.is_empty(),
+        Value::Array(items) => items.is_empty(),
+        Value::Object(fields) => fields.is_empty(),
+        Value::Bool(true) | Value::Number(_) => false,
+    }
+}
+
 /// A body as text: some servers write that of a failed request as a text, and not as an object.
 fn text(body: &Value) -> String {
     body.as_str()
@@ -78,7 +89,7 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
     let response = line.get("response").filter(|response| !response.is_null());
     let status = response.and_then(|response| response.get("status_code")?.as_u64());
     let status = status.and_then(|status| u16::try_from(status).ok());
-    let error = line.get("error").filter(|error| !error.is_null());
+    let error = line.get("error").filter(|error| !is_empty(error));
     let fail = |kind, text: &str| {
         let text = scrub.line(text);
         Err(Failure {
@@ -172,6 +183,12 @@ mod tests {
         let reply = answered.result.unwrap();
         assert_eq!(reply.text, "B");
         assert_eq!(reply.usage.unwrap().prompt_tokens, Some(9));
+        for empty in ["{}", "\"\"", "false", "[]"] {
+            let line = format!(
+                r#"{{"custom_id":"k","response":{{"status_code":200,"body":{{"choices":[{{"message":{{"content":"B"}},"finish_reason":"stop"}}]}}}},"error":{empty}}}"#
+            );
+            assert_eq!(read(&line).result.unwrap().text, "B", "{empty}");
+        }
         for (line, kind, message) in [
             (
                 r#"{"custom_id":"k","response":null,"error":{"code":"batch_expired","message":"This request could not be executed before the completion window expired."}}"#,

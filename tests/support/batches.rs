@@ -28,6 +28,8 @@ pub struct Course {
     tokens: u64,
     /// Requests that the server does not count.
     uncounted: usize,
+    /// Whether the server counts nothing before its output file has a name.
+    is_late_to_count: bool,
 }
 
 /// What comes of one request.
@@ -54,6 +56,8 @@ pub enum Order {
     Cut,
     /// The file is empty.
     Empty,
+    /// Each line after a failure of the same request.
+    AfterFailures,
 }
 
 impl Course {
@@ -69,6 +73,7 @@ impl Course {
             late: 0,
             tokens: 1,
             uncounted: 0,
+            is_late_to_count: false,
         }
     }
 
@@ -80,6 +85,14 @@ impl Course {
     /// A batch whose output file has no name at so many looks.
     pub fn late(self, late: usize) -> Self {
         Self { late, ..self }
+    }
+
+    /// No counts before the output file has a name.
+    pub fn late_to_count(self) -> Self {
+        Self {
+            is_late_to_count: true,
+            ..self
+        }
     }
 
     /// A batch whose answers are charged so many tokens each.
@@ -533,7 +546,9 @@ impl StoredBatch {
             .map(|i| (self.course.line)(i))
             .filter(|line| matches!(line, Line::Right))
             .count();
-        let (completed, failed) = if has_ended {
+        let is_silent = self.course.is_late_to_count && self.looks <= self.course.late;
+        let counted = if is_silent { 0 } else { total };
+        let (completed, failed) = if has_ended && !is_silent {
             (right - self.course.uncounted, total - right)
         } else {
             (0, 0)
@@ -544,7 +559,7 @@ impl StoredBatch {
             "input_file_id": self.body["input_file_id"], "completion_window": "24h", "status": self.state(),
             "output_file_id": self.output.as_ref().filter(|_| self.looks > self.course.late), "error_file_id": self.errors,
             "created_at": 1, "metadata": self.body["metadata"],
-            "request_counts": {"total": total, "completed": completed, "failed": failed},
+            "request_counts": {"total": counted, "completed": completed, "failed": failed},
         })
     }
 
@@ -578,6 +593,11 @@ impl StoredBatch {
                 let again = self.requests.iter();
                 output.extend(again.map(|one| reply(one, 200, &self.completion("A"))));
             }
+            Order::AfterFailures => {
+                let body = json!({"error": {"message": "first try"}});
+                let failures = self.requests.iter().map(|one| reply(one, 500, &body));
+                output.splice(0..0, failures);
+            }
             Order::AsSent | Order::Cut | Order::Empty => {}
         }
         let text = |lines: Vec<Value>| {
@@ -589,7 +609,7 @@ impl StoredBatch {
             Order::Cut => output.truncate(output.len() - 40),
             // A file without lines is one all the same.
             Order::Empty => output = b"\n".to_vec(),
-            Order::AsSent | Order::Reversed | Order::Twice => {}
+            Order::AsSent | Order::Reversed | Order::Twice | Order::AfterFailures => {}
         }
         [output, errors]
     }

@@ -140,7 +140,9 @@ impl RemoteBatch {
             error_file: text(object, "error_file_id"),
             counts: RequestCounts {
                 answered: count("completed").unwrap_or(0),
-                done: count("completed").unwrap_or(0) + count("failed").unwrap_or(0),
+                done: count("completed")
+                    .unwrap_or(0)
+                    .saturating_add(count("failed").unwrap_or(0)),
                 total: count("total").unwrap_or(0),
             },
             problem: errors

@@ -21,6 +21,9 @@ const MOST_REPLY_BYTES: u64 = 4 << 20;
 /// default of `--poll`.
 const MOST_INCOMPLETE: u32 = 10;
 
+/// The same for batches that the user cancels, who waits; chosen.
+const MOST_INCOMPLETE_CANCELLED: u32 = 3;
+
 /// How often a file is tried to be deleted; chosen.
 const DELETIONS: usize = 3;
 
@@ -61,10 +64,14 @@ impl<D: Detail> Driver<'_, D> {
                 ));
                 Ok(Step::Waiting)
             }
-            BatchState::Failed => self.failed(part, &batch),
-            BatchState::Completed | BatchState::Expired | BatchState::Cancelled => {
-                self.fetch(part, &batch).await
+            // A batch that failed on its way may have asked a part of its requests.
+            BatchState::Failed if batch.output_file.is_none() && batch.counts.done == 0 => {
+                self.failed(part, &batch)
             }
+            BatchState::Failed
+            | BatchState::Completed
+            | BatchState::Expired
+            | BatchState::Cancelled => self.fetch(part, &batch).await,
         }
     }
 
@@ -141,14 +148,14 @@ impl<D: Detail> Driver<'_, D> {
         self.fetched_all(part, batch)
     }
 
-    /// The difference between the server's counts and the lines of an ended batch's files; `None` if they agree, if none of its trials waits any
-    /// more, or if the user wants the batch to end.
+    /// The difference between the server's counts and the lines of an ended batch's files; `None` if they agree, or if none of its trials waits
+    /// any more.
     fn missing_lines(&self, part: usize, batch: &RemoteBatch) -> Result<Option<String>> {
         let Some(keys) = self.keys(part)? else {
             return Ok(None);
         };
         let waiting = self.store.pending_in_batches()?;
-        if self.until == Goal::Cancelled || !keys.iter().any(|key| waiting.contains(key)) {
+        if !keys.iter().any(|key| waiting.contains(key)) {
             return Ok(None);
         }
         let server = self.server(part)?;
@@ -175,6 +182,10 @@ impl<D: Detail> Driver<'_, D> {
             BatchState::Completed if !is_counted && lines < requests => {
                 format!("its files have {lines} lines for {requests} requests")
             }
+            // Counts and files of a batch that ended early may come later than its state.
+            BatchState::Expired | BatchState::Cancelled if !is_counted && lines == 0 => {
+                "the server states neither counts nor files".to_owned()
+            }
             _ if lines < counts.done && replies < counts.answered => format!(
                 "the server counts {} replies, and its files have {replies}",
                 counts.answered
@@ -191,10 +202,21 @@ impl<D: Detail> Driver<'_, D> {
     fn incomplete(&mut self, part: usize, batch: &RemoteBatch, problem: &str) -> Result<Step> {
         let looks = self.notes.incomplete_looks.entry(part).or_default();
         *looks += 1;
-        let has_ended = *looks >= MOST_INCOMPLETE;
+        let looks = *looks;
+        let is_cancelled = self.until == Goal::Cancelled;
+        let most = if is_cancelled {
+            MOST_INCOMPLETE_CANCELLED
+        } else {
+            MOST_INCOMPLETE
+        };
+        let has_ended = looks >= most;
         let name = self.part(part).name.clone();
         let text = format!("{name}: batch {}: {problem}", batch.id);
-        if self.until == Goal::Cancelled {
+        let states_nothing = batch.counts.done == 0 && batch.counts.total == 0;
+        let is_without_work = states_nothing && batch.state != BatchState::Completed;
+        if has_ended && (is_cancelled || is_without_work) {
+            tracing::warn!("{text}; its files stay at the server");
+            self.notes.kept_files.insert(part);
             return self.fetched_all(part, batch);
         }
         if self.until == Goal::LookedAt {
@@ -240,7 +262,7 @@ impl<D: Detail> Driver<'_, D> {
     /// Deletes the files of a part at the server, unless they are to be kept.
     pub(super) async fn delete_files(&mut self, part: usize) -> Result<Step> {
         let mut event = Event::Deleted;
-        if self.args.collect.keep_files {
+        if self.args.collect.keep_files || self.notes.kept_files.contains(&part) {
             event = Event::Kept;
         } else {
             for id in self.files_at_server(part).await? {

@@ -107,6 +107,8 @@ pub(super) struct Notes {
     pub(super) refused_looks: BTreeMap<usize, u32>,
     /// Consecutive checks of an ended batch with incomplete files, by part.
     pub(super) incomplete_looks: BTreeMap<usize, u32>,
+    /// Parts whose files stay at the server, because they were not complete.
+    pub(super) kept_files: BTreeSet<usize>,
     /// Parts checked since the last wait.
     pub(super) looked_at: BTreeSet<usize>,
     /// Total charge for the stored replies in US dollars; `None` if it must be summed again.

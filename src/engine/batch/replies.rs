@@ -166,7 +166,11 @@ pub(crate) fn import<D: Detail>(
             problem,
         });
     }
-    for path in files {
+    // A reply counts, whatever other lines state about its request: all replies come first.
+    let passes = [true, false].into_iter();
+    for (path, of_replies) in
+        passes.flat_map(|of_replies| files.iter().map(move |path| (path, of_replies)))
+    {
         let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
         for (i, line) in BufReader::new(file).lines().enumerate() {
             let line = line.map_err(|e| Error::file(path, "read", e))?;
@@ -174,7 +178,9 @@ pub(crate) fn import<D: Detail>(
                 continue;
             }
             let line = BatchLine::read(&line).ok_or_else(|| not_a_line(path, i + 1))?;
-            replies.take(line)?;
+            if line.result.is_ok() == of_replies {
+                replies.take(line)?;
+            }
         }
     }
     let waiting = replies.waiting.len();

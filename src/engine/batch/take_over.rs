@@ -50,12 +50,21 @@ impl<'a, D: Detail> Driver<'a, D> {
         let (mut is_adapted, mut unparsed) = (false, 0);
         let server = self.servers.server(&self.part(part).facts)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
-        for path in paths.iter().filter(|path| path.exists()) {
+        // A reply counts, whatever other lines state about its request: all replies come first.
+        let present: Vec<_> = paths.iter().filter(|path| path.exists()).collect();
+        let passes = [true, false];
+        for (path, of_replies) in passes
+            .into_iter()
+            .flat_map(|of_replies| present.iter().map(move |path| (path, of_replies)))
+        {
             for_each_line(path, |line| {
                 let Some(line) = server.line(line) else {
-                    unparsed += 1;
+                    unparsed += usize::from(of_replies);
                     return Ok(());
                 };
+                if line.result.is_ok() != of_replies {
+                    return Ok(());
+                }
                 let refusal = line.refusal.clone();
                 match replies.take(line)? {
                     Imported::Failed(key, FailureKind::Filtered) => {

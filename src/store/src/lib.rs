@@ -64,7 +64,7 @@ pub use folder::{
 };
 
 /// The trials that were sent in batches.
-const TRIALS: &str = "trials.jsonl";
+pub const TRIALS: &str = "trials.jsonl";
 
 /// Lines of the records that could not be read.
 const SET_ASIDE: &str = "set-aside.jsonl";

@@ -108,3 +108,64 @@ fn failures_without_a_line_are_asked_again_as_counted() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once_but_lost(&bench, &mock, QUESTIONS / 2);
 }
+
+#[test]
+fn a_reply_counts_after_a_failure_of_its_request() {
+    let course = Course::of("in_progress completed").order(Order::AfterFailures);
+    let (bench, mock, called) = blind(&[course], "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+}
+
+#[test]
+fn an_expired_batch_without_counts_is_waited_for() {
+    let course = Course::of("in_progress expired").late(4).late_to_count();
+    let (bench, mock, called) = blind(&[course], "");
+    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_each_once(&bench, &mock, QUESTIONS);
+    assert_eq!(mock.count("POST batches"), 1);
+}
+
+#[test]
+fn a_cancelled_batch_is_fetched_before_its_files_are_deleted() {
+    let course = Course::of(&"in_progress ".repeat(1000))
+        .lines(|i| if i < 1 { Line::Right } else { Line::Absent })
+        .late(3);
+    let (bench, _mock, _) = blind(&[course, Course::of("completed")], "--detach");
+    let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
+    assert!(
+        cancelled.stdout.contains("cancelled: 1 answered, 3 not"),
+        "{cancelled:?}"
+    );
+    assert_eq!(answered(&bench).len(), 1);
+}
+
+#[test]
+fn files_of_a_cancelled_batch_stay_if_they_are_incomplete() {
+    let course = Course::of(&"in_progress ".repeat(1000))
+        .lines(|i| if i < 1 { Line::Right } else { Line::Absent })
+        .late(1000);
+    let (bench, mock, _) = blind(&[course], "--detach");
+    let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
+    assert!(
+        cancelled.stderr.contains("its files stay at the server"),
+        "{cancelled:?}"
+    );
+    assert_eq!(mock.count("DELETE files/id"), 0);
+}
+
+#[test]
+fn lost_trials_of_a_batch_are_not_paid_again() {
+    let course = Course::of("in_progress in_progress in_progress completed");
+    let (bench, mock, _) = blind(&[course, Course::of("completed")], "--detach");
+    std::fs::remove_file(bench.path("run/batch/trials.jsonl")).unwrap();
+    let called = call_with(BLIND, &bench, &mock, "");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(
+        called
+            .stderr
+            .contains("4 trials of part-1-m-001.jsonl, whose batch is at the server, are missing"),
+        "{called:?}"
+    );
+    assert_eq!(mock.count("POST batches"), 1);
+}
