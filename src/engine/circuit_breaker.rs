@@ -35,10 +35,11 @@ pub(crate) enum EndReason {
 impl EndReason {
     pub(crate) fn status(&self, counts: Counts) -> Status {
         match self {
+            // Truncated replies that are asked again count as answered.
+            Self::OverBudget => Status::OverBudget,
             _ if counts.answered == counts.trials => Status::Complete,
             Self::AllAsked => Status::Incomplete,
             Self::Interrupted => Status::Cancelled,
-            Self::OverBudget => Status::OverBudget,
             Self::Stopped(_) | Self::ModelsStopped(_) => Status::Stopped,
         }
     }

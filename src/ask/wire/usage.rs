@@ -21,8 +21,9 @@ pub(super) fn read(usage: Option<&Value>) -> Option<Usage> {
     let read = number_in(usage, "cache_read_input_tokens");
     // Anthropic counts what was in its cache, or is put there, apart from the prompt.
     let apart = read.unwrap_or(0).saturating_add(written);
-    let is_apart = apart > 0 && sum([prompt, completion, Some(apart)]) == total;
-    let prompt = prompt.map(|prompt| prompt + if is_apart { apart } else { 0 });
+    let exceeds_prompt = total.is_none() && prompt.is_some_and(|prompt| apart > prompt);
+    let is_apart = apart > 0 && (exceeds_prompt || sum([prompt, completion, Some(apart)]) == total);
+    let prompt = prompt.map(|prompt| prompt.saturating_add(if is_apart { apart } else { 0 }));
     let outside = reasoning(usage).filter(|reasoning| completion.is_some_and(|c| *reasoning > c));
     let completion = [
         completion,

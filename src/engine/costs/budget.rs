@@ -136,7 +136,7 @@ impl Budget {
         });
         Ok(Self {
             unstated: unstated.fold((0, 0.0), |(count, sum), (requests, dollars)| {
-                (count + requests, sum + dollars)
+                (u32::saturating_add(count, requests), sum + dollars)
             }),
             models: budgets,
             spending: Arc::new(Spending::new(money.max_cost, costs.sum())),

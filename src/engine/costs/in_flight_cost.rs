@@ -37,13 +37,20 @@ impl InFlightCost {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
             Err(e) => return Err(Error::file(path, "read", e)),
         };
-        let note: Self =
-            serde_json::from_slice(&text).map_err(|e| Error::json_line(&path, 1, &e))?;
         let is_cost = |dollars: f64| dollars.is_finite() && dollars >= 0.0;
-        if !is_cost(note.killed) || !is_cost(note.in_flight) {
-            let problem = "costs of 0 or more expected".to_owned();
-            return Err(Error::Run { path, problem });
-        }
+        let note = serde_json::from_slice::<Self>(&text)
+            .ok()
+            .filter(|note| is_cost(note.killed) && is_cost(note.in_flight));
+        let Some(note) = note else {
+            let aside = path.with_extension("json.damaged");
+            fs::rename(&path, &aside).map_err(|e| Error::file(&path, "rename", e))?;
+            tracing::warn!(
+                "{}: not readable, set aside as {}: requests that were in flight when a process was killed are not in the costs",
+                path.display(),
+                aside.display()
+            );
+            return Ok(Self::default());
+        };
         Ok(Self {
             killed: note.killed + note.in_flight,
             in_flight: 0.0,
@@ -104,7 +111,16 @@ mod tests {
         next.end(path).unwrap();
         let third = InFlightCost::open(path).unwrap();
         assert!((third.killed() - 5.0).abs() < 1e-9, "it counts once");
-        fs::write(path.join(NOTE), "{\"killed\":-1,\"in_flight\":0}").unwrap();
-        assert!(InFlightCost::open(path).is_err());
+    }
+
+    #[test]
+    fn a_damaged_note_is_set_aside() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        for damaged in ["", "{\"killed\":1", "{\"killed\":-1,\"in_flight\":0}"] {
+            fs::write(path.join(NOTE), damaged).unwrap();
+            assert!(InFlightCost::open(path).unwrap().killed() < 1e-9);
+            assert!(path.join("in_flight.json.damaged").exists());
+        }
     }
 }

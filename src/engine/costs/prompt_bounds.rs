@@ -24,6 +24,10 @@ const JOINS: u64 = 4;
 /// Number of earlier prompts that are kept for comparison; chosen.
 const REFERENCES: usize = 16;
 
+/// Number of later prompts that must agree with an earlier one before it replaces the bound by length; chosen: the first reply of a
+/// server may be from another replica, or from a cache.
+const AGREEING: usize = 2;
+
 /// Factor between a bound and the charged tokens from which a prompt is kept for comparison; chosen.
 const CLOSE: f64 = 1.05;
 
@@ -50,6 +54,15 @@ struct Reference {
     prompt: Prompt,
     sizes: Vec<(usize, usize)>,
     charged: u64,
+    /// Number of later prompts that were charged at most what this one let expect.
+    agreeing: usize,
+}
+
+impl Reference {
+    /// The most tokens of another prompt with images of the same sizes.
+    fn most_tokens(&self, facts: PromptFacts<'_>) -> f64 {
+        (self.charged + differing_bytes(&self.prompt, facts.prompt) as u64 + JOINS) as f64
+    }
 }
 
 /// Upper bounds of the tokens of a model's prompts.
@@ -74,7 +87,7 @@ impl PromptBounds {
     /// The most tokens of a prompt.
     pub(crate) fn bound(&self, facts: PromptFacts<'_>) -> u64 {
         let by_length = by_length(facts) * self.excess_by_length;
-        let by_comparison = self.by_comparison(facts);
+        let by_comparison = self.by_comparison(facts, AGREEING);
         let by_comparison = by_comparison.map(|tokens| tokens * self.excess_by_comparison);
         by_comparison
             .map_or(by_length, |tokens| tokens.min(by_length))
@@ -88,7 +101,14 @@ impl PromptBounds {
         }
         let tokens = charged as f64;
         self.excess_by_length = self.excess_by_length.max(tokens / by_length(facts));
-        let by_comparison = self.by_comparison(facts);
+        let by_comparison = self.by_comparison(facts, 0);
+        for one in self
+            .references
+            .iter_mut()
+            .filter(|one| one.sizes == facts.sizes)
+        {
+            one.agreeing += usize::from(tokens <= one.most_tokens(facts));
+        }
         if let Some(expected) = by_comparison {
             self.excess_by_comparison = self.excess_by_comparison.max(tokens / expected);
         }
@@ -100,18 +120,19 @@ impl PromptBounds {
                 prompt: facts.prompt.clone(),
                 sizes: facts.sizes.to_vec(),
                 charged,
+                agreeing: 0,
             });
         }
     }
 
-    /// The most tokens of a prompt, by the earlier prompt that is most like it; `None` if none had images of these sizes.
-    fn by_comparison(&self, facts: PromptFacts<'_>) -> Option<f64> {
+    /// The most tokens of a prompt, by the earlier prompt that is most like it, among those that this many later ones agree with; `None`
+    /// if none of them had images of these sizes.
+    fn by_comparison(&self, facts: PromptFacts<'_>, agreeing: usize) -> Option<f64> {
         self.references
             .iter()
-            .filter(|one| one.sizes == facts.sizes)
-            .map(|one| one.charged + differing_bytes(&one.prompt, facts.prompt) as u64 + JOINS)
-            .min()
-            .map(|tokens| tokens as f64)
+            .filter(|one| one.sizes == facts.sizes && one.agreeing >= agreeing)
+            .map(|one| one.most_tokens(facts))
+            .min_by(f64::total_cmp)
     }
 }
 
@@ -179,6 +200,10 @@ mod tests {
     fn later_prompts_are_bounded_by_earlier_ones() {
         let (mut bounds, seven) = (PromptBounds::new(), prompt(7));
         bounds.observe(facts(&seven, None), 300);
+        // A single reply may be from a cache.
+        assert!(bounds.bound(facts(&prompt(123), None)) > 2000);
+        bounds.observe(facts(&prompt(8), None), 301);
+        bounds.observe(facts(&prompt(9), None), 300);
         assert_eq!(bounds.bound(facts(&prompt(123), None)), 300 + 3 + 4);
         let other_size = PromptFacts {
             sizes: &[(320, 240)],
