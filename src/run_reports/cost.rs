@@ -113,7 +113,7 @@ pub(super) fn cost<'t, D: Detail + 't>(
         }
         if let Some(lost) = charged.and_then(|charged| charged.lost) {
             lost_dollars += lost;
-            attempts += trial.lost().attempts;
+            attempts = u32::saturating_add(attempts, trial.lost().attempts);
         }
     }
     let lost = match attempts {

@@ -36,9 +36,15 @@ impl RunUsage {
             let tokens: Usage = trial.usage().unwrap_or_default();
             usage.trials += 1;
             usage.requests += u64::from(trial.attempts());
-            usage.prompt_tokens += tokens.prompt_tokens.unwrap_or(0);
-            usage.completion_tokens += tokens.completion_tokens.unwrap_or(0);
-            usage.image_bytes += trial.images().map_or(0, |images| images.bytes);
+            usage.prompt_tokens = usage
+                .prompt_tokens
+                .saturating_add(tokens.prompt_tokens.unwrap_or(0));
+            usage.completion_tokens = usage
+                .completion_tokens
+                .saturating_add(tokens.completion_tokens.unwrap_or(0));
+            usage.image_bytes = usage
+                .image_bytes
+                .saturating_add(trial.images().map_or(0, |images| images.bytes));
             waits.extend(trial.latency_ms().map(|ms| ms as u32));
             if let Some(model) = trial.served_model()
                 && !usage.served.contains(model)

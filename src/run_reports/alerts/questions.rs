@@ -108,7 +108,7 @@ pub(super) fn repeat_alert(combined: &Combined) -> Option<Alert> {
         .map(|run| {
             let times = combined
                 .trials_of(run)
-                .map(|trial| trial.repeat() + 1)
+                .map(|trial| trial.repeat().saturating_add(1))
                 .max();
             (&run.name, times.unwrap_or(1))
         })
