@@ -22,7 +22,7 @@ const MOST_REPLY_BYTES: u64 = 4 << 20;
 const MOST_INCOMPLETE: u32 = 10;
 
 /// The same for batches that the user cancels, who waits; chosen.
-const MOST_INCOMPLETE_CANCELLED: u32 = 3;
+const MOST_INCOMPLETE_CANCELLED: u32 = 6;
 
 /// How often a file is tried to be deleted; chosen.
 const DELETIONS: usize = 3;
@@ -65,7 +65,7 @@ impl<D: Detail> Driver<'_, D> {
                 Ok(Step::Waiting)
             }
             // A batch that failed on its way may have asked a part of its requests.
-            BatchState::Failed if batch.output_file.is_none() && batch.counts.done == 0 => {
+            BatchState::Failed if batch.output_file.is_none() && batch.counts.answered == 0 => {
                 self.failed(part, &batch)
             }
             BatchState::Failed
@@ -118,7 +118,7 @@ impl<D: Detail> Driver<'_, D> {
         let of = self.part(part);
         Err(Error::Endpoint {
             endpoint: of.facts.base.clone(),
-            problem: format!("{}: {why}; none of its requests was asked", of.name),
+            problem: format!("{}: {why}; none of its requests has a reply", of.name),
         })
     }
 
@@ -213,15 +213,24 @@ impl<D: Detail> Driver<'_, D> {
         let name = self.part(part).name.clone();
         let text = format!("{name}: batch {}: {problem}", batch.id);
         let states_nothing = batch.counts.done == 0 && batch.counts.total == 0;
-        let is_without_work = states_nothing && batch.state != BatchState::Completed;
+        // A file that is named and could not be fetched may hold paid replies.
+        let has_output = batch.output_file.is_none() || self.fetched(part)[0].exists();
+        let is_without_work = states_nothing && has_output && batch.state != BatchState::Completed;
         if has_ended && (is_cancelled || is_without_work) {
-            tracing::warn!("{text}; its files stay at the server");
-            self.notes.kept_files.insert(part);
+            let has_files = batch.output_file.is_some() || batch.error_file.is_some();
+            if states_nothing && !has_files {
+                tracing::warn!("{text}; taken as a batch without replies");
+            } else {
+                tracing::warn!(
+                    "{text}; its files stay at the server, and its requests may be asked and paid again"
+                );
+                self.notes.kept_files.insert(part);
+            }
             return self.fetched_all(part, batch);
         }
         if self.until == Goal::LookedAt {
             self.warn_once(format!(
-                "{text}; nothing is imported, asked again or deleted; look again later"
+                "{text}; nothing is imported, asked again or deleted; look again later (the command of the run without --detach, or batch cancel, ends the wait)"
             ));
             return Ok(Step::Waiting);
         }

@@ -75,8 +75,9 @@ fn check_trials<D: Detail>(journal: &Journal, store: &Store<D>) -> Result<()> {
             return Err(Error::Run {
                 path: journal.folder().join(TRIALS),
                 problem: format!(
-                    "{lost} trials of {}, whose batch is at the server, are missing: restore this file from a copy; without it they would be asked and paid again",
-                    journal.parts[part].name
+                    "{lost} trials of {}, whose batch is at the server, are missing: restore this file from a copy; without it they would be asked and paid again. Without a copy, cancel the batch on the server's page and delete {}",
+                    journal.parts[part].name,
+                    journal.folder().display()
                 ),
             });
         }

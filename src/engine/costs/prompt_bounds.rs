@@ -101,18 +101,21 @@ impl PromptBounds {
         }
         let tokens = charged as f64;
         self.excess_by_length = self.excess_by_length.max(tokens / by_length(facts));
-        let by_comparison = self.by_comparison(facts, 0);
+        let by_comparison = self.by_comparison(facts, AGREEING);
+        let mut is_close = false;
         for one in self
             .references
             .iter_mut()
             .filter(|one| one.sizes == facts.sizes)
         {
-            one.agreeing += usize::from(tokens <= one.most_tokens(facts));
+            let most = one.most_tokens(facts);
+            one.agreeing += usize::from(tokens <= most);
+            is_close |= (tokens..=CLOSE * tokens).contains(&most);
         }
         if let Some(expected) = by_comparison {
             self.excess_by_comparison = self.excess_by_comparison.max(tokens / expected);
         }
-        if by_comparison.is_none_or(|expected| expected > CLOSE * tokens) {
+        if !is_close {
             if self.references.len() == REFERENCES {
                 self.references.pop_front();
             }
