@@ -63,8 +63,7 @@ pub(super) fn permanent_cause(text: &str, is_plain: bool) -> Option<&'static str
 }
 
 /// Remedy for a host name that no name server knows.
-pub(super) const UNKNOWN_HOST: &str =
-    "no name server knows this host; check --base-url and the proxy settings";
+pub(super) const UNKNOWN_HOST: &str = "no name server knows this host; check --base-url and the proxy settings, and that the server is started and this machine is online";
 
 /// Words of glibc, musl, macOS and Windows for a host name that does not exist. A name server that does not answer has others.
 const UNKNOWN_HOST_WORDS: [&str; 5] = [

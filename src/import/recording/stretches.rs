@@ -33,6 +33,8 @@ struct ClockRun {
     since: Nanoseconds,
     /// The latest time of a frame on this clock.
     latest: Nanoseconds,
+    /// The recorder's time of the last frame.
+    log_time: Nanoseconds,
 }
 
 impl ClockRun {
@@ -44,7 +46,7 @@ impl ClockRun {
 }
 
 /// The stretches of a drive, of one length in time from the first frame, whatever frames are taken. The clocks of topics may differ; the
-/// recorder's time relates them. A clock that is set back starts a new stretch.
+/// recorder's time relates them, also after a clock was set back. If that was set back, too, the next stretch begins.
 #[derive(Debug)]
 pub(crate) struct Stretches {
     length: Nanoseconds,
@@ -85,9 +87,11 @@ impl Stretches {
                 first: time,
                 since: self.first_of_clock(start, time, log_time, previous),
                 latest: time,
+                log_time,
             },
         };
         run.latest = run.latest.max(time);
+        run.log_time = log_time;
         clock.0 = Some(run);
         let since = run.since(time);
         Place {
@@ -98,7 +102,7 @@ impl Stretches {
     }
 
     /// Time from the first frame of the drive to the first frame of a clock: by the clock, if it is that of the drive's first frame, else
-    /// by the recorder's. A clock that was set back goes on with the next stretch.
+    /// by the recorder's. If both were set back, it goes on with the next stretch.
     fn first_of_clock(
         &self,
         start: DriveStart,
@@ -112,6 +116,9 @@ impl Stretches {
             let is_same = stated.saturating_sub(recorded).saturating_abs() <= ANOTHER_CLOCK;
             return if is_same { stated } else { recorded.max(0) };
         };
+        if log_time > previous.log_time {
+            return recorded.max(0);
+        }
         let passed = previous.since(previous.latest) / self.length;
         let next = passed.saturating_add(1).saturating_mul(self.length);
         recorded.max(next)
@@ -168,6 +175,16 @@ mod tests {
                 assert_eq!(difference, expected, "{milliseconds}");
             }
         }
+    }
+
+    #[test]
+    fn a_drive_that_is_played_again_goes_on_by_the_recorder() {
+        let (mut stretches, mut clock) = (Stretches::new(10.0), TopicClock::default());
+        let found = [(0, 0), (24, 24), (0, 25), (24, 49)].map(|(time, log_time)| {
+            let [time, log_time] = [time, log_time].map(|seconds| seconds * 1_000_000_000);
+            stretches.place(&mut clock, time, log_time).stretch
+        });
+        assert_eq!(found, [0, 2, 2, 4]);
     }
 
     #[test]

@@ -62,11 +62,16 @@ const DAMAGE_WORDS: [&str; 4] = ["error", "invalid", "corrupt", "truncating"];
 impl FfmpegLog {
     fn add(&mut self, line: &str) {
         let words = line.to_lowercase();
-        if DAMAGE_WORDS.iter().any(|word| words.contains(word)) {
+        // The names of files, and their metadata, which are indented, are no damage.
+        let is_about_file = line.starts_with([' ', '\t'])
+            || ["Input #", "Output #"]
+                .iter()
+                .any(|start| line.starts_with(start));
+        if !is_about_file && DAMAGE_WORDS.iter().any(|word| words.contains(word)) {
             self.damages += 1;
             self.first_damage.get_or_insert_with(|| line.to_owned());
         }
-        self.last.push(line.to_owned());
+        self.last.push(line.trim().to_owned());
         if self.last.len() > LAST_LINES {
             self.last.remove(0);
         }
@@ -147,7 +152,7 @@ impl Video {
                     // The receiver is gone if the rest of the video is not wanted.
                     Some(time) => drop(sender.send(time)),
                     None if text.contains("showinfo") => {}
-                    None => kept.add(text.trim()),
+                    None => kept.add(text.trim_end()),
                 }
                 line.clear();
             }
@@ -335,6 +340,16 @@ impl Drop for VideoFrames {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_of_files_are_no_damage() {
+        let mut log = FfmpegLog::default();
+        log.add("Input #0, mov, from 'file:error_cases/x.mp4':");
+        log.add("    title           : Error 404");
+        assert_eq!(log.damages, 0);
+        log.add("[h264 @ 0x1] error while decoding MB 3 5");
+        assert_eq!(log.damages, 1);
+    }
 
     #[test]
     fn lines_of_ffmpeg_are_understood() {

@@ -107,9 +107,13 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         Some(problem) => Some(format!("{problem}; frames up to there are kept")),
         None => frames
             .damage()
-            .or_else(|| early_end(&video, last, args.sampling.interval()))
             .map(|problem| format!("{place}: {problem}; its frames are kept")),
     };
+    if problem.is_none()
+        && let Some(early) = early_end(&video, last, args.sampling.interval())
+    {
+        tracing::warn!("{place}: {early}, or of which the last frame is shown for long");
+    }
     let is_whole = problem.is_none();
     if let Some(problem) = problem {
         tracing::warn!("{problem}");
