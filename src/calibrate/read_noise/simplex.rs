@@ -1,4 +1,4 @@
-//! Derivative-free minimization of a function of two variables: [`least`].
+//! Derivative-free minimization of a function of two variables: [`minimize`].
 
 /// Maximum number of steps (chosen; the fits of read noise take about 80).
 const MAX_STEPS: usize = 600;
