@@ -101,6 +101,13 @@ pub(crate) struct RequestCounts {
     pub total: u64,
 }
 
+impl RequestCounts {
+    /// Whether the server has counted anything.
+    pub(crate) fn is_stated(self) -> bool {
+        self.total > 0 || self.done > 0
+    }
+}
+
 /// A batch at a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct RemoteBatch {

@@ -15,7 +15,7 @@ use super::split::PIECE;
 use super::take_over::{for_each_line, key_of};
 use crate::error::{Error, Result};
 use crate::files::create_new;
-use crate::store::{Store, TRIALS};
+use crate::store::Store;
 use crate::types::TrialKey;
 use darkqa_score::answers::record::Detail;
 
@@ -44,36 +44,32 @@ pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Res
 
 /// Refuses to go on without the records of trials that a batch at the server asks: they would be asked, and paid, again.
 fn check_trials<D: Detail>(journal: &Journal, store: &Store<D>) -> Result<()> {
-    let at_server = |part: &&usize| {
-        let stage = &journal.parts[**part].stage;
-        matches!(
-            stage,
-            Stage::Creating | Stage::Created | Stage::Fetched { .. }
-        )
-    };
-    let parts: Vec<usize> = (0..journal.parts.len())
-        .filter(|part| at_server(&part))
+    let at_server: Vec<usize> = (0..journal.parts.len())
+        .filter(|part| {
+            let stage = &journal.parts[*part].stage;
+            matches!(
+                stage,
+                Stage::Creating | Stage::Created | Stage::Fetched { .. }
+            )
+        })
         .collect();
-    if parts.is_empty() {
+    if at_server.is_empty() {
         return Ok(());
     }
-    let known: BTreeSet<TrialKey> = store
-        .batch_trials()?
-        .into_iter()
-        .map(|blank| blank.key)
-        .collect();
-    for part in parts {
+    let known = store.batch_keys()?;
+    for part in at_server {
         let path = journal.file(part);
-        let mut lost = 0;
-        if path.exists() {
-            for_each_line(&path, |line| {
-                lost += usize::from(key_of(line).is_some_and(|key| !known.contains(&key)));
-                Ok(())
-            })?;
+        if !path.exists() {
+            continue;
         }
+        let mut lost = 0;
+        for_each_line(&path, |line| {
+            lost += usize::from(key_of(line).is_some_and(|key| !known.contains(&key)));
+            Ok(())
+        })?;
         if lost > 0 {
             return Err(Error::Run {
-                path: journal.folder().join(TRIALS),
+                path: store.batch_trials_file(),
                 problem: format!(
                     "{lost} trials of {}, whose batch is at the server, are missing: restore this file from a copy; without it they would be asked and paid again. Without a copy, cancel the batch on the server's page and delete {}",
                     journal.parts[part].name,

@@ -1,6 +1,6 @@
 //! Import of the output of a Batch API into a run: [`import`].
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -26,17 +26,6 @@ pub(super) struct ReplyCounts {
     unknown: usize,
 }
 
-/// The result of importing a line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Imported {
-    /// Nothing: the trial is not one of this run, or does not wait for a batch.
-    Nothing,
-    /// A reply.
-    Answered,
-    /// A failure of this kind.
-    Failed(TrialKey, FailureKind),
-}
-
 /// The trials of a run that wait for a batch, and the place for their replies.
 pub(super) struct ReplyImport<'a, D> {
     store: &'a mut Store<D>,
@@ -44,7 +33,15 @@ pub(super) struct ReplyImport<'a, D> {
     /// Trials in batches, as records without an outcome.
     blanks: HashMap<TrialKey, Record<D>>,
     waiting: BTreeSet<TrialKey>,
+    /// The first failure of each waiting trial. It is stored at the end, because a later line may have the reply.
+    failures: BTreeMap<TrialKey, FailedTrial<D>>,
     pub(super) counts: ReplyCounts,
+}
+
+/// A trial without an outcome, and the failure of its request.
+struct FailedTrial<D> {
+    blank: Record<D>,
+    failure: Failure,
 }
 
 impl<'a, D: Detail> ReplyImport<'a, D> {
@@ -54,22 +51,24 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         Ok(Self {
             blanks: blanks.map(|blank| (blank.key, blank)).collect(),
             waiting: store.pending_in_batches()?,
+            failures: BTreeMap::new(),
             store,
             manifest,
             counts: ReplyCounts::default(),
         })
     }
 
-    /// Stores what a line states, if its trial waits for a batch.
-    pub(super) fn take(&mut self, line: BatchLine) -> Result<Imported> {
+    /// Stores the reply of a line, or keeps its failure, if its trial waits for a batch.
+    pub(super) fn take(&mut self, line: BatchLine) -> Result<()> {
         let key = line.id.parse::<TrialKey>().ok();
         let Some(blank) = key.and_then(|key| self.blanks.get(&key)) else {
             self.counts.unknown += 1;
-            return Ok(Imported::Nothing);
+            return Ok(());
         };
-        if !self.waiting.remove(&blank.key) {
+        let has_failed = self.failures.contains_key(&blank.key);
+        if !self.waiting.contains(&blank.key) || (has_failed && line.result.is_err()) {
             self.counts.imported_before += 1;
-            return Ok(Imported::Nothing);
+            return Ok(());
         }
         let mut blank = blank.clone().batched();
         let bound = std::mem::take(&mut blank.lost.unstated);
@@ -80,9 +79,15 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
                 if line.charged.is_none() && may_be_charged(failure.kind) {
                     blank.lost.unstated = bound;
                 }
-                return self.store_failure(blank, failure);
+                self.failures
+                    .insert(blank.key, FailedTrial { blank, failure });
+                return Ok(());
             }
         };
+        self.waiting.remove(&blank.key);
+        if self.failures.remove(&blank.key).is_some() {
+            self.counts.imported_before += 1;
+        }
         let unstated = match reply.usage {
             _ if bound.is_none() => bound,
             Some(usage) => missing(bound, usage),
@@ -100,31 +105,39 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
             lost,
             ..with_letter(reply, constrain, choices)
         };
-        self.store.append(&answered(blank, reply)?)?;
-        Ok(Imported::Answered)
+        self.store.append(&answered(blank, reply)?)
     }
 
-    /// Stores that a trial has no reply, if it waits for a batch.
-    pub(super) fn fail(&mut self, key: TrialKey, failure: Failure) -> Result<()> {
-        if self.waiting.remove(&key)
+    /// Keeps the failure of a trial that has neither a reply nor a failure, if it waits for a batch.
+    pub(super) fn fail(&mut self, key: TrialKey, failure: Failure) {
+        if self.waiting.contains(&key)
+            && !self.failures.contains_key(&key)
             && let Some(blank) = self.blanks.get(&key)
         {
             let mut blank = blank.clone().batched();
             blank.lost = LostAttempts::default();
-            self.store_failure(blank, failure)?;
+            self.failures.insert(key, FailedTrial { blank, failure });
         }
-        Ok(())
     }
 
-    fn store_failure(&mut self, blank: Record<D>, failure: Failure) -> Result<Imported> {
-        self.counts.failed += 1;
-        let (key, kind) = (blank.key, failure.kind);
-        self.store.append(&blank.failed_by(failure, 1))?;
-        Ok(Imported::Failed(key, kind))
+    /// Trials whose request failed, with the kind of the failure.
+    pub(super) fn failures(&self) -> impl Iterator<Item = (TrialKey, FailureKind)> {
+        self.failures
+            .iter()
+            .map(|(key, failed)| (*key, failed.failure.kind))
     }
 
-    /// Forces the records to the disk; the numbers of lines.
-    pub(super) fn finish(self) -> Result<ReplyCounts> {
+    /// Number of trials that wait for a batch, and have neither a reply nor a failure.
+    fn waiting(&self) -> usize {
+        self.waiting.len() - self.failures.len()
+    }
+
+    /// Stores the failures and forces the records to the disk; the numbers of lines.
+    pub(super) fn finish(mut self) -> Result<ReplyCounts> {
+        for FailedTrial { blank, failure } in std::mem::take(&mut self.failures).into_values() {
+            self.counts.failed += 1;
+            self.store.append(&blank.failed_by(failure, 1))?;
+        }
         self.store.sync()?;
         Ok(self.counts)
     }
@@ -150,7 +163,7 @@ fn may_be_charged(kind: FailureKind) -> bool {
 /// Imports the replies of output and error files; a summary for the user. Each reply is imported once, even if a file is named again.
 ///
 /// # Errors
-/// If the run has written no batch, or a line is not one of a Batch API. The lines before it are kept.
+/// If the run has written no batch, or a line is not one of a Batch API. The replies before it are kept.
 pub(crate) fn import<D: Detail>(
     store: &mut Store<D>,
     manifest: &RunManifest,
@@ -166,11 +179,7 @@ pub(crate) fn import<D: Detail>(
             problem,
         });
     }
-    // A reply counts, whatever other lines state about its request: all replies come first.
-    let passes = [true, false].into_iter();
-    for (path, of_replies) in
-        passes.flat_map(|of_replies| files.iter().map(move |path| (path, of_replies)))
-    {
+    for path in files {
         let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
         for (i, line) in BufReader::new(file).lines().enumerate() {
             let line = line.map_err(|e| Error::file(path, "read", e))?;
@@ -178,12 +187,10 @@ pub(crate) fn import<D: Detail>(
                 continue;
             }
             let line = BatchLine::read(&line).ok_or_else(|| not_a_line(path, i + 1))?;
-            if line.result.is_ok() == of_replies {
-                replies.take(line)?;
-            }
+            replies.take(line)?;
         }
     }
-    let waiting = replies.waiting.len();
+    let waiting = replies.waiting();
     Ok(summary(&replies.finish()?, waiting))
 }
 

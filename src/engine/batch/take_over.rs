@@ -1,13 +1,13 @@
 //! Final steps of a part of a batch run: import its replies, or give up its requests.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use super::driver::{Driver, Step};
 use super::event::Event;
 use super::part::Stage;
-use super::replies::{Imported, ReplyCounts, ReplyImport};
+use super::replies::{ReplyCounts, ReplyImport};
 use crate::ask::Model;
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -50,42 +50,39 @@ impl<'a, D: Detail> Driver<'a, D> {
         let (mut is_adapted, mut unparsed) = (false, 0);
         let server = self.servers.server(&self.part(part).facts)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
-        // A reply counts, whatever other lines state about its request: all replies come first.
-        let present: Vec<_> = paths.iter().filter(|path| path.exists()).collect();
-        let passes = [true, false];
-        for (path, of_replies) in passes
-            .into_iter()
-            .flat_map(|of_replies| present.iter().map(move |path| (path, of_replies)))
-        {
+        let mut refusals = BTreeMap::new();
+        for path in paths.iter().filter(|path| path.exists()) {
             for_each_line(path, |line| {
-                let Some(line) = server.line(line) else {
-                    unparsed += usize::from(of_replies);
+                let Some(mut line) = server.line(line) else {
+                    unparsed += 1;
                     return Ok(());
                 };
-                if line.result.is_ok() != of_replies {
-                    return Ok(());
+                if let (Some(refusal), Ok(key)) = (line.refusal.take(), line.id.parse::<TrialKey>())
+                {
+                    refusals.entry(key).or_insert(refusal);
                 }
-                let refusal = line.refusal.clone();
-                match replies.take(line)? {
-                    Imported::Failed(key, FailureKind::Filtered) => {
-                        self.refused.insert(key);
-                    }
-                    Imported::Failed(key, FailureKind::Request) => {
-                        refused.insert(key);
-                        if let Some((status, body)) = refusal {
-                            for model in &models {
-                                is_adapted |= model.adapt_to_refusal(status, body.as_bytes());
-                            }
+                replies.take(line)
+            })?;
+        }
+        for (key, kind) in replies.failures() {
+            match kind {
+                FailureKind::Filtered => {
+                    self.refused.insert(key);
+                }
+                FailureKind::Request => {
+                    refused.insert(key);
+                    if let Some((status, body)) = refusals.get(&key) {
+                        for model in &models {
+                            is_adapted |= model.adapt_to_refusal(*status, body.as_bytes());
                         }
                     }
-                    _ => {}
                 }
-                Ok(())
-            })?;
+                _ => {}
+            }
         }
         if let Some(state) = ended {
             for key in keys.iter().flatten() {
-                replies.fail(*key, missing_line_failure(state))?;
+                replies.fail(*key, missing_line_failure(state));
             }
         }
         let counts = replies.finish()?;
@@ -143,7 +140,7 @@ impl<'a, D: Detail> Driver<'a, D> {
                 status: None,
                 message: why.clone(),
             };
-            replies.fail(key, failure)?;
+            replies.fail(key, failure);
         }
         replies.finish()?;
         self.journal.record(part, Event::GaveUp { why })

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::reading;
+use crate::store::set_file_aside;
 
 /// Name of the note in a run folder; it is there while requests are in flight, and after a killed process.
 const NOTE: &str = "in_flight.json";
@@ -42,8 +43,7 @@ impl InFlightCost {
             .ok()
             .filter(|note| is_cost(note.killed) && is_cost(note.in_flight));
         let Some(note) = note else {
-            let aside = path.with_extension("json.damaged");
-            fs::rename(&path, &aside).map_err(|e| Error::file(&path, "rename", e))?;
+            let aside = set_file_aside(&path)?;
             tracing::warn!(
                 "{}: not readable, set aside as {}: requests that were in flight when a process was killed are not in the costs",
                 path.display(),

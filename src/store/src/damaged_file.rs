@@ -91,7 +91,7 @@ const MOST_ASIDE: usize = 1000;
 ///
 /// # Errors
 /// If it cannot be renamed.
-pub(super) fn set_file_aside(path: &Path) -> Result<PathBuf> {
+pub fn set_file_aside(path: &Path) -> Result<PathBuf> {
     let name = |number: usize| {
         let mut name = path.as_os_str().to_owned();
         name.push(match number {

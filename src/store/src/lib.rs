@@ -41,7 +41,7 @@ use darkqa_ground::types::{
 use darkqa_score::answers::record::Detail;
 
 use changed_questions::ChangedQuestions;
-use damaged_file::{each_readable_line, lacks_notes, set_file_aside};
+use damaged_file::{each_readable_line, lacks_notes};
 use folder::{FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, create_run, write, write_manifest};
 use lines::{append, each_line, json_lines, lines, repair, set_aside};
 
@@ -49,6 +49,7 @@ use own_files::check_own;
 use unlocked_log::UnlockedLog;
 
 pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
+pub use damaged_file::set_file_aside;
 pub use image_notes::{missing_thumbnails, more_fidelity};
 pub use log_mark::LogMark;
 use lost_questions::LostQuestions;
@@ -64,7 +65,7 @@ pub use folder::{
 };
 
 /// The trials that were sent in batches.
-pub const TRIALS: &str = "trials.jsonl";
+const TRIALS: &str = "trials.jsonl";
 
 /// Lines of the records that could not be read.
 const SET_ASIDE: &str = "set-aside.jsonl";
@@ -204,7 +205,7 @@ impl<D: Detail> Store<D> {
 
     /// Appends trials that are sent in a batch to the list of such trials.
     pub fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
-        let path = self.folder.join(BATCH).join(TRIALS);
+        let path = self.batch_trials_file();
         let records: Vec<Record<D>> = records
             .iter()
             .map(|record| self.recorded(record).into_owned())
@@ -361,7 +362,21 @@ impl<D: Detail> Store<D> {
 
     /// The trials that were sent in batches, without replies; a trial that was sent again is in the list again.
     pub fn batch_trials(&self) -> Result<Vec<Record<D>>> {
-        lines(&self.folder.join(BATCH).join(TRIALS)).map(|records| self.shown(records))
+        lines(&self.batch_trials_file()).map(|records| self.shown(records))
+    }
+
+    /// The keys of these trials.
+    pub fn batch_keys(&self) -> Result<BTreeSet<TrialKey>> {
+        let mut keys = BTreeSet::new();
+        each_line(&self.batch_trials_file(), |trial: StoredTrial| {
+            keys.insert(trial.key);
+        })?;
+        Ok(keys)
+    }
+
+    /// The file of these trials.
+    pub fn batch_trials_file(&self) -> PathBuf {
+        self.folder.join(BATCH).join(TRIALS)
     }
 
     /// The trials whose batch has no result yet: they have no reply, and were sent more often than they failed.
