@@ -396,6 +396,8 @@ mod tests {
             failed: 0,
         };
         assert_eq!(EndReason::Interrupted.status(all), Status::Complete);
+        // Truncated replies may be left to ask again.
+        assert_eq!(EndReason::OverBudget.status(all), Status::OverBudget);
         let some = Counts { answered: 1, ..all };
         assert_eq!(EndReason::Interrupted.status(some), Status::Cancelled);
         assert_eq!(EndReason::OverBudget.status(some), Status::OverBudget);

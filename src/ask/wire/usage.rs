@@ -163,6 +163,17 @@ mod tests {
     }
 
     #[test]
+    fn a_cache_larger_than_the_prompt_is_counted_apart() {
+        let prompt = |usage: Value| read(Some(&usage)).unwrap().prompt_tokens;
+        let large =
+            json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 2000});
+        assert_eq!(prompt(large), Some(2100));
+        let within =
+            json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 60});
+        assert_eq!(prompt(within), Some(100));
+    }
+
+    #[test]
     fn a_number_that_is_missing_follows_from_the_total() {
         let usage = read(Some(&json!({"prompt_tokens": 9, "total_tokens": 12}))).unwrap();
         assert_eq!(usage.completion_tokens, Some(3));

@@ -87,7 +87,7 @@ impl PromptBounds {
     /// The most tokens of a prompt.
     pub(crate) fn bound(&self, facts: PromptFacts<'_>) -> u64 {
         let by_length = by_length(facts) * self.excess_by_length;
-        let by_comparison = self.by_comparison(facts, AGREEING);
+        let by_comparison = self.by_comparison(facts);
         let by_comparison = by_comparison.map(|tokens| tokens * self.excess_by_comparison);
         by_comparison
             .map_or(by_length, |tokens| tokens.min(by_length))
@@ -101,7 +101,7 @@ impl PromptBounds {
         }
         let tokens = charged as f64;
         self.excess_by_length = self.excess_by_length.max(tokens / by_length(facts));
-        let by_comparison = self.by_comparison(facts, AGREEING);
+        let by_comparison = self.by_comparison(facts);
         let mut is_close = false;
         for one in self
             .references
@@ -128,12 +128,12 @@ impl PromptBounds {
         }
     }
 
-    /// The most tokens of a prompt, by the earlier prompt that is most like it, among those that this many later ones agree with; `None`
-    /// if none of them had images of these sizes.
-    fn by_comparison(&self, facts: PromptFacts<'_>, agreeing: usize) -> Option<f64> {
+    /// The most tokens of a prompt, by the earlier prompt that is most like it, among those that enough later ones agree with; `None` if
+    /// none of them had images of these sizes.
+    fn by_comparison(&self, facts: PromptFacts<'_>) -> Option<f64> {
         self.references
             .iter()
-            .filter(|one| one.sizes == facts.sizes && one.agreeing >= agreeing)
+            .filter(|one| one.sizes == facts.sizes && one.agreeing >= AGREEING)
             .map(|one| one.most_tokens(facts))
             .min_by(f64::total_cmp)
     }
