@@ -37,6 +37,12 @@ const CHUNK_HEAD: u64 = 28;
 /// The first bytes of a zstd frame (RFC 8878). No message begins with them: the first byte of CDR is 0.
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
+/// The problem of a bag in SQLite, with the remedy.
+pub(crate) const SQLITE_BAG: &str = "a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap";
+
+/// The problem of a file that is compressed as a whole, with the remedy.
+pub(crate) const COMPRESSED_FILE: &str = "compressed as a whole; unpack it first: zstd -d FILE";
+
 /// Opcodes of the records that are read.
 mod opcode {
     pub(super) const SCHEMA: u8 = 3;
@@ -485,10 +491,10 @@ fn not_mcap(start: &[u8]) -> String {
             .to_owned();
     }
     if start.starts_with(b"SQLite f") {
-        return "a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap".to_owned();
+        return SQLITE_BAG.to_owned();
     }
     if start.starts_with(&ZSTD_MAGIC) {
-        return "compressed as a whole; unpack it first: zstd -d FILE".to_owned();
+        return COMPRESSED_FILE.to_owned();
     }
     "not an MCAP file; a recording of ROS 2 or Foxglove that ends in .mcap expected".to_owned()
 }

@@ -30,7 +30,7 @@ pub(crate) use channel::{Channel, Content, camera_of};
 pub(crate) use encoding::Encoding;
 pub(crate) use exposure::Exposure;
 pub(crate) use image_message::{ImageMessage, MessageImage, stamp};
-pub(crate) use mcap::{Event, LARGEST_MESSAGE, McapReader, Message};
+pub(crate) use mcap::{COMPRESSED_FILE, Event, LARGEST_MESSAGE, McapReader, Message, SQLITE_BAG};
 pub(crate) use overview::{Overview, TopicOverview};
 pub(crate) use sampling::{Sampler, SamplingArgs};
 pub(crate) use stretches::{Place, Stretches, TopicClock};

@@ -7,7 +7,7 @@ use super::frame_writer::COPIED;
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, open};
 use crate::images::progress::Progress;
-use crate::import::recording::{McapReader, Overview};
+use crate::import::recording::{COMPRESSED_FILE, McapReader, Overview, SQLITE_BAG};
 use crate::picture::ImageFile;
 use crate::picture::reading_rule::ReadingRule;
 
@@ -50,9 +50,9 @@ fn no_mcap_inside(folder: &Path) -> Result<&'static str> {
             .any(|file| file.extension().is_some_and(|own| own == ending))
     };
     Ok(if has("db3") {
-        "a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap"
+        SQLITE_BAG
     } else if has("zstd") || has("zst") {
-        "its files are compressed as a whole; unpack them first: zstd -d FILE"
+        COMPRESSED_FILE
     } else {
         "no .mcap file in this folder"
     })

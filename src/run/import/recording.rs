@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use super::camera_facts::{Cameras, Exposures};
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
 use super::mcap_files::{bytes, files, overview, reader};
-use super::topic_list::{listing, no_images};
+use super::topic_list::{MAX_NAMED, listing, no_images};
 use crate::error::{Error, Result};
 use crate::images::progress::{Progress, StepBar};
 use crate::images::workers::{ThreadArgs, pool};
@@ -26,9 +26,6 @@ use crate::runs::Outcome;
 use crate::text::words::{counted, first_names};
 use crate::types::Decides;
 use crate::types::flags::positive;
-
-/// Number of topics that a message names.
-const MAX_NAMED: usize = 3;
 
 /// Bytes at the start of a message that hold its time.
 const STAMP: u64 = 64;

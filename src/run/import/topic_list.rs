@@ -9,7 +9,7 @@ use crate::runs::Outcome;
 use crate::text::words::{counted, first_names};
 
 /// Number of topics that a message names.
-const MAX_NAMED: usize = 3;
+pub(super) const MAX_NAMED: usize = 3;
 
 /// The list of the topics with images.
 pub(super) fn listing(file: &Path, overview: &Overview) -> Result<Outcome> {

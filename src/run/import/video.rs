@@ -70,8 +70,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     );
     let bar = progress.bar("seconds", duration as usize);
     let mut frames = video.frames(args.sampling.interval())?;
-    let (mut seen, mut passed, mut problem) = (0, 0, None);
-    let mut last = 0.0_f64;
+    let (mut seen, mut last, mut problem) = (0, 0.0_f64, None);
     loop {
         let frame = match frames.next() {
             Ok(Some(frame)) => frame,
@@ -84,10 +83,9 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         let at = stretches.place(&mut clock, frame.time, frame.time);
         let name = format!("{seen:06}");
         seen += 1;
+        let before = last as usize;
         last = last.max(seconds(frame.time));
-        let now = seconds(frame.time).max(0.0) as usize;
-        bar.advance(now.saturating_sub(passed));
-        passed = passed.max(now);
+        bar.advance(last as usize - before);
         let is_taken = sampler.is_due(at)
             && (!sampler.compares() || sampler.has_changed(Thumbnail::new(&frame.image)));
         if is_taken {
@@ -109,14 +107,10 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
             .damage()
             .map(|problem| format!("{place}: {problem}; its frames are kept")),
     };
-    if problem.is_none()
-        && let Some(early) = early_end(&video, last, args.sampling.interval())
-    {
-        tracing::warn!("{place}: {early}, or of which the last frame is shown for long");
-    }
     let is_whole = problem.is_none();
-    if let Some(problem) = problem {
-        tracing::warn!("{problem}");
+    let early = early_end(&video, last, args.sampling.interval());
+    if let Some(warning) = problem.or(early.map(|early| format!("{place}: {early}"))) {
+        tracing::warn!("{warning}");
     }
     let info = args.written.info("video", &drive);
     let scenes = writer.finish(&place, &info)?;
@@ -144,6 +138,8 @@ const END: f64 = 2.0;
 fn early_end(video: &Video, last: f64, interval: f64) -> Option<String> {
     let duration = video.duration?;
     (duration - last > interval + END).then(|| {
-        format!("the frames end at {last:.1} s of {duration:.1} s, as in a file that is cut off")
+        format!(
+            "the frames end at {last:.1} s of {duration:.1} s, as in a file that is cut off, or of which the last frame is shown for long"
+        )
     })
 }
