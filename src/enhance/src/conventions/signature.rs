@@ -6,7 +6,7 @@
 use super::convention::{Channels, TensorLayout};
 use super::sidecar::ModelSidecar;
 use crate::graphs::{Port, list};
-use crate::inputs::{ATTENTION, FurtherInput};
+use crate::inputs::{FurtherInput, is_map_or_noise};
 use crate::outputs::Output;
 
 /// Inputs and outputs of a graph, by their roles.
@@ -127,12 +127,7 @@ fn image_input<'a>(
     // If all but one lack a value, the message names the first of those.
     let Some(image) = images
         .iter()
-        .find(|port| {
-            let name = port.name.to_lowercase();
-            port.layout(channels.count()).is_some()
-                && !ATTENTION.iter().any(|word| name.contains(word))
-                && !(name == "z" || name.contains("noise"))
-        })
+        .find(|port| port.layout(channels.count()).is_some() && !is_map_or_noise(&port.name))
         .or(images.first())
         .copied()
     else {

@@ -299,8 +299,7 @@ fn missing(port: &Port, places: Option<Places>) -> String {
             "takes {port} in addition to the image, and its value is unknown; {beside} {line}"
         );
     };
-    let name = port.name.to_lowercase();
-    if ATTENTION.iter().any(|word| name.contains(word)) {
+    if is_map(&port.name.to_lowercase()) {
         return format!(
             "takes {port} in addition to the image, which seems to be made from it; {beside} an expression, as `{key} = {{ from = \"1 - max(image)\" }}`, with its authors' formula; a blur or a maximum over the image must be in the graph"
         );
@@ -317,7 +316,17 @@ fn missing(port: &Port, places: Option<Places>) -> String {
 }
 
 /// Words in the names of inputs that are made from the image.
-pub(crate) const ATTENTION: [&str; 4] = ["mask", "gray", "grey", "att"];
+const ATTENTION: [&str; 4] = ["mask", "gray", "grey", "att"];
+
+/// Whether an input has the name of a map that is made from the image, or of noise, and not that of the image.
+pub(crate) fn is_map_or_noise(name: &str) -> bool {
+    let name = name.to_lowercase();
+    is_map(&name) || name == "z" || name.contains("noise")
+}
+
+fn is_map(lower_case_name: &str) -> bool {
+    ATTENTION.iter().any(|word| lower_case_name.contains(word))
+}
 
 /// A name as a key of a TOML file, in quotes if needed.
 fn quoted(name: &str) -> String {

@@ -8,5 +8,5 @@ mod tensor;
 
 pub(super) use fed_image::{DarkImage, FedImage};
 pub(super) use feeding::Feeding;
-pub(super) use further_input::{ATTENTION, FurtherInput};
+pub(super) use further_input::{FurtherInput, is_map_or_noise};
 pub(super) use tensor::{Tensor, TensorData};

@@ -12,6 +12,9 @@ use darkqa_ground::types::Flaw;
 /// Number of dark frames that a model is tried on: with 6, none of 9 trained models was flagged; with one, 5 % were.
 pub const FRAMES: usize = 6;
 
+/// Placeholder for the output that is read, in the remedy for a flaw.
+pub(super) const OUTPUT: &str = "OUTPUT";
+
 /// The range in which a model is fed, and the one in which it is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RangePair {

@@ -2,7 +2,7 @@
 
 use super::findings::warn_of_untried;
 use super::plausible::Codes;
-use super::probe::{Conclusion, PairTrial, Probe, RangePair, Ranges};
+use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, RangePair, Ranges};
 use super::usage::{ImageUse, Implausible, Seen};
 use crate::conventions::sidecar::{self, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
@@ -62,7 +62,7 @@ impl Enhancer {
             (None, ..) => {}
         }
         if problem.is_none() && self.may_be_residual(probe.usual)? {
-            let name = in_expression(&self.graph().signature.outputs[0].port.name);
+            let name = self.read_output();
             self.remark(&format!(
                 "its output of a white image is nearly black, as if it had to be added to the input; if its authors add it, state in MODEL.onnx.toml beside it: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` draws both"
             ));
@@ -93,20 +93,25 @@ impl Enhancer {
             }
             _ => None,
         };
-        let name = match &self.graph().convention.image {
-            Some(image) => format!("({image})"),
-            None => in_expression(&self.graph().signature.outputs[0].port.name),
+        let Some(problem) = problem.or_else(|| probe.problem()) else {
+            return Ok(None);
         };
-        let problem = problem
-            .or_else(|| probe.problem())
-            .map(|problem| problem.replace("OUTPUT", &name));
+        let problem = problem.replace(OUTPUT, &self.read_output());
         let unread = self
             .graph()
             .unread_images()
             .map_or(String::new(), |unread| {
                 format!(". Perhaps another output is needed: {unread}")
             });
-        Ok(problem.map(|problem| sidecar::named(&(problem + &unread), self.path())))
+        Ok(Some(sidecar::named(&(problem + &unread), self.path())))
+    }
+
+    /// The output that is read, as a term of a sidecar's expression.
+    fn read_output(&self) -> String {
+        match &self.graph().convention.image {
+            Some(image) => format!("({image})"),
+            None => in_expression(&self.graph().signature.outputs[0].port.name),
+        }
     }
 
     /// Enhances a frame in a condition, and looks at the result; with what its note got from it.
