@@ -703,6 +703,43 @@ pub fn residual() -> Graph {
     after_enhancing(|graph| graph.node("Sub", &["enhanced", "input"], "output"))
 }
 
+/// What an authors' script subtracts from the image.
+pub fn subtracted() -> Graph {
+    after_enhancing(|graph| graph.node("Sub", &["input", "enhanced"], "output"))
+}
+
+/// What an authors' script multiplies the image with.
+pub fn gain_map() -> Graph {
+    after_enhancing(|graph| {
+        graph
+            .constant("black", &[], &[1e-3])
+            .node("Max", &["input", "black"], "lit")
+            .node("Div", &["enhanced", "lit"], "output")
+    })
+}
+
+/// What an authors' script divides the image by, bright for black, too.
+pub fn light_map() -> Graph {
+    after_enhancing(|graph| {
+        graph
+            .constant("black", &[], &[1e-2])
+            .node("Add", &["input", "black"], "above")
+            .node("Add", &["enhanced", "black"], "below")
+            .node("Div", &["above", "below"], "output")
+    })
+}
+
+/// An enhancer that gives the brightest channel three times.
+pub fn colourless() -> Graph {
+    let axes = [("axes", Attribute::Ints(&[1]))];
+    let axis = [("axis", Attribute::Int(1))];
+    after_enhancing(|graph| {
+        graph
+            .node_with("ReduceMax", &["enhanced"], "luma", &axes)
+            .node_with("Concat", &["luma", "luma", "luma"], "output", &axis)
+    })
+}
+
 /// An enhanced image, and a light map of its size.
 pub fn light_beside() -> Graph {
     let axes = [("axes", Attribute::Ints(&[1]))];
@@ -753,6 +790,36 @@ pub fn seven_channels() -> Graph {
         .node_with("ReduceMax", &["input"], "light", &axes)
         .node_with("Concat", &["input", "light", "input"], "x", &axis)
         .output("x", Type::Float, &image(7))
+}
+
+/// The image twice: six channels.
+pub fn six_channels() -> Graph {
+    let axis = [("axis", Attribute::Int(1))];
+    Graph::new()
+        .node_with("Concat", &["input", "input"], "x", &axis)
+        .output("x", Type::Float, &image(6))
+}
+
+/// The image `img` and a number, its loss, which is named as images are.
+pub fn loss_beside() -> Graph {
+    let axes = [
+        ("axes", Attribute::Ints(&[0, 1, 2, 3])),
+        ("keepdims", Attribute::Int(0)),
+    ];
+    Graph::new()
+        .node_with("ReduceMean", &["input"], "output", &axes)
+        .node("Identity", &["input"], "img")
+        .output("output", Type::Float, &[])
+        .output("img", Type::Float, &image(3))
+}
+
+/// The image and a text embedding, a further input whose size is not the image's.
+pub fn with_embedding() -> Graph {
+    Graph::new()
+        .input("text", Type::Float, &[Known(1), Known(77), Known(512)])
+        .node("ReduceMean", &["text"], "mean")
+        .node("Mul", &["input", "mean"], "output")
+        .giving_image()
 }
 
 /// The image times three numbers, a further input.

@@ -170,16 +170,20 @@ pub(crate) enum Normalisation {
     ImageNet,
     /// Mean 0.5, deviation 1: values of −0.5..0.5.
     Centred,
+    /// Mean and standard deviation of CLIP, as in its `clip.load` (<https://github.com/openai/CLIP>, `clip/clip.py`).
+    Clip,
 }
 
 impl Normalisation {
-    pub(crate) const ALL: [Self; 2] = [Self::ImageNet, Self::Centred];
-
     /// Mean and deviation of red, green and blue.
     pub(super) fn mean_and_std(self) -> [[f32; 3]; 2] {
         match self {
             Self::ImageNet => [[0.485, 0.456, 0.406], [0.229, 0.224, 0.225]],
             Self::Centred => [[0.5; 3], [1.0; 3]],
+            Self::Clip => [
+                [0.481_454_66, 0.457_827_5, 0.408_210_73],
+                [0.268_629_54, 0.261_302_6, 0.275_777_1],
+            ],
         }
     }
 }
@@ -192,6 +196,15 @@ pub(crate) enum ValueScale {
 }
 
 impl ValueScale {
+    pub(crate) const ALL: [Self; 6] = [
+        Self::Range(ValueRange::Unit),
+        Self::Range(ValueRange::Bytes),
+        Self::Range(ValueRange::Signed),
+        Self::Normalised(Normalisation::ImageNet),
+        Self::Normalised(Normalisation::Centred),
+        Self::Normalised(Normalisation::Clip),
+    ];
+
     /// The range that a mean and a deviation, if any, are applied to.
     pub(crate) fn range(self) -> ValueRange {
         match self {
@@ -215,6 +228,9 @@ impl fmt::Display for ValueScale {
             Self::Range(range) => range.fmt(f),
             Self::Normalised(Normalisation::ImageNet) => {
                 f.write_str("0..1 with the mean and std of ImageNet")
+            }
+            Self::Normalised(Normalisation::Clip) => {
+                f.write_str("0..1 with the mean and std of CLIP")
             }
             Self::Normalised(Normalisation::Centred) => f.write_str("-0.5..0.5 (mean 0.5, std 1)"),
         }

@@ -7,9 +7,11 @@ pub(super) mod preset;
 pub(super) mod sidecar;
 mod signature;
 
+#[cfg(test)]
+pub(super) use convention::Normalisation;
 pub(super) use convention::{
-    ChannelOrder, Channels, ElementType, LUMA, Normalisation, Padding, Rounding, TensorLayout,
-    Tile, ValueRange, ValueScale,
+    ChannelOrder, Channels, ElementType, LUMA, Padding, Rounding, TensorLayout, Tile, ValueRange,
+    ValueScale,
 };
 pub(super) use describe::Description;
 pub(super) use extra::{ExtraValue, NoiseStatement, Number};

@@ -5,17 +5,12 @@ use std::path::{Path, PathBuf};
 use super::Enhancer;
 use crate::conventions::sidecar::{self, ModelSidecar};
 use crate::conventions::{Channels, ElementType, ValueRange, ValueScale};
-use crate::graphs::{Graph, RunResult};
-use crate::planes::Planes;
+use crate::graphs::Graph;
 use crate::probes::{RangePair, Usage};
 use crate::sizing::TakenSizes;
 use darkqa_ground::error::Result;
+use darkqa_ground::types::SizeLog;
 use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
-use darkqa_ground::types::{Rgb, SizeLog};
-
-/// Maximum mean output for a white image, in 0..1, at which the output may be a residual. Chosen: models that return the image itself
-/// exceed 0.9.
-const MAX_RESIDUAL_MEAN: f64 = 0.25;
 
 impl Enhancer {
     /// Path of the model file; for a built-in enhancer, the name that messages show.
@@ -125,42 +120,6 @@ impl Enhancer {
         for remark in &self.description.remarks {
             tracing::warn!("{}: {remark}", self.name);
         }
-    }
-
-    /// True if the output may be a residual, to be added to the input: in these ranges, the output for a white image is nearly black.
-    ///
-    /// # Errors
-    /// If the runtime fails.
-    pub(crate) fn may_be_residual(&self, ranges: RangePair) -> Result<bool> {
-        let convention = self.convention();
-        let output = &self.graph.signature.outputs[0];
-        let has_expression = convention.image.is_some();
-        if has_expression || output.slice.is_some() || convention.channels == Some(Channels::Y) {
-            return Ok(false);
-        }
-        let convention = convention.clone().fed(ranges.input).read(ranges.output);
-        let graph = self
-            .graph
-            .with_convention(convention)
-            .map_err(|problem| self.fault(problem))?;
-        let [height, width] = self.probe_size([96, 144]);
-        // Black at the left, so that models that stretch an image to its darkest and brightest pixel do so.
-        let mut white = Rgb::black(height, width);
-        for row in white.samples_mut().chunks_exact_mut(3 * width) {
-            row[3 * (width / 4)..].fill(u8::MAX);
-        }
-        graph.restart_clock();
-        let RunResult::Output(planes) = graph.planes(&Planes::from_rgb(&white))? else {
-            return Ok(false);
-        };
-        let right: Vec<f64> = planes
-            .samples
-            .chunks_exact(width)
-            .flat_map(|row| &row[width / 2..])
-            .map(|sample| f64::from(*sample))
-            .collect();
-        let mean = right.iter().sum::<f64>() / right.len().max(1) as f64;
-        Ok(mean <= MAX_RESIDUAL_MEAN)
     }
 
     /// Height and width of a probe frame: the given size, filled up to the model's multiple, or the size that the model fixes.

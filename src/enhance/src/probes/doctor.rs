@@ -6,14 +6,15 @@ mod proposal;
 
 use std::collections::BTreeSet;
 
+use super::expressions::{ExpressionTrial, OutputKind};
 use super::plausible::{Codes, Facts};
-use super::probe::{PairTrial, Probe, RangePair};
+use super::probe::{PairTrial, Probe};
 use super::probe_run::{Trials, made};
+use super::range_pair::RangePair;
 use crate::conventions::sidecar::{ModelSidecar, OutputChoice};
-use crate::conventions::{ChannelOrder, ValueScale};
+use crate::conventions::{ChannelOrder, ValueRange, ValueScale};
 use crate::enhancer::Enhancer;
 use crate::graphs::Port;
-use crate::outputs::in_expression;
 use crate::sizing::TakenSizes;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
@@ -102,13 +103,26 @@ impl Enhancer {
         if image == ImageOutput::Known {
             found.mention(&plausible);
         }
-        if image == ImageOutput::Known && self.may_be_residual(probe.best())? {
-            let sums = self.sums(&frames, probe.best())?;
-            if sums.iter().any(|sum| sum.problem.is_none()) {
-                found.settled = Settled::No;
-                found.conclusion += " Its output of a white image is nearly black, so it may have to be added to the input; both are possible and are drawn below.";
+        if image == ImageOutput::Known {
+            let kind = self.kind_by_endpoints(probe.best())?;
+            if kind.is_some() || found.lines.is_empty() && probe.plausible().is_empty() {
+                let expressions = self.expressions(dark)?;
+                if !expressions.is_empty() {
+                    found.settled = Settled::No;
+                    found.conclusion += match kind {
+                        Some(OutputKind::Residual) => {
+                            " Its output of a white image is nearly black, so it may have to be added to the input; the possible expressions are drawn below."
+                        }
+                        Some(OutputKind::Map) => {
+                            " Its output of a black image is nearly as bright as that of a white one, so it may be a light map; the possible expressions are drawn below."
+                        }
+                        None => {
+                            " Its authors may make the image of input and output; the plausible expressions are drawn below."
+                        }
+                    };
+                }
+                others.extend(expressions);
             }
-            others.extend(sums);
         }
         let convention = self.convention();
         let is_stated = convention.color.is_some()
@@ -209,28 +223,17 @@ impl Enhancer {
         Some(ProposedLine { line, reason })
     }
 
-    /// The sum of the input and of the output that is read.
-    fn sums(&self, frames: &[Rgb], ranges: RangePair) -> Result<Vec<ExaminedConvention>> {
-        let name = &self.graph().signature.outputs[0].port.name;
-        let text = format!("input + {}", in_expression(name));
-        let convention = ModelSidecar {
-            output: None,
-            image: Some(
-                text.parse()
-                    .map_err(|problem: String| self.fault(problem))?,
-            ),
-            ..self.convention().clone()
-        };
-        let convention = convention.fed(ranges.input).read(ranges.output);
-        let graph = self.graph().with_convention(convention);
-        let graph = graph.map_err(|problem| self.fault(problem))?;
-        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
-        let made = made(&[graph], frames)?.unwrap_or_default();
-        Ok(made
+    /// The plausible images that are made of input and output.
+    fn expressions(&self, dark: &[Rgb]) -> Result<Vec<ExaminedConvention>> {
+        let ranges = self
+            .stated_ranges()
+            .map(|range| range.unwrap_or(ValueRange::Unit));
+        let trials = self.expression_trials(dark, ranges)?;
+        Ok(trials
             .into_iter()
-            .map(|made| {
-                let pair = PairTrial::new(ranges, &seen, made);
-                column(&pair, format!("image = \"{text}\", {ranges}"))
+            .filter(|trial| trial.pair.is_clean())
+            .map(|ExpressionTrial { text, pair, .. }| {
+                column(&pair, format!("image = \"{text}\", {}", pair.ranges))
             })
             .collect())
     }

@@ -1,10 +1,13 @@
 //! Probes of a model on dark frames, and judgement of its images.
 
 mod doctor;
+mod endpoints;
+mod expressions;
 mod findings;
 mod plausible;
 mod probe;
 mod probe_run;
+mod range_pair;
 mod usage;
 
 pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
@@ -12,5 +15,5 @@ pub use findings::Findings;
 pub(super) use plausible::Codes;
 pub use plausible::{DARK, brightness};
 pub use probe::FRAMES;
-pub(super) use probe::RangePair;
+pub(super) use range_pair::RangePair;
 pub use usage::{ImageUse, Implausible, Usage};

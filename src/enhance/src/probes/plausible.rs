@@ -21,6 +21,10 @@ const DARKEST_SHARE: f64 = 0.01;
 /// How much nearer to the mean the darkest pixels must be than in the dark frame, as a ratio, for a haze. Codes of light that is dimmed
 /// keep their ratios, as their curve is nearly a power. Chosen: noise moves the ratio less.
 const LIFTED: f64 = 1.5;
+/// Mean difference of the channels of blocks, in codes, above which a dark frame has colours, and below which an output has none. Chosen:
+/// noise of single pixels does not reach the first, and only three equal channels stay below the second.
+const COLOURED: f64 = 1.0;
+const GREY: f64 = 0.1;
 /// Side of the blocks whose means are compared, in pixels; chosen, so that noise is averaged out.
 const BLOCK: usize = 4;
 
@@ -57,6 +61,7 @@ impl fmt::Display for Verdict {
             Flaw::Inverted => write!(f, "rank correlation {figure:.2}"),
             Flaw::Shuffled => write!(f, "{figure:.2} of the edges agree, 1 at best"),
             Flaw::Hue => write!(f, "cosine {figure:.2}"),
+            Flaw::Grey => write!(f, "channels differ by {figure:.1} of 255"),
             Flaw::Haze => write!(f, "99 % of the pixels are above {figure:.0} of 255"),
         }?;
         f.write_str(")")
@@ -185,9 +190,9 @@ impl Codes {
         }
     }
 
-    /// Red less blue of each block, relative to its light; 3 codes keep black blocks from counting.
-    fn warmth(&self) -> Vec<f64> {
-        let channels = [0, 1, 2].map(|channel| {
+    /// Means of red, green and blue of each block, in codes.
+    fn channel_blocks(&self) -> [Vec<f64>; 3] {
+        [0, 1, 2].map(|channel| {
             let samples = self
                 .samples
                 .iter()
@@ -197,13 +202,29 @@ impl Codes {
                 .collect();
             let width = self.width;
             Plane { width, samples }.blocks().samples
-        });
-        let [red, green, blue] = &channels;
+        })
+    }
+
+    /// Red less blue of each block, relative to its light; 3 codes keep black blocks from counting.
+    fn warmth(&self) -> Vec<f64> {
+        let [red, green, blue] = self.channel_blocks();
         red.iter()
-            .zip(green)
-            .zip(blue)
+            .zip(&green)
+            .zip(&blue)
             .map(|((red, green), blue)| (red - blue) / (red + green + blue + 3.0))
             .collect()
+    }
+
+    /// Mean difference between the largest and the smallest channel of the blocks, in codes.
+    fn colour(&self) -> f64 {
+        let [red, green, blue] = self.channel_blocks();
+        let differences: Vec<f64> = red
+            .iter()
+            .zip(&green)
+            .zip(&blue)
+            .map(|((red, green), blue)| red.max(*green).max(*blue) - red.min(*green).min(*blue))
+            .collect();
+        mean(&differences)
     }
 }
 
@@ -279,6 +300,10 @@ pub(super) fn judge(dark: &Codes, made: &Codes) -> Option<Verdict> {
     let cosine = product(&was, &is) / (strength * product(&is, &is)).sqrt();
     if (strength / was.len() as f64).sqrt() > 0.06 && cosine < -0.25 {
         return impossible(Flaw::Hue, cosine);
+    }
+    let [was, is] = [dark, made].map(Codes::colour);
+    if was > COLOURED && is < GREY {
+        return doubtful(Flaw::Grey, is);
     }
     let darkest = percentile(&after.samples, DARKEST_SHARE);
     // A pale room has no dark pixel either: in its dark frame, too, the darkest pixels are near to the mean.

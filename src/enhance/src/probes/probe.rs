@@ -5,8 +5,9 @@
 
 use std::fmt;
 
+use super::endpoints::Endpoints;
 use super::plausible::{Codes, Gravity, Verdict, judge};
-use crate::conventions::{Normalisation, ValueRange, ValueScale};
+use super::range_pair::RangePair;
 use darkqa_ground::types::Flaw;
 
 /// Number of dark frames that a model is tried on: with 6, none of 9 trained models was flagged; with one, 5 % were.
@@ -15,73 +16,12 @@ pub const FRAMES: usize = 6;
 /// Placeholder for the output that is read, in the remedy for a flaw.
 pub(super) const OUTPUT: &str = "OUTPUT";
 
-/// The range in which a model is fed, and the one in which it is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct RangePair {
-    pub(crate) input: ValueScale,
-    pub(crate) output: ValueScale,
-}
+/// Largest distance of black and white from themselves, in codes, at which a pair with a mean and a deviation is advised. Chosen: trained
+/// models are at most 20 off in their true ranges.
+const NEAR: f64 = 50.0;
 
-impl RangePair {
-    /// The pairs with these ranges; `None` stands for each range in turn.
-    pub(super) fn all(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
-        let of = |stated: Option<ValueRange>| {
-            ValueRange::ALL
-                .into_iter()
-                .filter(move |range| stated.is_none_or(|stated| stated == *range))
-                .map(ValueScale::Range)
-        };
-        of(input)
-            .flat_map(|input| of(output).map(move |output| Self { input, output }))
-            .collect()
-    }
-
-    /// The pairs with an input that has a mean and a deviation; the output is in 0..1, or has them too, unless its range is stated.
-    pub(super) fn normalised(output: Option<ValueRange>) -> Vec<Self> {
-        Normalisation::ALL
-            .into_iter()
-            .flat_map(|normalisation| {
-                let input = ValueScale::Normalised(normalisation);
-                let outputs = match output {
-                    Some(range) => vec![ValueScale::Range(range)],
-                    None => vec![ValueScale::Range(ValueRange::Unit), input],
-                };
-                outputs
-                    .into_iter()
-                    .map(move |output| Self { input, output })
-            })
-            .collect()
-    }
-
-    /// The lines of a sidecar that state it.
-    pub(super) fn lines(self) -> Vec<String> {
-        let side = |scale: ValueScale, keys: [&str; 3]| match scale.mean_and_std() {
-            None => vec![format!("{} = \"{}\"", keys[0], scale.range())],
-            Some([mean, std]) => vec![
-                format!("{} = {mean:?}", keys[1]),
-                format!("{} = {std:?}", keys[2]),
-            ],
-        };
-        let mut lines = side(self.input, ["range_in", "mean", "std"]);
-        lines.extend(side(self.output, ["range_out", "mean_out", "std_out"]));
-        lines
-    }
-
-    /// These lines in a sentence.
-    fn stated(self) -> String {
-        self.lines()
-            .into_iter()
-            .map(|line| format!("`{line}`"))
-            .collect::<Vec<_>>()
-            .join(" and ")
-    }
-}
-
-impl fmt::Display for RangePair {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} in and {} out", self.input, self.output)
-    }
-}
+/// By how many codes black and white must be nearer to themselves with one pair than with the next for it to be advised alone. Chosen.
+const CLEAR: f64 = 25.0;
 
 /// A model's images of the dark frames, with one pair of ranges.
 #[derive(Debug, Clone)]
@@ -91,6 +31,8 @@ pub(super) struct PairTrial {
     pub(super) made: Vec<Codes>,
     /// Flaw of each output.
     pub(super) verdicts: Vec<Option<Verdict>>,
+    /// Output for black and white; `None` if it was not measured.
+    pub(super) endpoints: Option<Endpoints>,
 }
 
 impl PairTrial {
@@ -100,12 +42,40 @@ impl PairTrial {
             ranges,
             verdicts: verdicts.collect(),
             made,
+            endpoints: None,
         }
     }
 
     /// Whether no frame has a flaw.
-    fn is_clean(&self) -> bool {
+    pub(super) fn is_clean(&self) -> bool {
         self.verdicts.iter().all(Option::is_none)
+    }
+
+    /// Distance of black and white from themselves, in codes; infinite if it was not measured.
+    pub(super) fn distance(&self) -> f64 {
+        self.endpoints
+            .map_or(f64::INFINITY, |endpoints| endpoints.distance)
+    }
+
+    /// Whether black and white stay near to themselves.
+    pub(super) fn is_near(&self) -> bool {
+        self.distance() <= NEAR
+    }
+
+    /// The ranges, and what black and white become with them, if it was measured.
+    fn words(&self) -> String {
+        match self.endpoints {
+            None => self.ranges.to_string(),
+            Some(Endpoints { black, white, .. }) => format!(
+                "{} (black becomes {black:.0} of 255, white {white:.0}{})",
+                self.ranges,
+                if self.is_near() {
+                    ""
+                } else {
+                    ", so it may be another range"
+                }
+            ),
+        }
     }
 
     /// The verdict on the model: the most frequent flaw, if at least half of the frames have one.
@@ -193,9 +163,9 @@ pub(super) enum Conclusion {
     Doubtful(FlawedFrames),
     /// The ranges are stated or all were tried, and the images cannot be enhanced images.
     Implausible(FlawedFrames),
-    /// Only these ranges give plausible images, and they are not the usual ones.
+    /// Only these ranges give plausible images, or they keep black and white nearest to themselves, and they are not the usual ones.
     Other(RangePair, FlawedFrames),
-    /// Several pairs of ranges give plausible images, but not the usual ones.
+    /// Several pairs of ranges give plausible images, the likely ones first, but not the usual ones.
     Several(Vec<RangePair>, FlawedFrames),
 }
 
@@ -211,7 +181,7 @@ impl Probe {
 
     /// Draws the conclusion.
     pub(super) fn conclusion(&self) -> Conclusion {
-        let usual = self.pairs.iter().find(|pair| pair.ranges == self.usual);
+        let usual = self.usual_pair();
         let advised = self.advised();
         let seen = usual.and_then(|usual| {
             // With a flaw on some frames, other than dim images, it gives way to a pair without any.
@@ -221,25 +191,53 @@ impl Probe {
             });
             usual.verdict().or(mixed)
         });
-        match (self.ranges, seen, advised.as_slice()) {
-            (Ranges::Stated, None, _) => Conclusion::Plausible,
-            (_, None, _) => Conclusion::Assumed,
-            (Ranges::Stated, Some(seen), _) if seen.gravity == Gravity::Doubtful => {
+        match (self.ranges, seen) {
+            (Ranges::Stated, None) => Conclusion::Plausible,
+            (_, None) => Conclusion::Assumed,
+            (Ranges::Stated, Some(seen)) if seen.gravity == Gravity::Doubtful => {
                 Conclusion::Doubtful(seen)
             }
-            (_, Some(seen), []) | (Ranges::Stated, Some(seen), _) => Conclusion::Implausible(seen),
-            (_, Some(seen), [other]) => Conclusion::Other(*other, seen),
-            (_, Some(seen), several) => Conclusion::Several(several.to_vec(), seen),
+            (Ranges::Stated, Some(seen)) => Conclusion::Implausible(seen),
+            (_, Some(seen)) => match (clear_first(&advised), advised.as_slice()) {
+                (Some(first), _) => Conclusion::Other(first.ranges, seen),
+                (None, []) => Conclusion::Implausible(seen),
+                (None, several) => {
+                    Conclusion::Several(several.iter().map(|pair| pair.ranges).collect(), seen)
+                }
+            },
         }
     }
 
+    /// The usual pair; `None` if it was not tried.
+    pub(super) fn usual_pair(&self) -> Option<&PairTrial> {
+        self.pairs.iter().find(|pair| pair.ranges == self.usual)
+    }
+
     /// The pairs that may be advised in place of the usual one: those whose images of all frames are plausible.
-    fn advised(&self) -> Vec<RangePair> {
+    fn advised(&self) -> Vec<&PairTrial> {
         self.pairs
             .iter()
             .filter(|pair| pair.ranges != self.usual && pair.is_clean())
-            .map(|pair| pair.ranges)
             .collect()
+    }
+
+    /// The plausible pair that black and white point to; `None` if several are as likely.
+    pub(super) fn likeliest(&self) -> Option<RangePair> {
+        let plausible: Vec<&PairTrial> = self
+            .pairs
+            .iter()
+            .filter(|pair| pair.verdict().is_none())
+            .collect();
+        clear_first(&plausible).map(|pair| pair.ranges)
+    }
+
+    /// Puts the pairs first with which black and white stay nearest to themselves, and removes those with a mean and a deviation with
+    /// which they do not.
+    pub(super) fn rank(&mut self) {
+        self.pairs
+            .retain(|pair| pair.ranges.is_plain() || pair.is_near());
+        self.pairs
+            .sort_by(|a, b| a.distance().total_cmp(&b.distance()));
     }
 
     /// Leaves out pairs that are plausible on most frames, but not on all.
@@ -279,12 +277,13 @@ impl Probe {
                 format!("{seen}. {}", self.remedy(&seen))
             }
             Conclusion::Other(pair, seen) => format!(
-                "{seen}. {}With {pair} they can be enhanced images; if its authors use these values, state in MODEL.onnx.toml beside it: {}",
+                "{seen}. {}With {} they can be enhanced images; if its authors use these values, state in MODEL.onnx.toml beside it: {}",
                 dim(&seen),
+                self.words(pair),
                 pair.stated()
             ),
             Conclusion::Several(pairs, seen) => {
-                let list: Vec<String> = pairs.iter().map(ToString::to_string).collect();
+                let list: Vec<String> = pairs.iter().map(|pair| self.words(*pair)).collect();
                 format!(
                     "{seen}. {}With other value ranges they can be enhanced images ({}); state those that its authors use in MODEL.onnx.toml beside it, as {}",
                     dim(&seen),
@@ -295,6 +294,14 @@ impl Probe {
         })
     }
 
+    /// A pair, and what black and white become with it.
+    fn words(&self, ranges: RangePair) -> String {
+        self.pairs
+            .iter()
+            .find(|pair| pair.ranges == ranges)
+            .map_or_else(|| ranges.to_string(), PairTrial::words)
+    }
+
     /// Remedy for a flaw that no other range explains.
     fn remedy(&self, seen: &FlawedFrames) -> String {
         match (seen.example.flaw, self.ranges) {
@@ -303,9 +310,21 @@ impl Probe {
                 self.usual.stated()
             ),
             (Flaw::White | Flaw::Haze, Ranges::Open | Ranges::OneStated) => {
-                "Its values are none of 0..1, 0..255 and -1..1, with and without the mean and std of ImageNet; take those of its authors' code, `range_in`, `mean`, `std` and `range_out`, into MODEL.onnx.toml beside it".to_owned()
+                "Its values are none of 0..1, 0..255, -1..1, -0.5..0.5 and those with the mean and std of ImageNet or CLIP; take those of its authors' code, `range_in`, `mean`, `std` and `range_out`, into MODEL.onnx.toml beside it".to_owned()
             }
             (flaw, ranges) => remedy(flaw, ranges).to_owned(),
+        }
+    }
+}
+
+/// The first of ranked pairs if it is the only one, or if black and white are clearly nearer to themselves with it than with the second.
+fn clear_first<'p>(ranked: &[&'p PairTrial]) -> Option<&'p PairTrial> {
+    match ranked {
+        [] => None,
+        [only] => Some(only),
+        [first, second, ..] => {
+            let is_clear = first.is_near() && first.distance() + CLEAR <= second.distance();
+            is_clear.then_some(*first)
         }
     }
 }
@@ -314,10 +333,13 @@ impl Probe {
 fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
     match (flaw, ranges) {
         (Flaw::Hue, _) => {
-            "If its output has blue first, state in MODEL.onnx.toml beside it: `color_out = \"bgr\"` (or \"rgb\", if that is stated)"
+            "If its output has blue first, state in MODEL.onnx.toml beside it: `color_out = \"bgr\"` (or \"rgb\", if that is stated); if its input has, `color = \"bgr\"` and `color_out = \"rgb\"`"
         }
         (Flaw::Inverted, _) => {
             "Perhaps another output is the image, or its authors subtract it from white: `image = \"1 - OUTPUT\"`, or divide the input by it: `image = \"input / OUTPUT\"`, in MODEL.onnx.toml beside it"
+        }
+        (Flaw::Grey, _) => {
+            "Perhaps it is a light map, which its authors divide by: `image = \"clip(input / OUTPUT, 0, 1)\"`, or the luma alone, in MODEL.onnx.toml beside it"
         }
         (Flaw::Shuffled, _) => {
             "Perhaps another output is the image, or the dimensions have another order: `layout_in`, `layout_out` and `output` in MODEL.onnx.toml beside it"
@@ -333,7 +355,7 @@ fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
             "Beside the one range that its sidecar states, or its element type, no other explains that: without a line in the sidecar all are tried"
         }
         (_, Ranges::Open) => {
-            "No value range explains that; perhaps another output is the image, or the export has lost its weights"
+            "No value range explains that (0..1, 0..255, -1..1, -0.5..0.5, ImageNet's and CLIP's mean and std); perhaps its authors use another `mean` and `std`, another output is the image, or the export has lost its weights"
         }
     }
 }
@@ -341,6 +363,7 @@ fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::conventions::{Normalisation, ValueRange, ValueScale};
 
     const UNIT: RangePair = RangePair {
         input: ValueScale::Range(ValueRange::Unit),
@@ -361,6 +384,20 @@ mod tests {
             ranges,
             made: Vec::new(),
             verdicts: flaws.iter().map(|flaw| flaw.map(verdict)).collect(),
+            endpoints: None,
+        }
+    }
+
+    /// A plausible pair with black and white so far from themselves, in codes.
+    fn far(ranges: RangePair, distance: f64) -> PairTrial {
+        let endpoints = Endpoints {
+            black: distance,
+            white: 255.0,
+            distance,
+        };
+        PairTrial {
+            endpoints: Some(endpoints),
+            ..pair(ranges, &[None; 6])
         }
     }
 
@@ -445,18 +482,47 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_and_a_deviation_are_lines_of_a_sidecar() {
-        let pairs = RangePair::normalised(None);
-        assert_eq!(pairs.len(), 4);
-        assert_eq!(
-            pairs[0].lines(),
-            [
-                "mean = [0.485, 0.456, 0.406]",
-                "std = [0.229, 0.224, 0.225]",
-                "range_out = \"0..1\""
-            ]
-        );
-        assert_eq!(pairs[3].lines()[2], "mean_out = [0.5, 0.5, 0.5]");
+    fn black_and_white_choose_among_plausible_pairs() {
+        let signed = RangePair {
+            input: UNIT.input,
+            output: ValueScale::Range(ValueRange::Signed),
+        };
+        let ranked = |first: f64, second: f64| {
+            let pairs = vec![
+                pair(UNIT, &[FLAT; 6]),
+                far(signed, second),
+                far(BYTES, first),
+            ];
+            let mut probe = probe(Ranges::Open, pairs);
+            probe.rank();
+            probe.conclusion()
+        };
+        assert!(matches!(ranked(2.0, 120.0), Conclusion::Other(BYTES, _)));
+        let Conclusion::Several(pairs, _) = ranked(2.0, 9.0) else {
+            panic!("nearly as near");
+        };
+        assert_eq!(pairs, [BYTES, signed]);
+        let Conclusion::Several(..) = ranked(90.0, 200.0) else {
+            panic!("none is near");
+        };
+    }
+
+    #[test]
+    fn a_normalised_pair_needs_black_and_white() {
+        let clip = RangePair {
+            input: ValueScale::Normalised(Normalisation::Clip),
+            output: UNIT.output,
+        };
+        let conclusion = |distance: f64| {
+            let mut probe = probe(
+                Ranges::Open,
+                vec![pair(UNIT, &[FLAT; 6]), far(clip, distance)],
+            );
+            probe.rank();
+            probe.conclusion()
+        };
+        assert!(matches!(conclusion(10.0), Conclusion::Other(pair, _) if pair == clip));
+        assert!(matches!(conclusion(60.0), Conclusion::Implausible(_)));
     }
 
     #[test]
@@ -490,13 +556,5 @@ mod tests {
             vec![pair(UNIT, &[WHITE, WHITE, WHITE, FLAT, FLAT, FLAT])],
         );
         assert!(matches!(mixed.conclusion(), Conclusion::Implausible(_)));
-    }
-
-    #[test]
-    fn only_ranges_that_are_not_stated_are_tried() {
-        assert_eq!(RangePair::all(None, None).len(), 9);
-        assert_eq!(RangePair::all(Some(ValueRange::Signed), None).len(), 3);
-        let stated = RangePair::all(Some(ValueRange::Unit), Some(ValueRange::Unit));
-        assert_eq!(stated, [UNIT]);
     }
 }

@@ -2,7 +2,8 @@
 
 use super::findings::warn_of_untried;
 use super::plausible::Codes;
-use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, RangePair, Ranges};
+use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, Ranges};
+use super::range_pair::RangePair;
 use super::usage::{ImageUse, Implausible, Seen};
 use crate::conventions::sidecar::{self, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
@@ -61,11 +62,14 @@ impl Enhancer {
             (Some(problem), ..) => tracing::warn!("{}: {problem}", self.name()),
             (None, ..) => {}
         }
-        if problem.is_none() && self.may_be_residual(probe.usual)? {
-            let name = self.read_output();
-            self.remark(&format!(
-                "its output of a white image is nearly black, as if it had to be added to the input; if its authors add it, state in MODEL.onnx.toml beside it: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` draws both"
-            ));
+        if problem.is_none() {
+            let remark = match self.remark_on_endpoints(probe.usual)? {
+                None => self.remark_on_name(),
+                remark => remark,
+            };
+            if let Some(remark) = remark {
+                self.remark(&remark);
+            }
         }
         self.warn_of_remarks();
         if probe.conclusion() == Conclusion::Assumed {
@@ -88,7 +92,10 @@ impl Enhancer {
             Conclusion::Implausible(seen) | Conclusion::Doubtful(seen)
                 if !self.follows_preset() =>
             {
-                let better = self.better_lines(dark)?;
+                let better = match self.better_lines(dark)? {
+                    None => self.better_expression(dark, seen.example.flaw)?,
+                    lines => lines,
+                };
                 better.map(|better| format!("{seen}. {better}"))
             }
             _ => None,
@@ -158,7 +165,8 @@ impl Enhancer {
     }
 
     /// Runs the model on dark frames by each of these conventions, which differ in how the output is read, and with each pair of ranges
-    /// that is not stated. The model runs once for each frame and input range. Returns `None` if it fails at all sizes that are tried.
+    /// that is not stated. Where the usual pair is implausible, pairs with a mean and a deviation are tried too, and all are ranked by the
+    /// output for black and white. Returns `None` if the model fails at all sizes that are tried.
     pub(super) fn trials<const N: usize>(
         &self,
         dark: &[Rgb],
@@ -171,59 +179,86 @@ impl Enhancer {
             (None, None) => Ranges::Open,
             _ => Ranges::OneStated,
         };
-        'sizes: for size in SIZES {
+        for size in SIZES {
             let frames: Vec<Rgb> = dark
                 .iter()
                 .map(|frame| self.probe_image(frame, size))
                 .collect::<Result<_>>()?;
-            let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
-            let mut pairs = [(); N].map(|()| Vec::new());
-            for fed_alike in RangePair::all(input, output).chunk_by(|a, b| a.input == b.input) {
-                let graphs: Vec<Graph> = conventions
-                    .iter()
-                    .flat_map(|convention| {
-                        fed_alike
-                            .iter()
-                            .map(|ranges| self.read_by(convention, *ranges))
-                    })
-                    .collect::<Result<_>>()?;
-                // A failure in one range does not predict failure in the others at this size.
-                let Some(made) = made(&graphs, &frames)? else {
-                    continue 'sizes;
-                };
-                let mut made = made.into_iter();
-                for pairs in &mut pairs {
-                    let trials = fed_alike.iter().zip(&mut made);
-                    pairs.extend(trials.map(|(ranges, made)| PairTrial::new(*ranges, &seen, made)));
-                }
-            }
-            if !pairs[0].iter().any(|pair| pair.verdict().is_none())
-                && self.may_be_normalised(input)
-            {
-                for pair in RangePair::normalised(output) {
-                    let graphs: Vec<Graph> = conventions
-                        .iter()
-                        .map(|convention| self.read_by(convention, pair))
-                        .collect::<Result<_>>()?;
-                    // The sizes are those of the plain ranges, so what fails here is no reason to try others.
-                    let made = made(&graphs, &frames)?.unwrap_or_default();
-                    for (pairs, made) in pairs.iter_mut().zip(made) {
-                        pairs.push(PairTrial::new(pair, &seen, made));
-                    }
-                }
-            }
-            let probes = pairs.map(|pairs| Probe {
+            let plain = RangePair::plain(input, output);
+            // A failure in one range does not predict failure in the others at this size.
+            let Some(pairs) = self.pair_trials(&frames, conventions, &plain)? else {
+                continue;
+            };
+            let mut probes = pairs.map(|pairs| Probe {
                 ranges,
                 usual,
                 pairs,
             });
+            let usual_pair = probes[0].usual_pair();
+            if usual_pair.is_none_or(|pair| pair.verdict().is_some()) {
+                if self.may_be_normalised(input) {
+                    let pairs = RangePair::normalised(input, output);
+                    for fed_alike in pairs.chunk_by(|a, b| a.input == b.input) {
+                        // The sizes are those of the plain ranges, so what fails here is no reason to try others.
+                        let more = self.pair_trials(&frames, conventions, fed_alike)?;
+                        for (probe, pairs) in probes.iter_mut().zip(more.into_iter().flatten()) {
+                            probe.pairs.extend(pairs);
+                        }
+                    }
+                }
+                for (probe, convention) in probes.iter_mut().zip(conventions) {
+                    self.rank(probe, convention)?;
+                }
+            }
             return Ok(Some(Trials { frames, probes }));
         }
         Ok(None)
     }
 
+    /// Images of the frames by each of these conventions, with each pair of ranges. The model runs once for each frame and input range.
+    /// Returns `None` if it fails on a frame.
+    fn pair_trials<const N: usize>(
+        &self,
+        frames: &[Rgb],
+        conventions: [&ModelSidecar; N],
+        ranges: &[RangePair],
+    ) -> Result<Option<[Vec<PairTrial>; N]>> {
+        let seen: Vec<Codes> = frames.iter().map(Codes::from_rgb).collect();
+        let mut pairs = [(); N].map(|()| Vec::new());
+        for fed_alike in ranges.chunk_by(|a, b| a.input == b.input) {
+            let graphs: Vec<Graph> = conventions
+                .iter()
+                .flat_map(|convention| {
+                    fed_alike
+                        .iter()
+                        .map(|ranges| self.read_by(convention, *ranges))
+                })
+                .collect::<Result<_>>()?;
+            let Some(made) = made(&graphs, frames)? else {
+                return Ok(None);
+            };
+            let mut made = made.into_iter();
+            for pairs in &mut pairs {
+                let trials = fed_alike.iter().zip(&mut made);
+                pairs.extend(trials.map(|(ranges, made)| PairTrial::new(*ranges, &seen, made)));
+            }
+        }
+        Ok(Some(pairs))
+    }
+
+    /// Ranks the pairs of a probe by the output for black and white, which is measured for the plausible ones.
+    fn rank(&self, probe: &mut Probe, convention: &ModelSidecar) -> Result<()> {
+        for pair in &mut probe.pairs {
+            if pair.verdict().is_none() {
+                pair.endpoints = self.endpoints(convention, pair.ranges)?;
+            }
+        }
+        probe.rank();
+        Ok(())
+    }
+
     /// The model, fed and read by a convention with these ranges.
-    fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
+    pub(super) fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
         let convention = convention.clone().fed(ranges.input).read(ranges.output);
         let graph = self.graph().with_convention(convention);
         graph.map_err(|problem| self.fault(problem))

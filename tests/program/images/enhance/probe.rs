@@ -142,6 +142,10 @@ fn random_graphs_residuals_and_other_outputs_are_named() {
         (onnx::noisy(), "draws random numbers (RandomNormalLike)"),
         (onnx::residual(), "`image = \"input + output\"`"),
         (
+            onnx::light_map(),
+            "`image = \"clip(input / max(output, 0.001), 0, 1)\"`",
+        ),
+        (
             onnx::light_beside(),
             "and \"L\", which has the image's size",
         ),
@@ -176,10 +180,68 @@ fn a_normalised_input_is_found() {
 }
 
 #[test]
-fn an_expression_mends_a_negative() {
-    let bench = bench(&onnx::negative(), "image = \"1 - output\"");
+fn mixed_ranges_are_found_by_black_and_white() {
+    let centred = [-0.5, 0.5];
+    let clip = [
+        [0.481_454_66, 0.457_827_5, 0.408_210_73],
+        [0.268_629_54, 0.261_302_6, 0.275_777_1],
+    ];
+    for (graph, lines) in [
+        (
+            onnx::enhancer_in_ranges(UNIT, centred),
+            "range_in = \"0..1\"\nmean_out = [0.5, 0.5, 0.5]\nstd_out = [1.0, 1.0, 1.0]",
+        ),
+        (
+            onnx::enhancer_in_ranges(BYTES, centred),
+            "range_in = \"0..255\"\nmean_out = [0.5, 0.5, 0.5]\nstd_out = [1.0, 1.0, 1.0]",
+        ),
+        (
+            onnx::enhancer_in_ranges(centred, SIGNED),
+            "mean = [0.5, 0.5, 0.5]\nstd = [1.0, 1.0, 1.0]\nrange_out = \"-1..1\"",
+        ),
+        (
+            onnx::normalised(clip[0], clip[1]),
+            "mean = [0.48145467, 0.4578275, 0.40821072]\nstd = [0.26862955, 0.2613026, 0.2757771]\nrange_out = \"0..1\"",
+        ),
+    ] {
+        advised(&graph, lines);
+    }
+}
+
+#[test]
+fn expressions_of_the_input_are_advised() {
+    for (graph, line) in [
+        (onnx::negative(), "image = \"1 - output\""),
+        (onnx::subtracted(), "image = \"input - output\""),
+        (onnx::gain_map(), "image = \"input * output\""),
+    ] {
+        advised(&graph, line);
+    }
+}
+
+/// Checks that a model is refused with these lines of a sidecar, and evaluated with them.
+fn advised(graph: &Graph, lines: &str) {
+    let unstated = bench(graph, "");
+    let called = ask(&unstated, "");
+    assert_eq!(called.code, Some(2), "{lines}: {called:?}");
+    for line in lines.lines() {
+        assert!(
+            called.stderr.contains(&format!("`{line}`")),
+            "{line}: {called:?}"
+        );
+    }
+    let stated = bench(graph, lines);
+    let called = ask(&stated, "");
+    assert_eq!(called.code, Some(0), "{lines}: {called:?}");
+}
+
+#[test]
+fn images_without_colour_are_refused() {
+    let bench = bench(&onnx::colourless(), "");
     let called = ask(&bench, "");
-    assert_eq!(called.code, Some(0), "{called:?}");
+    assert_eq!(called.code, Some(2), "{called:?}");
+    assert!(called.stderr.contains("have no colour"), "{called:?}");
+    assert!(called.stderr.contains("enhanced luma"), "{called:?}");
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Conclusion of an examination ([`Found`]): the proposed lines of a sidecar, with the reason.
 
 use crate::conventions::ChannelOrder;
-use crate::probes::probe::{Conclusion, Probe, RangePair};
+use crate::probes::probe::{Conclusion, Probe};
+use crate::probes::range_pair::RangePair;
 use darkqa_ground::types::Flaw;
 
 /// Whether an examination found one convention.
@@ -122,6 +123,13 @@ pub(super) fn propose(
         [] => {}
         several => {
             let list: Vec<String> = several.iter().map(ToString::to_string).collect();
+            if let Some(pair) = probe.likeliest() {
+                let conclusion = format!(
+                    "With {pair} its images can be enhanced images, and black and white come out nearest to themselves. Other plausible ranges: {}.",
+                    list[1..].join("; ")
+                );
+                return Found::ranges(pair, conclusion);
+            }
             let stated = stated.map_or_else(String::new, |pair| {
                 format!(" {pair}, which is stated, is not one of them.")
             });
@@ -141,8 +149,10 @@ pub(super) fn propose(
         several => stated.filter(|pair| several.contains(pair)),
     };
     if let Some(pair) = pair.filter(|_| is_hue) {
-        let conclusion =
-            format!("With {pair} and {order} in the output its images can be enhanced images.");
+        let order_of_input = order.to_string().to_lowercase();
+        let conclusion = format!(
+            "With {pair} and {order} in the output its images can be enhanced images; or in the input: `color = \"{order_of_input}\"` and the other order for `color_out`."
+        );
         let mut found = Found::ranges(pair, conclusion);
         if stated == Some(pair) {
             found.lines.clear();

@@ -71,6 +71,10 @@ fn each_wrong_reading_has_its_flaw() {
             ..good.clone()
         }
     };
+    let mut grey = good.clone();
+    for pixel in grey.samples.chunks_exact_mut(3) {
+        pixel.fill(pixel[1]);
+    }
     let mut not_a_number = good.clone();
     not_a_number.samples[7] = f32::NAN;
     let cases = [
@@ -86,6 +90,7 @@ fn each_wrong_reading_has_its_flaw() {
         (each(&good, |code| 255.0 - code), Flaw::Inverted),
         (relabelled, Flaw::Shuffled),
         (swapped, Flaw::Hue),
+        (grey, Flaw::Grey),
         (each(&good, |code| f32::midpoint(code, 255.0)), Flaw::Haze),
     ];
     for (made, expected) in cases {

@@ -24,6 +24,8 @@ pub enum Flaw {
     Shuffled,
     /// Blue where the frame is red.
     Hue,
+    /// Three equal channels where the frame has colours.
+    Grey,
     /// No dark pixel at all.
     Haze,
 }
@@ -37,6 +39,7 @@ words!(Flaw {
     Inverted = "inverted",
     Shuffled = "shuffled",
     Hue = "hue",
+    Grey = "grey",
     Haze = "haze",
 });
 
@@ -53,6 +56,7 @@ impl Flaw {
             Self::Inverted => "are bright where the frames are dark",
             Self::Shuffled => "have edges that are not those of the frames",
             Self::Hue => "are blue where the frames are red",
+            Self::Grey => "have no colour, unlike the frames",
             Self::Haze => "have no dark pixel",
         }
     }

@@ -1,0 +1,197 @@
+//! Images that authors make of an output that is not the image itself: residuals, gains and light maps.
+
+use super::endpoints::Endpoints;
+use super::probe::{PairTrial, Probe};
+use super::probe_run::Trials;
+use super::range_pair::RangePair;
+use crate::conventions::{Channels, ValueRange};
+use crate::enhancer::Enhancer;
+use crate::outputs::in_expression;
+use darkqa_ground::error::Result;
+use darkqa_ground::types::{Flaw, Rgb};
+
+/// Maximum mean output for white, in codes, at which the output may be a residual, and minimum difference between those for white and black
+/// at which it is an image. Chosen: models that return the image itself exceed 230.
+const MIN_CONTRAST: f64 = 64.0;
+
+/// Expressions of the input and of an output that is not the image, with the kind of the output. `OUTPUT` stands for its name.
+const EXPRESSIONS: [(&str, &str); 5] = [
+    ("input + OUTPUT", "a residual"),
+    ("input - OUTPUT", "a residual"),
+    ("input * OUTPUT", "a gain"),
+    ("clip(input / max(OUTPUT, 0.001), 0, 1)", "a light map"),
+    ("1 - OUTPUT", "the negative"),
+];
+
+/// Parts of the names of outputs that are not the image but are applied to the input.
+const NAMES: [&str; 8] = [
+    "illu",
+    "light_map",
+    "lightmap",
+    "gain",
+    "curve",
+    "residual",
+    "noise",
+    "mask",
+];
+
+/// Kind of an output that is not the image itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum OutputKind {
+    /// Nearly black for white: added to the input.
+    Residual,
+    /// As bright for black as for white: the input is divided by it or multiplied with it.
+    Map,
+}
+
+impl OutputKind {
+    /// The kind that the output for black and white shows; `None` if it may be the image.
+    fn from_endpoints(endpoints: Endpoints) -> Option<Self> {
+        let Endpoints { black, white, .. } = endpoints;
+        if white <= MIN_CONTRAST {
+            Some(Self::Residual)
+        } else if white - black <= MIN_CONTRAST {
+            Some(Self::Map)
+        } else {
+            None
+        }
+    }
+}
+
+/// An expression of the input and the output, with the model's images by it.
+pub(super) struct ExpressionTrial {
+    /// The expression, as `input + output`.
+    pub(super) text: String,
+    /// Kind of the output, as `a residual`.
+    pub(super) kind: &'static str,
+    pub(super) pair: PairTrial,
+}
+
+impl Enhancer {
+    /// The trials of [`EXPRESSIONS`] in these ranges; none if the image is an expression already, or if the model fails.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn expression_trials(
+        &self,
+        dark: &[Rgb],
+        ranges: [ValueRange; 2],
+    ) -> Result<Vec<ExpressionTrial>> {
+        if !self.reads_plain_image() {
+            return Ok(Vec::new());
+        }
+        let name = in_expression(&self.graph().signature.outputs[0].port.name);
+        let texts = EXPRESSIONS.map(|(text, _)| text.replace("OUTPUT", &name));
+        let mut conventions = texts.clone().map(|_| self.convention().clone());
+        for (convention, text) in conventions.iter_mut().zip(&texts) {
+            convention.output = None;
+            let image = text
+                .parse()
+                .map_err(|problem: String| self.fault(problem))?;
+            convention.image = Some(image);
+        }
+        let conventions = conventions.each_ref();
+        let Some(Trials { probes, .. }) = self.trials(dark, conventions, ranges.map(Some))? else {
+            return Ok(Vec::new());
+        };
+        let mut trials = Vec::new();
+        for (((probe, convention), text), (_, kind)) in probes
+            .into_iter()
+            .zip(conventions)
+            .zip(texts)
+            .zip(EXPRESSIONS)
+        {
+            let Probe { pairs, .. } = probe;
+            for mut pair in pairs {
+                if pair.is_clean() {
+                    pair.endpoints = self.endpoints(convention, pair.ranges)?;
+                }
+                let text = text.clone();
+                trials.push(ExpressionTrial { text, kind, pair });
+            }
+        }
+        Ok(trials)
+    }
+
+    /// The expressions by which an output that is not the image gives plausible images, in a sentence with the lines of a sidecar; `None`
+    /// if there are none.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn better_expression(&self, dark: &[Rgb], flaw: Flaw) -> Result<Option<String>> {
+        let ranges = self
+            .stated_ranges()
+            .map(|range| range.unwrap_or(ValueRange::Unit));
+        let mut found = self.expression_trials(dark, ranges)?;
+        found.retain(|trial| trial.pair.is_clean() && trial.pair.is_near());
+        found.sort_by(|a, b| a.pair.distance().total_cmp(&b.pair.distance()));
+        let lines: Vec<String> = found
+            .iter()
+            .map(|trial| format!("`image = \"{}\"` (if it is {})", trial.text, trial.kind))
+            .collect();
+        Ok((!lines.is_empty()).then(|| {
+            format!(
+                "The output may not be the image itself: plausible images come from {}. If its authors do that, state the line in MODEL.onnx.toml beside it{}",
+                lines.join(" or "),
+                if flaw == Flaw::Grey {
+                    "; if it is the enhanced luma, export the model so that it joins luma and colours in the graph"
+                } else {
+                    ""
+                }
+            )
+        }))
+    }
+
+    /// The kind of an output that does not keep black and white apart in these ranges, as an image does; `None` if it does.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn kind_by_endpoints(&self, ranges: RangePair) -> Result<Option<OutputKind>> {
+        if !self.reads_plain_image() {
+            return Ok(None);
+        }
+        let endpoints = self.endpoints(self.convention(), ranges)?;
+        Ok(endpoints.and_then(OutputKind::from_endpoints))
+    }
+
+    /// The remark on an output that black and white show to be no image; `None` if they do not.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn remark_on_endpoints(&self, ranges: RangePair) -> Result<Option<String>> {
+        let Some(kind) = self.kind_by_endpoints(ranges)? else {
+            return Ok(None);
+        };
+        let name = in_expression(&self.graph().signature.outputs[0].port.name);
+        Ok(Some(match kind {
+            OutputKind::Residual => format!(
+                "its output of a white image is nearly black, as if it had to be added to the input; if its authors add it, state in MODEL.onnx.toml beside it: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` draws both"
+            ),
+            OutputKind::Map => format!(
+                "its output of a black image is nearly as bright as that of a white one, as that of a light map; if its authors divide by it, state in MODEL.onnx.toml beside it: `image = \"clip(input / max({name}, 0.001), 0, 1)\"`; `darkqa-eval enhance doctor` draws both"
+            ),
+        }))
+    }
+
+    /// The remark on an output that is read as the image and named like a map or a residual; `None` if it is not.
+    pub(super) fn remark_on_name(&self) -> Option<String> {
+        if !self.reads_plain_image() || self.convention().output.is_some() {
+            return None;
+        }
+        let name = &self.graph().signature.outputs[0].port.name;
+        let lower_case = name.to_lowercase();
+        NAMES.iter().find(|word| lower_case.contains(**word))?;
+        let term = in_expression(name);
+        Some(format!(
+            "its output {name:?} is read as the image, but is named like a map or a residual; if its authors apply it to the input, state their formula in MODEL.onnx.toml beside it, as `image = \"clip(input / max({term}, 0.001), 0, 1)\"` or `image = \"input + {term}\"`; else `output = {name:?}`"
+        ))
+    }
+
+    /// Whether all channels of one output are read as the image, without an expression.
+    fn reads_plain_image(&self) -> bool {
+        let convention = self.convention();
+        convention.image.is_none()
+            && convention.channels != Some(Channels::Y)
+            && self.graph().signature.outputs[0].slice.is_none()
+    }
+}

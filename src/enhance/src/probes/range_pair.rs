@@ -1,0 +1,130 @@
+//! The value ranges of a model's input and output: [`RangePair`].
+
+use std::fmt;
+
+use crate::conventions::{ValueRange, ValueScale};
+
+/// The range in which a model is fed, and the one in which it is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RangePair {
+    pub(crate) input: ValueScale,
+    pub(crate) output: ValueScale,
+}
+
+impl RangePair {
+    /// The pairs of plain ranges with these; `None` stands for each range in turn.
+    pub(super) fn plain(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
+        let ranges = ValueRange::ALL.map(ValueScale::Range);
+        pairs(&scales(input, &ranges), &scales(output, &ranges))
+    }
+
+    /// The pairs with a mean and a deviation at either end or both; `None` stands for each range in turn, with and without them.
+    pub(super) fn normalised(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
+        let mut all = pairs(
+            &scales(input, &ValueScale::ALL),
+            &scales(output, &ValueScale::ALL),
+        );
+        all.retain(|pair| !pair.is_plain());
+        all
+    }
+
+    /// Whether neither side has a mean and a deviation.
+    pub(super) fn is_plain(self) -> bool {
+        let is_range = |scale| matches!(scale, ValueScale::Range(_));
+        is_range(self.input) && is_range(self.output)
+    }
+
+    /// The lines of a sidecar that state it.
+    pub(super) fn lines(self) -> Vec<String> {
+        let mut lines = scale_lines(self.input, ["range_in", "mean", "std"]);
+        lines.extend(scale_lines(
+            self.output,
+            ["range_out", "mean_out", "std_out"],
+        ));
+        lines
+    }
+
+    /// These lines in a sentence.
+    pub(super) fn stated(self) -> String {
+        self.lines()
+            .into_iter()
+            .map(|line| format!("`{line}`"))
+            .collect::<Vec<_>>()
+            .join(" and ")
+    }
+}
+
+impl fmt::Display for RangePair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} in and {} out", self.input, self.output)
+    }
+}
+
+/// The stated range alone, or all of these.
+fn scales(stated: Option<ValueRange>, all: &[ValueScale]) -> Vec<ValueScale> {
+    match stated {
+        Some(range) => vec![ValueScale::Range(range)],
+        None => all.to_vec(),
+    }
+}
+
+/// Each input with each output, those of the same input in a row.
+fn pairs(inputs: &[ValueScale], outputs: &[ValueScale]) -> Vec<RangePair> {
+    inputs
+        .iter()
+        .flat_map(|&input| {
+            outputs
+                .iter()
+                .map(move |&output| RangePair { input, output })
+        })
+        .collect()
+}
+
+/// The lines of a sidecar for one side; the keys are those of a range, a mean and a deviation.
+fn scale_lines(scale: ValueScale, [range, mean, std]: [&str; 3]) -> Vec<String> {
+    match scale.mean_and_std() {
+        None => vec![format!("{range} = \"{}\"", scale.range())],
+        Some([means, deviations]) => vec![
+            format!("{mean} = {means:?}"),
+            format!("{std} = {deviations:?}"),
+        ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conventions::Normalisation;
+
+    #[test]
+    fn a_mean_and_a_deviation_are_lines_of_a_sidecar() {
+        let imagenet = RangePair {
+            input: ValueScale::Normalised(Normalisation::ImageNet),
+            output: ValueScale::Range(ValueRange::Unit),
+        };
+        assert_eq!(
+            imagenet.lines(),
+            [
+                "mean = [0.485, 0.456, 0.406]",
+                "std = [0.229, 0.224, 0.225]",
+                "range_out = \"0..1\""
+            ]
+        );
+        let centred = RangePair {
+            output: ValueScale::Normalised(Normalisation::Centred),
+            ..imagenet
+        };
+        assert_eq!(centred.lines()[2], "mean_out = [0.5, 0.5, 0.5]");
+    }
+
+    #[test]
+    fn only_ranges_that_are_not_stated_are_tried() {
+        let unit = Some(ValueRange::Unit);
+        assert_eq!(RangePair::plain(None, None).len(), 9);
+        assert_eq!(RangePair::plain(Some(ValueRange::Signed), None).len(), 3);
+        assert_eq!(RangePair::plain(unit, unit).len(), 1);
+        assert_eq!(RangePair::normalised(None, None).len(), 27);
+        assert_eq!(RangePair::normalised(None, unit).len(), 3);
+        assert!(RangePair::normalised(unit, unit).is_empty());
+    }
+}
