@@ -224,11 +224,16 @@ impl Description {
     }
 }
 
+/// Longest value, in characters, that the other rows of a table are padded to; remarks are longer. Chosen.
+const MAX_PADDED: usize = 60;
+
+/// A table of lines as text, with columns of equal width.
 fn aligned(path: &Path, lines: &[ConventionLine]) -> String {
     let width = |cell: fn(&ConventionLine) -> &str| {
         lines
             .iter()
             .map(|line| cell(line).chars().count())
+            .filter(|width| *width <= MAX_PADDED)
             .max()
             .unwrap_or(0)
     };

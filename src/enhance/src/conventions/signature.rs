@@ -57,10 +57,14 @@ impl Signature {
         if let (Channels::Y, Some(problem)) = (channels, mismatch) {
             return Err(problem);
         }
+        let input = ImageInput {
+            port: image.clone(),
+            layout,
+        };
         let extras = inputs
             .iter()
             .filter(|port| port.name != image.name)
-            .map(|port| FurtherInput::new(port, convention.extra.get(&port.name), layout))
+            .map(|port| FurtherInput::new(port, convention.extra.get(&port.name), &input))
             .collect::<Result<Vec<_>, String>>()?;
         let mut stated = convention.extra.keys();
         if let Some(name) =
@@ -94,11 +98,18 @@ impl Signature {
             extras,
             unread: outputs.iter().filter(is_unread).cloned().collect(),
             outputs: read,
-            input: ImageInput {
-                port: image.clone(),
-                layout,
-            },
+            input,
         })
+    }
+}
+
+impl ImageInput {
+    /// Whether it takes images of any height or width.
+    pub(crate) fn takes_any_side(&self) -> bool {
+        let [_, height, width] = self.layout.places();
+        [height, width]
+            .iter()
+            .any(|place| self.port.dims[*place].known().is_none())
     }
 }
 

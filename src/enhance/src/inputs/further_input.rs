@@ -3,7 +3,7 @@
 use super::fed_image::FedImage;
 use super::noise;
 use super::tensor::{Tensor, TensorData};
-use crate::conventions::{ElementType, ExtraValue, TensorLayout, preset};
+use crate::conventions::{ElementType, ExtraValue, ImageInput, TensorLayout, preset};
 use crate::graphs::{Dim, Port};
 
 /// An input in addition to the image, with its value.
@@ -65,6 +65,13 @@ impl Places {
             .map(|(_, dim)| dim)
     }
 
+    /// Whether the graph fixes both rows and columns.
+    fn are_fixed(self, port: &Port) -> bool {
+        [self.rows, self.columns]
+            .iter()
+            .all(|place| port.dims[*place].known().is_some())
+    }
+
     /// Number of channels, if the graph states it.
     fn channels(self, port: &Port) -> Option<usize> {
         self.channels
@@ -80,9 +87,17 @@ impl FurtherInput {
     pub(crate) fn new(
         port: &Port,
         value: Option<&ExtraValue>,
-        image: TensorLayout,
+        image: &ImageInput,
     ) -> Result<Self, String> {
-        let places = Places::for_port(port, image);
+        let places = Places::for_port(port, image.layout);
+        if let Some(places) = places
+            && places.are_fixed(port)
+            && image.takes_any_side()
+        {
+            return Err(format!(
+                "takes {port} in addition to the image, a tensor of a fixed size that is not the image's; export the model with its values in the graph"
+            ));
+        }
         let value = value.ok_or_else(|| missing(port, places))?;
         let input = Self {
             port: port.clone(),

@@ -58,7 +58,7 @@ impl Output {
         }
         let fits_count = &fits;
         let fits = |port: &Port| fits_count(port, channels.count());
-        let images: Vec<usize> = (0..outputs.len()).filter(|&i| fits(&outputs[i])).collect();
+        let images = image_outputs(outputs, fits);
         let (index, reason) = match (images.as_slice(), stated) {
             ([only], None) => (*only, "the only output that can be the image"),
             // An index may count the outputs of the authors' model. An export may have fewer.
@@ -178,6 +178,21 @@ impl Output {
     }
 }
 
+/// Indices of the outputs that can be the image: those whose dimensions the graph states, else those without stated dimensions.
+fn image_outputs(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Vec<usize> {
+    let fitting = |has_dims: bool| -> Vec<usize> {
+        (0..outputs.len())
+            .filter(|&i| outputs[i].dims.is_empty() != has_dims && fits(&outputs[i]))
+            .collect()
+    };
+    let shaped = fitting(true);
+    if shaped.is_empty() {
+        fitting(false)
+    } else {
+        shaped
+    }
+}
+
 /// The output and the channels that a name such as `x[4:7]` means; `None` if it means no channels of an output.
 fn sliced<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelSlice)> {
     if outputs.iter().any(|port| port.name == name) {
@@ -215,7 +230,11 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
         let name = &port.name;
         return match count {
             4 => format!(
-                "gives {port}, 4 channels, and an image has 3; if the fourth is opacity, state in MODEL.onnx.toml beside it: `output = \"{name}[0:3]\"`"
+                "gives {port}, 4 channels, and an image has 3; if the fourth is opacity, state in MODEL.onnx.toml beside it: `output = \"{name}[0:3]\"`; if they are reflectance and light: `image = \"{0}[0:3] * {0}[3:4]\"`",
+                in_expression(name)
+            ),
+            6 => format!(
+                "gives {port}, 6 channels, and an image has 3; state in MODEL.onnx.toml beside it which half is the image: `output = \"{name}[0:3]\"` or `output = \"{name}[3:6]\"`"
             ),
             24 => format!(
                 "gives {port}, 24 channels, and an image has 3; if they are the curves of Zero-DCE, state in MODEL.onnx.toml beside it: `image = \"curves(input, {0}[0:3], {0}[3:6], {0}[6:9], {0}[9:12], {0}[12:15], {0}[15:18], {0}[18:21], {0}[21:24])\"`",
@@ -231,7 +250,7 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
         && let Some(port) = outputs.iter().find(|port| fits(port, 1))
     {
         return format!(
-            "gives {port}, one channel, which is no image: perhaps a light map, which its authors divide by; state their formula in MODEL.onnx.toml beside it: `image = \"clip(input / {}, 0, 1)\"`",
+            "gives {port}, one channel, which is no image: if it is a light map, which its authors divide by, state in MODEL.onnx.toml beside it: `image = \"clip(input / max({0}, 0.001), 0, 1)\"`; if it is the enhanced luma, export it with the colours joined in the graph",
             in_expression(&port.name)
         );
     }

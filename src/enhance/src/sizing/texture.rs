@@ -4,9 +4,9 @@ use std::ops::RangeInclusive;
 
 use darkqa_ground::types::Rgb;
 
-/// Codes of the trial images: one as dark as an underexposed photograph, one with the whole range. Black is left out, as some
-/// models divide by it.
-pub(crate) const CODES: [RangeInclusive<u8>; 2] = [4..=40, 4..=251];
+/// Codes of the trial images: one as dark as an underexposed photograph, one with the whole range, and one nearly black, for gates that
+/// brighter images saturate. Black is left out, as some models divide by it.
+pub(crate) const CODES: [RangeInclusive<u8>; 3] = [4..=40, 4..=251, 1..=12];
 
 /// An image whose samples look like noise within a range of codes, the same at each call.
 pub(crate) fn texture([height, width]: [usize; 2], codes: &RangeInclusive<u8>) -> Rgb {

@@ -203,3 +203,28 @@ fn tiles_start_where_blocks_do() {
         whole.enhance(&image).unwrap()
     );
 }
+
+#[test]
+fn halves_of_six_channels_are_named() {
+    let message = fault(&onnx::six_channels());
+    assert!(
+        message.contains("`output = \"x[0:3]\"` or `output = \"x[3:6]\"`"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_number_named_output_is_no_image() {
+    let (_folder, mut enhancer) = loaded(&onnx::loss_beside());
+    let image = image(12, 8);
+    assert_eq!(enhancer.enhance(&image).unwrap(), image);
+}
+
+#[test]
+fn an_input_of_another_size_is_named() {
+    let message = fault(&onnx::with_embedding());
+    assert!(
+        message.contains("a tensor of a fixed size that is not the image's"),
+        "{message}"
+    );
+}
