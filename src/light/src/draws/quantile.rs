@@ -1,6 +1,7 @@
 //! Distributions symmetric about zero, sampled by their quantile functions: [`Quantile`].
 
-use std::sync::LazyLock;
+use std::cell::RefCell;
+use std::sync::{Arc, LazyLock};
 
 use super::lanes::{LANES, Lanes};
 use super::piecewise::Piecewise;
@@ -13,6 +14,14 @@ const LAST: f32 = 2_147_483_520.0;
 /// The smallest u is 2⁻³³.
 #[derive(Debug, Clone)]
 pub struct Quantile(Piecewise);
+
+/// Most tables that a thread keeps; the built-in calibrations have at most 11 shapes each.
+const KEPT_TABLES: usize = 16;
+
+thread_local! {
+    /// Bits of shapes λ with their tables, the last one last. Each thread has its own, because a fork could find a shared one locked.
+    static TUKEY_LAMBDA: RefCell<Vec<(u64, Arc<Quantile>)>> = const { RefCell::new(Vec::new()) };
+}
 
 /// Quantile function of the standard normal distribution.
 pub(crate) static NORMAL: LazyLock<Quantile> = LazyLock::new(|| Quantile::new(standard_normal));
@@ -29,6 +38,22 @@ impl Quantile {
     #[must_use]
     pub fn tukey_lambda(shape: f64) -> Self {
         Self::new(|u| tukey_lambda(u, shape))
+    }
+
+    /// The same from the tables that this thread keeps. A table is a twentieth of the work of a small image.
+    pub(crate) fn kept_tukey_lambda(shape: f64) -> Arc<Self> {
+        let bits = shape.to_bits();
+        TUKEY_LAMBDA.with_borrow_mut(|tables| {
+            if let Some((_, table)) = tables.iter().find(|(kept, _)| *kept == bits) {
+                return Arc::clone(table);
+            }
+            if tables.len() == KEPT_TABLES {
+                tables.remove(0);
+            }
+            let table = Arc::new(Self::tukey_lambda(shape));
+            tables.push((bits, Arc::clone(&table)));
+            table
+        })
     }
 
     /// The quantile of 32 random bits: one for the sign, 31 for u.
