@@ -60,21 +60,36 @@ impl Quantile {
     #[inline(always)]
     #[must_use]
     pub fn at(&self, word: u32) -> f32 {
-        let place = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
-        let lower = self.0.at(if place < LAST { place } else { LAST });
-        f32::from_bits(lower.to_bits() ^ (word & 0x8000_0000))
+        signed(self.0.at(place_of(word)), word)
     }
 
     /// The quantiles of a batch of words.
     #[inline(always)]
     #[must_use]
     pub fn lanes(&self, words: &Lanes<u32>) -> Lanes<f32> {
-        let mut numbers = [0.0; LANES];
+        let mut places = [0.0; LANES];
+        for (place, word) in places.iter_mut().zip(words) {
+            *place = place_of(*word);
+        }
+        let mut numbers = self.0.lanes(&places);
         for (number, word) in numbers.iter_mut().zip(words) {
-            *number = self.at(*word);
+            *number = signed(*number, *word);
         }
         numbers
     }
+}
+
+/// The place on the lower half that 31 bits of a word stand for.
+#[inline(always)]
+fn place_of(word: u32) -> f32 {
+    let place = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
+    if place < LAST { place } else { LAST }
+}
+
+/// A quantile of the lower half, or of the upper half, by the first bit of a word.
+#[inline(always)]
+fn signed(lower: f32, word: u32) -> f32 {
+    f32::from_bits(lower.to_bits() ^ (word & 0x8000_0000))
 }
 
 /// The quantile function of Tukey's λ distribution, (u^λ − (1 − u)^λ) / λ and ln u − ln(1 − u) at λ = 0, for u in the

@@ -184,32 +184,19 @@ impl Kernel for Display<'_> {
         for (index, values) in self.values.chunks_mut(6 * LANES).enumerate() {
             bayer::demosaic(self.rows, self.row, index, &mut colours);
             self.developer.to_linear_srgb(&mut colours, scale);
-            let [even, odd] = &colours;
-            for (lane, values) in values.chunks_mut(6).enumerate().take(LANES) {
-                let (even, odd) = (even.each_ref(), odd.each_ref());
-                let pair = [
-                    even[0][lane],
-                    even[1][lane],
-                    even[2][lane],
-                    odd[0][lane],
-                    odd[1][lane],
-                    odd[2][lane],
-                ];
-                if let Ok(values) = <&mut [f32; 6]>::try_from(&mut *values) {
-                    for (value, light) in values.iter_mut().zip(pair) {
-                        *value = gamma.at(light);
-                    }
-                } else {
-                    // The last pixel of an odd width.
-                    for (value, light) in values.iter_mut().zip(pair) {
-                        *value = gamma.at(light);
-                    }
-                }
+            for channel in colours.as_flattened_mut() {
+                *channel = gamma.lanes(channel);
+            }
+            let [[er, eg, eb], [or, og, ob]] = &colours;
+            let mut pairs = [[0.0; 6]; LANES];
+            for (lane, pair) in pairs.iter_mut().enumerate() {
+                *pair = [er[lane], eg[lane], eb[lane], or[lane], og[lane], ob[lane]];
             }
             if self.developer.tone == Tone::BeforeEv {
                 for value in values {
                     *value = curve::smoothstep(*value);
                 }
+            values.copy_from_slice(&pairs.as_flattened()[..values.len()]);
             }
         }
     }
