@@ -101,6 +101,7 @@ impl Negative {
     pub fn develop_by(&self, drop_ev: f64) -> Rgb {
         let [height, width] = self.size;
         let mut degraded = Rgb::black(height, width);
+        let factor = self.developer.factor(drop_ev);
         degraded
             .samples_mut()
             .par_chunks_mut(3 * width)
@@ -109,7 +110,7 @@ impl Negative {
                 || vec![0.0; 3 * width],
                 |display, (row, codes)| {
                     self.developer.display(&self.balanced, row, display);
-                    self.developer.encode(display, drop_ev, codes);
+                    self.developer.encode(display, factor, codes);
                 },
             );
         degraded
@@ -179,21 +180,21 @@ pub fn develop_with_state(
 
 /// A sample of a developed image.
 pub(crate) trait Target: Sample + Send {
-    /// Writes the samples of display values after an exposure drop.
-    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]);
+    /// Writes the samples of display values after an exposure drop with this [`Developer::factor`].
+    fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]);
 }
 
 /// 8-bit codes.
 impl Target for u8 {
-    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]) {
-        developer.encode(display, drop_ev, samples);
+    fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]) {
+        developer.encode(display, factor, samples);
     }
 }
 
 /// Linear light.
 impl Target for f32 {
-    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]) {
-        developer.expand(display, drop_ev, samples);
+    fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]) {
+        developer.expand(display, factor, samples);
     }
 }
 
@@ -269,6 +270,10 @@ impl Capture {
     fn develop<T: Target>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [Image<T>]) {
         let (height, width) = (clean.height(), clean.width());
         let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
+        let factors: Vec<f32> = drops
+            .iter()
+            .map(|drop_ev| self.developer.factor(*drop_ev))
+            .collect();
         bands.resize_with(height.div_ceil(BAND), Vec::new);
         for image in &mut images[..drops.len()] {
             assert_eq!((image.height(), image.width()), (height, width));
@@ -294,9 +299,9 @@ impl Capture {
                 }
                 for row in 0..rows {
                     self.developer.display(raw, lead + row, display);
-                    for (drop_ev, part) in drops.iter().zip(&mut parts) {
+                    for (factor, part) in factors.iter().zip(&mut parts) {
                         let samples = &mut part[row * 3 * width..][..3 * width];
-                        T::write(&self.developer, display, *drop_ev, samples);
+                        T::write(&self.developer, display, *factor, samples);
                     }
                 }
             },
