@@ -100,8 +100,8 @@ impl Negative {
     #[must_use]
     pub fn develop_by(&self, drop_ev: f64) -> Rgb {
         let [height, width] = self.size;
-        let mut degraded = Rgb::black(height, width);
         let factor = self.developer.factor(drop_ev);
+        let mut degraded = Rgb::black(height, width);
         degraded
             .samples_mut()
             .par_chunks_mut(3 * width)
@@ -117,18 +117,18 @@ impl Negative {
     }
 }
 
-/// Develops a frame at several levels: `images[i]`, of the frame's size, receives the image at `levels[i]`.
+/// Develops a frame at several levels: `images[i]` receives the samples of the image at `levels[i]`.
 ///
 /// The images equal those of [`Negative::develop`]; together they take less time and memory.
 ///
 /// # Panics
-/// If an image has another size, or there are more levels than images.
+/// If an image has another number of samples than the frame, or there are more levels than images.
 pub fn ladder<'a>(
     clean: impl Into<Clean<'a>>,
     key: &NoiseKey,
     synthesis: &Synthesis,
     levels: &[Severity],
-    images: &mut [Rgb],
+    images: &mut [&mut [u8]],
 ) {
     let (clean, isa) = (clean.into(), Isa::best());
     if synthesis.shares_negative() {
@@ -174,7 +174,7 @@ pub fn develop_with_state(
     let capture = Capture::with(key, state, amplify, tone, &Term::ALL, Isa::best());
     let capture = capture.for_clean(clean, headroom_ev);
     let mut image = Rgb::black(clean.height(), clean.width());
-    capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
+    capture.develop(clean, &[drop_ev], &mut [image.samples_mut()]);
     image
 }
 
@@ -225,7 +225,7 @@ impl Capture {
     ) -> Image<T> {
         let mut image = Image::black(clean.height(), clean.width());
         let capture = self.for_clean(clean, headroom_ev);
-        capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
+        capture.develop(clean, &[drop_ev], &mut [image.samples_mut()]);
         image
     }
 
@@ -266,18 +266,18 @@ impl Capture {
         line.repeat_edges();
     }
 
-    /// Develops the frame after each of these exposure drops, band by band.
-    fn develop<T: Target>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [Image<T>]) {
+    /// Develops the frame after each of these exposure drops, band by band. `images` are the samples of images of its size.
+    fn develop<T: Target>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [&mut [T]]) {
         let (height, width) = (clean.height(), clean.width());
-        let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
         let factors: Vec<f32> = drops
             .iter()
             .map(|drop_ev| self.developer.factor(*drop_ev))
             .collect();
+        let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
         bands.resize_with(height.div_ceil(BAND), Vec::new);
         for image in &mut images[..drops.len()] {
-            assert_eq!((image.height(), image.width()), (height, width));
-            let parts = image.samples_mut().chunks_mut(BAND * 3 * width);
+            assert_eq!(image.len(), 3 * height * width);
+            let parts = image.chunks_mut(BAND * 3 * width);
             for (band, part) in bands.iter_mut().zip(parts) {
                 band.push(part);
             }
@@ -376,7 +376,8 @@ mod tests {
                     let capture = Capture::with(&key, &state, amplify, tone, &Term::ALL, *isa);
                     let mut images = Severity::LADDER.map(|_| Rgb::black(40, 150));
                     let drops = Severity::LADDER.map(Severity::value);
-                    capture.develop((&clean).into(), &drops, &mut images);
+                    let mut samples = images.each_mut().map(Rgb::samples_mut);
+                    capture.develop((&clean).into(), &drops, &mut samples);
                     images
                 };
                 let baseline = develop(&Isa::Baseline);
