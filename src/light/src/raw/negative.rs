@@ -13,8 +13,9 @@ use crate::noise_profile::{Amplify, Coupling, Draws, Synthesis, Tone};
 use darkqa_ground::types::images::{Isa, Sample};
 use darkqa_ground::types::{Image, Rgb, Severity};
 
-/// Rows of a band, which is processed from RAW to codes within a core's cache; chosen.
-const BAND: usize = 32;
+/// Rows of a band, which is processed from RAW to codes within a core's cache; chosen. Images of 480, 720, 1080 or 1440 rows have an
+/// even number of bands, which two threads can share equally.
+const BAND: usize = 30;
 
 /// Noisy RAW image of a frame. Camera and noise are drawn once and shared by all levels developed from it.
 ///
