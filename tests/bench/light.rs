@@ -64,7 +64,7 @@ fn ladder(c: &mut Criterion) {
                 &key,
                 &paper,
                 &Severity::LADDER,
-                &mut dark,
+                &mut dark.each_mut().map(Rgb::samples_mut),
             );
         });
     });
@@ -79,7 +79,7 @@ fn ladder(c: &mut Criterion) {
                 &key,
                 &fresh,
                 &Severity::LADDER,
-                &mut dark,
+                &mut dark.each_mut().map(Rgb::samples_mut),
             );
         });
     });

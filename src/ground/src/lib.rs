@@ -9,6 +9,7 @@
 
 pub mod error;
 pub mod files;
+#[cfg(feature = "program")]
 pub mod labels;
 pub mod types;
 

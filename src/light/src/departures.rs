@@ -101,7 +101,7 @@ fn deviation(raw: Bayer) -> [f64; 3] {
     let values = display(raw, &median());
     let mut codes = vec![0; values.len()];
     let developer = Developer::new(&median(), Tone::None, Isa::best());
-    developer.encode(&values, Severity::L1.value(), &mut codes);
+    developer.encode(&values, developer.factor(Severity::L1.value()), &mut codes);
     let codes = || codes.iter().map(|code| f64::from(*code));
     let mean = means(codes());
     let squares = means(

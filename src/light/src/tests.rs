@@ -121,7 +121,7 @@ fn bytes_of_every_choice_are_those_of_this_version() {
             &key(20, "frame"),
             synthesis,
             &Severity::LADDER,
-            &mut images,
+            &mut images.each_mut().map(Rgb::samples_mut),
         );
         for image in &images {
             bytes.extend_from_slice(image.samples());
@@ -353,7 +353,8 @@ fn ladders_are_their_negatives() {
         let (clean, key) = (ramps(height, width), key(6, "a"));
         for synthesis in &settings {
             let mut images = Severity::LADDER.map(|_| Rgb::black(height, width));
-            ladder(&clean, &key, synthesis, &Severity::LADDER, &mut images);
+            let mut samples = images.each_mut().map(Rgb::samples_mut);
+            ladder(&clean, &key, synthesis, &Severity::LADDER, &mut samples);
             for (level, image) in Severity::LADDER.into_iter().zip(&images) {
                 let negative = Negative::new(&clean, &key, synthesis, level);
                 assert!(negative.serves(level));

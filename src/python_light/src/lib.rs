@@ -15,7 +15,7 @@ mod pools;
 mod state;
 
 use darkqa_ground::types::degradations::Kind;
-use darkqa_ground::types::{Image, Light, Rgb, Severity};
+use darkqa_ground::types::{Image, Rgb};
 use darkqa_light::raw::negative;
 use darkqa_light::{CaptureState, Exposures, NoiseKey, NoiseTerms};
 use pyo3::prelude::*;
@@ -93,13 +93,13 @@ fn degrade<'py>(
     if is_linear {
         let make = |index: usize, clean: &Rgb| {
             let (state, key) = capture(index);
-            vec![state.light(clean.into(), key, noise)]
+            state.light(clean.into(), key, noise).into_samples()
         };
         output(py, &batch, &[], threads, make)
     } else {
         let make = |index: usize, clean: &Rgb| {
             let (state, key) = capture(index);
-            vec![state.image(clean.into(), key, noise)]
+            state.image(clean.into(), key, noise).into_samples()
         };
         output(py, &batch, &[], threads, make)
     }
@@ -144,11 +144,9 @@ fn ladder<'py>(
     }
     let shape = [levels.len()];
     if is_linear {
-        let make = |index: usize, clean: &Rgb| -> Vec<Light> {
-            states[index]
-                .iter()
-                .map(|state| state.light(clean.into(), &keys[index], noise))
-                .collect()
+        let make = |index: usize, clean: &Rgb| {
+            let states = states[index].iter();
+            joined(states.map(|state| state.light(clean.into(), &keys[index], noise)))
         };
         return output(py, &batch, &shape, threads, make);
     }
@@ -156,39 +154,40 @@ fn ladder<'py>(
         if noise == NoiseTerms::All {
             return together(&settings, &levels, clean, &keys[index]);
         }
-        states[index]
-            .iter()
-            .map(|state| state.image(clean.into(), &keys[index], noise))
-            .collect()
+        let states = states[index].iter();
+        joined(states.map(|state| state.image(clean.into(), &keys[index], noise)))
     };
     output(py, &batch, &shape, threads, make)
 }
 
-/// The images of one frame at several levels, which share their work.
-fn together(settings: &Settings, levels: &[Level], clean: &Rgb, key: &NoiseKey) -> Vec<Rgb> {
-    let severities: Vec<Severity> = levels.iter().filter_map(|level| level.0).collect();
-    let degraded: Vec<Rgb> = if settings.kind == Kind::Sensor {
-        let mut images = vec![Rgb::black(clean.height(), clean.width()); severities.len()];
+/// The samples of one frame at several levels, which share their work.
+fn together(settings: &Settings, levels: &[Level], clean: &Rgb, key: &NoiseKey) -> Vec<u8> {
+    if settings.kind == Kind::Sensor {
+        let mut samples = vec![0; levels.len() * clean.samples().len()];
+        let (mut severities, mut images) = (Vec::new(), Vec::new());
+        let parts = samples.chunks_exact_mut(clean.samples().len());
+        for (level, part) in levels.iter().zip(parts) {
+            if let Some(severity) = level.0 {
+                severities.push(severity);
+                images.push(part);
+            } else {
+                part.copy_from_slice(clean.samples());
+            }
+        }
         negative::ladder(clean, key, &settings.synthesis, &severities, &mut images);
-        images
-    } else {
-        let mut exposures = Exposures::default();
-        // The states of all levels were made before, so that no level fails here.
-        let applied = severities
-            .iter()
-            .filter_map(|severity| settings.applied(*severity, clean.width(), key).ok());
-        applied
-            .map(|applied| exposures.degrade(clean.into(), &applied, key))
-            .collect()
-    };
-    let mut degraded = degraded.into_iter();
-    levels
-        .iter()
-        .map(|level| match level.0 {
-            Some(_) => degraded.next().unwrap_or_else(|| clean.clone()),
-            None => clean.clone(),
-        })
-        .collect()
+        return samples;
+    }
+    let mut exposures = Exposures::default();
+    joined(levels.iter().map(|level| {
+        let applied = level
+            .0
+            .map(|severity| settings.applied(severity, clean.width(), key));
+        match applied {
+            Some(Ok(applied)) => exposures.degrade(clean.into(), &applied, key),
+            // The states of all levels were made before, so that no level fails here.
+            None | Some(Err(_)) => clean.clone(),
+        }
+    }))
 }
 
 /// Return the numbers that decide an image of degrade(): exposure drop, motion and the state of the sensor.
@@ -256,12 +255,16 @@ fn replay<'py>(
     let keys = numbered_keys(replay.seed, &replay.key, &batch);
     let capture = &replay.capture;
     if is_linear {
-        let make =
-            |index: usize, clean: &Rgb| vec![capture.light(clean.into(), &keys[index], noise)];
+        let make = |index: usize, clean: &Rgb| {
+            let light = capture.light(clean.into(), &keys[index], noise);
+            light.into_samples()
+        };
         output(py, &batch, &[], threads, make)
     } else {
-        let make =
-            |index: usize, clean: &Rgb| vec![capture.image(clean.into(), &keys[index], noise)];
+        let make = |index: usize, clean: &Rgb| {
+            let image = capture.image(clean.into(), &keys[index], noise);
+            image.into_samples()
+        };
         output(py, &batch, &[], threads, make)
     }
 }
@@ -274,13 +277,13 @@ fn terms(noise: bool) -> NoiseTerms {
     }
 }
 
-/// The array of the images that `make` makes of each image of a batch; `levels` is the number of them, if it is an axis.
+/// The array of the samples that `make` makes of each image of a batch; `levels` is the number of its images, if it is an axis.
 fn output<'py, T: Output>(
     py: Python<'py>,
     batch: &Batch,
     levels: &[usize],
     threads: usize,
-    make: impl Fn(usize, &Rgb) -> Vec<Image<T>> + Sync,
+    make: impl Fn(usize, &Rgb) -> Vec<T> + Sync,
 ) -> PyResult<Bound<'py, PyAny>> {
     let shape = batch.output_shape(levels);
     // The images, each frame's images together, and all of them.
@@ -292,13 +295,13 @@ fn output<'py, T: Output>(
     let samples: Vec<T> = py.detach(|| {
         pool.install(|| {
             if let [only] = &batch.images[..] {
-                return joined(make(0, only));
+                return make(0, only);
             }
             batch
                 .images
                 .par_iter()
                 .enumerate()
-                .map(|(index, clean)| joined(make(index, clean)))
+                .map(|(index, clean)| make(index, clean))
                 .collect::<Vec<Vec<T>>>()
                 .concat()
         })
@@ -307,10 +310,9 @@ fn output<'py, T: Output>(
 }
 
 /// The samples of images of one size, one after the other.
-fn joined<T: Output>(mut images: Vec<Image<T>>) -> Vec<T> {
-    if images.len() == 1 {
-        return images.pop().map_or_else(Vec::new, Image::into_samples);
-    }
-    let images: Vec<&[T]> = images.iter().map(Image::samples).collect();
-    images.concat()
+fn joined<T: Output>(images: impl Iterator<Item = Image<T>>) -> Vec<T> {
+    images
+        .map(Image::into_samples)
+        .collect::<Vec<Vec<T>>>()
+        .concat()
 }

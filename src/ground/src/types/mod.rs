@@ -4,9 +4,13 @@
 pub mod degradations;
 pub mod flags;
 pub mod images;
+#[cfg(feature = "program")]
 pub mod manifests;
+#[cfg(feature = "program")]
 pub mod questions;
+#[cfg(feature = "program")]
 pub mod records;
+#[cfg(feature = "program")]
 pub mod replies;
 pub mod text;
 pub mod values;
@@ -24,20 +28,24 @@ pub use images::{
     DepthKind, FrameId, Image, Intrinsics, Label, Labels, Light, Pixels, Rgb, Rgb16Image, Sample,
     SegmentName, Segmentation,
 };
+#[cfg(feature = "program")]
 pub use manifests::{
     ColourHandling, ColourNote, DepthNote, Flaw, InputNote, InputSummary, ListedModel, ModelColumn,
     ModelListing, SeamCounts, SizeLog,
 };
+#[cfg(feature = "program")]
 pub use questions::{
     Answer, Choices, Family, PixelBox, Question, QuestionId, RunQuestion, StrictGroup, Truths,
     UnreadReason,
 };
+#[cfg(feature = "program")]
 pub use records::{
     AnswerReading, AskedItem, AskedParts, ChoiceDetail, ChoiceFacts, ChoiceTables, Failure,
     FailureKind, ImageFacts, ImageFidelity, KeptTrial, ObjectCrop, OpenDetail, SentImages, Step,
     StoredDetail, TextPlace, Thumbnail, TrialKey, TrialOutcome, TrialRef, Trials, Via, View,
     WalkFacts,
 };
+#[cfg(feature = "program")]
 pub use replies::{
     AnswerSource, Control, Finish, LostAttempts, Observed, OptionProbabilities, Reply, Thought,
     TokenChances, TokenPosition, Unstated, Usage,
@@ -46,6 +54,7 @@ pub use text::shell_word;
 pub use values::{Digest, Distinct, Shared};
 
 /// The record of a trial; by default of a question with choices.
+#[cfg(feature = "program")]
 pub type Record<D = ChoiceDetail> = records::Record<D>;
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use std::sync::Arc;
 pub use calibration::Calibration;
 pub use calibration::SensorNoise;
 use calibration::{GAINS, RATIOS};
-use rand_distr::{Distribution as _, Open01};
+use rand::distr::{Distribution as _, Open01};
 use serde::ser::SerializeStruct;
 use serde::{Deserialize, Serialize, Serializer};
 

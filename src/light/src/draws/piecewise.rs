@@ -1,5 +1,7 @@
 //! Piecewise linear approximation of a function of a positive number: [`Piecewise`].
 
+use super::lanes::{LANES, Lanes};
+
 /// Pieces per octave, a power of two; chosen.
 const PIECES: usize = 128;
 /// Low bits of a single-precision number that give its position within a piece.
@@ -47,15 +49,41 @@ impl Piecewise {
         }
     }
 
+    /// The function at each of a batch of numbers, which must be in the domain.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn lanes(&self, x: &Lanes<f32>) -> Lanes<f32> {
+        // Piece and position are loaded apart from the arithmetic, whose loops are vector instructions.
+        let mut pieces = [[0.0; 2]; LANES];
+        for (piece, x) in pieces.iter_mut().zip(x) {
+            *piece = self.pieces[self.piece(x.to_bits())];
+        }
+        let mut numbers = [0.0; LANES];
+        for i in 0..LANES {
+            let [value, rise] = pieces[i];
+            numbers[i] = value + rise * within(x[i].to_bits());
+        }
+        numbers
+    }
+
+    #[inline(always)]
+    fn piece(&self, bits: u32) -> usize {
+        (bits >> WITHIN).wrapping_sub(self.first) as usize % (OCTAVES * PIECES)
+    }
+
     /// The function at `x`, which must be in the domain.
     #[inline(always)]
     #[must_use]
     pub(crate) fn at(&self, x: f32) -> f32 {
-        let bits = x.to_bits();
-        let piece = (bits >> WITHIN).wrapping_sub(self.first) as usize % (OCTAVES * PIECES);
-        let [value, rise] = self.pieces[piece];
-        value + rise * (bits & ((1 << WITHIN) - 1)).cast_signed() as f32
+        let [value, rise] = self.pieces[self.piece(x.to_bits())];
+        value + rise * within(x.to_bits())
     }
+}
+
+/// Position of a number within its piece, from its bits.
+#[inline(always)]
+fn within(bits: u32) -> f32 {
+    (bits & ((1 << WITHIN) - 1)).cast_signed() as f32
 }
 
 #[cfg(test)]

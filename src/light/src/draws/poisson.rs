@@ -26,23 +26,23 @@ const ROUND: f32 = 12_582_912.0;
 /// Replaces means (from 0 to 2·10⁶) by Poisson numbers, each drawn from two words.
 #[inline(always)]
 pub(crate) fn lanes(means: &mut Lanes<f32>, words: [&Lanes<u32>; 2]) {
-    let (mut min, mut max) = (f32::INFINITY, 0.0_f32);
+    let (mut any_small, mut any_large) = (false, false);
     for mean in means.iter() {
-        min = if *mean < min { *mean } else { min };
-        max = if *mean > max { *mean } else { max };
+        any_small |= *mean < EXPANDED_FROM;
+        any_large |= *mean >= EXPANDED_FROM;
     }
-    if max < EXPANDED_FROM {
+    if !any_large {
         *means = split(means, words);
-    } else if min >= EXPANDED_FROM {
+    } else if !any_small {
         *means = expanded(means, words[0]);
     } else {
         let (small, large) = (split(means, words), expanded(means, words[0]));
-        for (mean, (small, large)) in means.iter_mut().zip(small.iter().zip(&large)) {
-            *mean = if *mean < EXPANDED_FROM {
-                *small
-            } else {
-                *large
-            };
+        for i in 0..LANES {
+            let is_small = means[i] < EXPANDED_FROM;
+            means[i] = large[i];
+            if is_small {
+                means[i] = small[i];
+            }
         }
     }
 }

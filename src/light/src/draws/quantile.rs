@@ -1,6 +1,7 @@
 //! Distributions symmetric about zero, sampled by their quantile functions: [`Quantile`].
 
-use std::sync::LazyLock;
+use std::cell::RefCell;
+use std::sync::{Arc, LazyLock};
 
 use super::lanes::{LANES, Lanes};
 use super::piecewise::Piecewise;
@@ -13,6 +14,14 @@ const LAST: f32 = 2_147_483_520.0;
 /// The smallest u is 2⁻³³.
 #[derive(Debug, Clone)]
 pub struct Quantile(Piecewise);
+
+/// Most tables that a thread keeps; the built-in calibrations have at most 11 shapes each.
+const KEPT_TABLES: usize = 16;
+
+thread_local! {
+    /// Bits of shapes λ with their tables, the last one last. Each thread has its own, because a fork could find a shared one locked.
+    static TUKEY_LAMBDA: RefCell<Vec<(u64, Arc<Quantile>)>> = const { RefCell::new(Vec::new()) };
+}
 
 /// Quantile function of the standard normal distribution.
 pub(crate) static NORMAL: LazyLock<Quantile> = LazyLock::new(|| Quantile::new(standard_normal));
@@ -31,25 +40,56 @@ impl Quantile {
         Self::new(|u| tukey_lambda(u, shape))
     }
 
+    /// The same from the tables that this thread keeps. A table is a twentieth of the work of a small image.
+    pub(crate) fn kept_tukey_lambda(shape: f64) -> Arc<Self> {
+        let bits = shape.to_bits();
+        TUKEY_LAMBDA.with_borrow_mut(|tables| {
+            if let Some((_, table)) = tables.iter().find(|(kept, _)| *kept == bits) {
+                return Arc::clone(table);
+            }
+            if tables.len() == KEPT_TABLES {
+                tables.remove(0);
+            }
+            let table = Arc::new(Self::tukey_lambda(shape));
+            tables.push((bits, Arc::clone(&table)));
+            table
+        })
+    }
+
     /// The quantile of 32 random bits: one for the sign, 31 for u.
     #[inline(always)]
     #[must_use]
     pub fn at(&self, word: u32) -> f32 {
-        let place = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
-        let lower = self.0.at(if place < LAST { place } else { LAST });
-        f32::from_bits(lower.to_bits() ^ (word & 0x8000_0000))
+        signed(self.0.at(place_of(word)), word)
     }
 
     /// The quantiles of a batch of words.
     #[inline(always)]
     #[must_use]
     pub fn lanes(&self, words: &Lanes<u32>) -> Lanes<f32> {
-        let mut numbers = [0.0; LANES];
+        let mut places = [0.0; LANES];
+        for (place, word) in places.iter_mut().zip(words) {
+            *place = place_of(*word);
+        }
+        let mut numbers = self.0.lanes(&places);
         for (number, word) in numbers.iter_mut().zip(words) {
-            *number = self.at(*word);
+            *number = signed(*number, *word);
         }
         numbers
     }
+}
+
+/// The place on the lower half that 31 bits of a word stand for.
+#[inline(always)]
+fn place_of(word: u32) -> f32 {
+    let place = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
+    if place < LAST { place } else { LAST }
+}
+
+/// A quantile of the lower half, or of the upper half, by the first bit of a word.
+#[inline(always)]
+fn signed(lower: f32, word: u32) -> f32 {
+    f32::from_bits(lower.to_bits() ^ (word & 0x8000_0000))
 }
 
 /// The quantile function of Tukey's λ distribution, (u^λ − (1 − u)^λ) / λ and ln u − ln(1 − u) at λ = 0, for u in the

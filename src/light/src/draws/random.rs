@@ -8,8 +8,8 @@ use std::convert::Infallible;
 use std::f64::consts::PI;
 
 use rand::TryRng;
+use rand::distr::{Distribution as _, Open01};
 use rand::rand_core::utils::{fill_bytes_via_next_word, next_u64_via_u32};
-use rand_distr::{Distribution as _, Open01};
 
 use super::lanes::{LANES, Lanes};
 use darkqa_ground::types::degradations::Kind;
@@ -176,7 +176,7 @@ impl Stream {
         field
     }
 
-    /// The words of one site as a generator for the distributions of `rand_distr`.
+    /// The words of one site as a generator for the distributions of `rand`.
     #[must_use]
     pub fn at(self, site: Site) -> SiteWords {
         SiteWords {

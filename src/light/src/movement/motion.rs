@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use rand_distr::{Distribution as _, Open01};
+use rand::distr::{Distribution as _, Open01};
 use serde::{Serialize, Serializer};
 
 use super::streak::Streak;

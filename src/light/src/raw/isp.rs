@@ -52,6 +52,8 @@ pub(crate) struct Developer {
     tone: Tone,
     /// Light at which the sensor saturates, in EV above white.
     headroom_ev: f64,
+    /// The same light; 1 is white.
+    headroom: f32,
     isa: Isa,
 }
 
@@ -63,6 +65,7 @@ impl Developer {
             matrix: state.camera_to_rgb.map(|row| row.map(|value| value as f32)),
             tone,
             headroom_ev: 0.0,
+            headroom: 1.0,
             isa,
         }
     }
@@ -77,13 +80,14 @@ impl Developer {
         Self {
             tone,
             headroom_ev,
+            headroom: libm::exp2(headroom_ev) as f32,
             ..self
         }
     }
 
-    /// Light at which the sensor saturates; 1 is white.
-    fn headroom(&self) -> f32 {
-        libm::exp2(self.headroom_ev) as f32
+    /// The factor of an exposure drop on display values.
+    pub(crate) fn factor(&self, drop_ev: f64) -> f32 {
+        curve::display_factor(drop_ev - self.headroom_ev) as f32
     }
 
     /// Multiplies a sensor row by the white-balance and brightness gains and clips it between 0 and the sensor's saturation.
@@ -92,7 +96,7 @@ impl Developer {
             let gain = self.gains[Plane::at(row, parity) as usize];
             self.isa.run(WhiteBalance {
                 gain,
-                most: self.headroom(),
+                most: self.headroom,
                 samples,
             });
         }
@@ -118,21 +122,21 @@ impl Developer {
         });
     }
 
-    /// Writes the 8-bit codes of display values after an exposure drop.
-    pub(crate) fn encode(&self, display: &[f32], drop_ev: f64, codes: &mut [u8]) {
+    /// Writes the 8-bit codes of display values after an exposure drop with this [`Developer::factor`].
+    pub(crate) fn encode(&self, display: &[f32], factor: f32, codes: &mut [u8]) {
         self.isa.run(Encode {
             display,
-            factor: curve::display_factor(drop_ev - self.headroom_ev) as f32,
+            factor,
             tone: self.tone,
             codes,
         });
     }
 
     /// Writes the linear light of display values after an exposure drop, which the codes of [`Developer::encode`] round.
-    pub(super) fn expand(&self, display: &[f32], drop_ev: f64, light: &mut [f32]) {
+    pub(super) fn expand(&self, display: &[f32], factor: f32, light: &mut [f32]) {
         self.isa.run(Expand {
             display,
-            factor: curve::display_factor(drop_ev - self.headroom_ev) as f32,
+            factor,
             tone: self.tone,
             light,
         });
@@ -179,33 +183,20 @@ impl Kernel for Display<'_> {
     #[inline(always)]
     fn run(self) {
         let gamma = &*GAMMA;
-        let scale = 1.0 / self.developer.headroom();
+        let scale = 1.0 / self.developer.headroom;
         let mut colours = [[[0.0; LANES]; 3]; 2];
         for (index, values) in self.values.chunks_mut(6 * LANES).enumerate() {
             bayer::demosaic(self.rows, self.row, index, &mut colours);
             self.developer.to_linear_srgb(&mut colours, scale);
-            let [even, odd] = &colours;
-            for (lane, values) in values.chunks_mut(6).enumerate().take(LANES) {
-                let (even, odd) = (even.each_ref(), odd.each_ref());
-                let pair = [
-                    even[0][lane],
-                    even[1][lane],
-                    even[2][lane],
-                    odd[0][lane],
-                    odd[1][lane],
-                    odd[2][lane],
-                ];
-                if let Ok(values) = <&mut [f32; 6]>::try_from(&mut *values) {
-                    for (value, light) in values.iter_mut().zip(pair) {
-                        *value = gamma.at(light);
-                    }
-                } else {
-                    // The last pixel of an odd width.
-                    for (value, light) in values.iter_mut().zip(pair) {
-                        *value = gamma.at(light);
-                    }
-                }
+            for channel in colours.as_flattened_mut() {
+                *channel = gamma.lanes(channel);
             }
+            let [[er, eg, eb], [or, og, ob]] = &colours;
+            let mut pairs = [[0.0; 6]; LANES];
+            for (lane, pair) in pairs.iter_mut().enumerate() {
+                *pair = [er[lane], eg[lane], eb[lane], or[lane], og[lane], ob[lane]];
+            }
+            values.copy_from_slice(&pairs.as_flattened()[..values.len()]);
             if self.developer.tone == Tone::BeforeEv {
                 for value in values {
                     *value = curve::smoothstep(*value);
@@ -309,7 +300,8 @@ mod tests {
             let light: Vec<f32> = (0..=300_000).map(|step| step as f32 / 300_000.0).collect();
             let display: Vec<f32> = light.iter().map(|x| GAMMA.at(x.max(DARKEST))).collect();
             let mut codes = vec![0; light.len()];
-            developer(Tone::None).encode(&display, level.value(), &mut codes);
+            let developer = developer(Tone::None);
+            developer.encode(&display, developer.factor(level.value()), &mut codes);
             for (light, code) in light.iter().zip(codes) {
                 let expected = curve::gamma_compress(factor * f64::from(*light));
                 let edge = (expected * 255.0 + 0.5).fract();
@@ -325,12 +317,14 @@ mod tests {
         let ends = Severity::LADDER.map(|level| {
             let mut codes = [7; 2];
             let display = [GAMMA.at(DARKEST), GAMMA.at(1.0)];
-            developer(Tone::None).encode(&display, level.value(), &mut codes);
+            let developer = developer(Tone::None);
+            developer.encode(&display, developer.factor(level.value()), &mut codes);
             codes
         });
         assert_eq!(ends, [[0, 136], [0, 72], [0, 39], [0, 24], [0, 15]]);
         let mut codes = [0; 2];
-        developer(Tone::None).encode(&[0.9, 1.0], -3.0, &mut codes);
+        let developer = developer(Tone::None);
+        developer.encode(&[0.9, 1.0], developer.factor(-3.0), &mut codes);
         assert_eq!(codes, [255, 255]);
     }
 

@@ -13,8 +13,9 @@ use crate::noise_profile::{Amplify, Coupling, Draws, Synthesis, Tone};
 use darkqa_ground::types::images::{Isa, Sample};
 use darkqa_ground::types::{Image, Rgb, Severity};
 
-/// Rows of a band, which is processed from RAW to codes within a core's cache; chosen.
-const BAND: usize = 32;
+/// Rows of a band, which is processed from RAW to codes within a core's cache; chosen. Images of 480, 720, 1080 or 1440 rows have an
+/// even number of bands, which two threads can share equally.
+const BAND: usize = 30;
 
 /// Noisy RAW image of a frame. Camera and noise are drawn once and shared by all levels developed from it.
 ///
@@ -100,6 +101,7 @@ impl Negative {
     #[must_use]
     pub fn develop_by(&self, drop_ev: f64) -> Rgb {
         let [height, width] = self.size;
+        let factor = self.developer.factor(drop_ev);
         let mut degraded = Rgb::black(height, width);
         degraded
             .samples_mut()
@@ -109,25 +111,25 @@ impl Negative {
                 || vec![0.0; 3 * width],
                 |display, (row, codes)| {
                     self.developer.display(&self.balanced, row, display);
-                    self.developer.encode(display, drop_ev, codes);
+                    self.developer.encode(display, factor, codes);
                 },
             );
         degraded
     }
 }
 
-/// Develops a frame at several levels: `images[i]`, of the frame's size, receives the image at `levels[i]`.
+/// Develops a frame at several levels: `images[i]` receives the samples of the image at `levels[i]`.
 ///
 /// The images equal those of [`Negative::develop`]; together they take less time and memory.
 ///
 /// # Panics
-/// If an image has another size, or there are more levels than images.
+/// If an image has another number of samples than the frame, or there are more levels than images.
 pub fn ladder<'a>(
     clean: impl Into<Clean<'a>>,
     key: &NoiseKey,
     synthesis: &Synthesis,
     levels: &[Severity],
-    images: &mut [Rgb],
+    images: &mut [&mut [u8]],
 ) {
     let (clean, isa) = (clean.into(), Isa::best());
     if synthesis.shares_negative() {
@@ -173,27 +175,27 @@ pub fn develop_with_state(
     let capture = Capture::with(key, state, amplify, tone, &Term::ALL, Isa::best());
     let capture = capture.for_clean(clean, headroom_ev);
     let mut image = Rgb::black(clean.height(), clean.width());
-    capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
+    capture.develop(clean, &[drop_ev], &mut [image.samples_mut()]);
     image
 }
 
 /// A sample of a developed image.
 pub(crate) trait Target: Sample + Send {
-    /// Writes the samples of display values after an exposure drop.
-    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]);
+    /// Writes the samples of display values after an exposure drop with this [`Developer::factor`].
+    fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]);
 }
 
 /// 8-bit codes.
 impl Target for u8 {
-    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]) {
-        developer.encode(display, drop_ev, samples);
+    fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]) {
+        developer.encode(display, factor, samples);
     }
 }
 
 /// Linear light.
 impl Target for f32 {
-    fn write(developer: &Developer, display: &[f32], drop_ev: f64, samples: &mut [Self]) {
-        developer.expand(display, drop_ev, samples);
+    fn write(developer: &Developer, display: &[f32], factor: f32, samples: &mut [Self]) {
+        developer.expand(display, factor, samples);
     }
 }
 
@@ -224,7 +226,7 @@ impl Capture {
     ) -> Image<T> {
         let mut image = Image::black(clean.height(), clean.width());
         let capture = self.for_clean(clean, headroom_ev);
-        capture.develop(clean, &[drop_ev], std::slice::from_mut(&mut image));
+        capture.develop(clean, &[drop_ev], &mut [image.samples_mut()]);
         image
     }
 
@@ -265,14 +267,18 @@ impl Capture {
         line.repeat_edges();
     }
 
-    /// Develops the frame after each of these exposure drops, band by band.
-    fn develop<T: Target>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [Image<T>]) {
+    /// Develops the frame after each of these exposure drops, band by band. `images` are the samples of images of its size.
+    fn develop<T: Target>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [&mut [T]]) {
         let (height, width) = (clean.height(), clean.width());
+        let factors: Vec<f32> = drops
+            .iter()
+            .map(|drop_ev| self.developer.factor(*drop_ev))
+            .collect();
         let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
         bands.resize_with(height.div_ceil(BAND), Vec::new);
         for image in &mut images[..drops.len()] {
-            assert_eq!((image.height(), image.width()), (height, width));
-            let parts = image.samples_mut().chunks_mut(BAND * 3 * width);
+            assert_eq!(image.len(), 3 * height * width);
+            let parts = image.chunks_mut(BAND * 3 * width);
             for (band, part) in bands.iter_mut().zip(parts) {
                 band.push(part);
             }
@@ -294,9 +300,9 @@ impl Capture {
                 }
                 for row in 0..rows {
                     self.developer.display(raw, lead + row, display);
-                    for (drop_ev, part) in drops.iter().zip(&mut parts) {
+                    for (factor, part) in factors.iter().zip(&mut parts) {
                         let samples = &mut part[row * 3 * width..][..3 * width];
-                        T::write(&self.developer, display, *drop_ev, samples);
+                        T::write(&self.developer, display, *factor, samples);
                     }
                 }
             },
@@ -371,7 +377,8 @@ mod tests {
                     let capture = Capture::with(&key, &state, amplify, tone, &Term::ALL, *isa);
                     let mut images = Severity::LADDER.map(|_| Rgb::black(40, 150));
                     let drops = Severity::LADDER.map(Severity::value);
-                    capture.develop((&clean).into(), &drops, &mut images);
+                    let mut samples = images.each_mut().map(Rgb::samples_mut);
+                    capture.develop((&clean).into(), &drops, &mut samples);
                     images
                 };
                 let baseline = develop(&Isa::Baseline);

@@ -7,6 +7,8 @@
 //! attenuated signal. [`Amplify`] chooses between the two. In the first form the three terms add less than 0.1 codes to an image
 //! (`departures` measures it).
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::bayer::{Bayer, Plane, RawRow};
@@ -91,7 +93,7 @@ pub(super) struct Noise {
     /// System gain K, in ADU per electron; `None` without shot noise.
     shot: Option<f32>,
     /// Scale in ADU and quantile function; `None` without read noise.
-    read: Option<(f32, Quantile)>,
+    read: Option<(f32, Arc<Quantile>)>,
     bias: [f32; 4],
     /// Standard deviation in ADU and random stream; `None` without row noise.
     row: Option<(f64, Stream)>,
@@ -116,7 +118,7 @@ impl Noise {
             adu_range: state.adu_range as f32,
             shot: has(Term::Shot).then_some(state.system_gain as f32),
             read: has(Term::Read).then(|| {
-                let shape = Quantile::tukey_lambda(state.read_shape);
+                let shape = Quantile::kept_tukey_lambda(state.read_shape);
                 (state.read_scale as f32, shape)
             }),
             bias: state.bias.map(|offset| offset as f32),
