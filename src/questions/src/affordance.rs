@@ -68,7 +68,7 @@ fn can_be_enabled(context: &RuleContext<'_>, activity: &ActivityRule) -> bool {
 /// True if a segment is a typical member of its class: its token is its own word, or questions call it by its word. The sofa of a coarse
 /// label space may be an armchair.
 fn is_called(context: &RuleContext<'_>, segment: &Segment) -> bool {
-    segment.token(context.book) != segment.class || segment.called(context.book).is_some()
+    segment.token(context.book) != segment.class || segment.question_word(context.book).is_some()
 }
 
 /// No: the room is known and of another type, and no object that the activity needs, or that could substitute one, has a
@@ -91,7 +91,7 @@ fn no(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, 
         .iter()
         .filter(|_| context.book.affordance.strict);
     let tokens: Vec<&String> = activity.enablers.iter().flatten().chain(pinch).collect();
-    if !tokens.iter().all(|token| context.expressible(token)) {
+    if !tokens.iter().all(|token| context.is_expressible(token)) {
         return Err(Reason::Inexpressible);
     }
     if tokens.iter().any(|token| context.may_be_hidden(token)) {
@@ -99,7 +99,7 @@ fn no(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, 
     }
     if tokens
         .iter()
-        .any(|token| context.statistics.shows(token, context.book))
+        .any(|token| context.statistics.has_token(token, context.book))
     {
         return Err(Reason::Seen);
     }
@@ -108,7 +108,7 @@ fn no(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, 
         activity,
         room,
         1,
-        &context.signs_of(room),
+        &context.room_evidence(room),
     ))
 }
 

@@ -30,7 +30,7 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     let mut objects: Vec<NearObject<'_>> = statistics
         .evidence(book)
         .filter(|segment| eligible(context, segment))
-        .filter_map(|segment| Some((segment, segment.measured(book)?)))
+        .filter_map(|segment| Some((segment, segment.reliable_depth(book)?)))
         .collect();
     objects.sort_by_key(|(segment, depth)| (depth.median, segment.id));
     let [first, rest @ ..] = &objects[..] else {
@@ -79,7 +79,7 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
 fn classes<'a>(objects: &[NearObject<'a>], book: &'a RuleBook) -> Vec<(&'a str, &'a str)> {
     let mut classes: Vec<(&str, &str)> = Vec::new();
     for (segment, _) in objects {
-        let Some(word) = segment.called(book) else {
+        let Some(word) = segment.question_word(book) else {
             continue;
         };
         if classes
@@ -95,11 +95,11 @@ fn classes<'a>(objects: &[NearObject<'a>], book: &'a RuleBook) -> Vec<(&'a str, 
 /// Whether a segment may be offered.
 fn eligible(context: &RuleContext<'_>, segment: &Segment) -> bool {
     let book = context.book;
-    book.is(&segment.class, ClassFlag::Asked)
-        && !book.is(&segment.class, ClassFlag::Structural)
-        && !segment.flat(book)
-        && segment.called(book).is_some()
-        && context.statistics.area(segment) >= book.closest.area_ppm
+    book.has_flag(&segment.class, ClassFlag::Asked)
+        && !book.has_flag(&segment.class, ClassFlag::Structural)
+        && !segment.is_flat(book)
+        && segment.question_word(book).is_some()
+        && context.statistics.area_ppm(segment) >= book.closest.area_ppm
 }
 
 /// The distance in mm from the first object's 10 % depth quantile to the smallest one of the others. `None` if another is
@@ -147,17 +147,18 @@ fn check_rivals(
     second: u32,
 ) -> Result<(), Reason> {
     let (book, statistics) = (context.book, context.statistics);
-    let background_class =
-        |class: &str| book.is(class, ClassFlag::Structural) || book.is(class, ClassFlag::Flat);
+    let background_class = |class: &str| {
+        book.has_flag(class, ClassFlag::Structural) || book.has_flag(class, ClassFlag::Flat)
+    };
     for segment in &statistics.segments {
         // A segment of several classes may be any object.
         let background =
-            (background_class(&segment.class) || segment.flat(book)) && !segment.mixed(book);
+            (background_class(&segment.class) || segment.is_flat(book)) && !segment.is_mixed(book);
         if background || objects.iter().any(|(object, _)| object.id == segment.id) {
             continue;
         }
-        let area = statistics.area(segment);
-        match segment.measured(book) {
+        let area = statistics.area_ppm(segment);
+        match segment.reliable_depth(book) {
             None if area >= book.closest.unmeasured_ppm => return Err(Reason::Unmeasured),
             Some(depth)
                 if area >= book.closest.rival_ppm

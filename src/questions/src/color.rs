@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::colors::{Color, Palette};
 use super::reason::Reason;
-use super::relative::relative;
+use super::relative::relative_code;
 use super::rule_context::{Candidate, RuleContext, RuleResult, rejected};
 use super::rules::{ClassFlag, ColorChoices, ColorRule};
 use super::statistics::{Segment, ppm};
@@ -16,7 +16,7 @@ pub(super) fn candidates(context: &RuleContext<'_>, palette: &Palette) -> Vec<Ru
         .statistics
         .segments
         .iter()
-        .filter(|segment| context.book.is(&segment.class, ClassFlag::Color))
+        .filter(|segment| context.book.has_flag(&segment.class, ClassFlag::Color))
         .map(|segment| {
             let result = candidate(context, segment, palette);
             result.unwrap_or_else(|reason| rejected(Family::Color, &segment.class, None, reason))
@@ -30,19 +30,24 @@ fn candidate(
     palette: &Palette,
 ) -> Result<RuleResult, Reason> {
     let rule = &context.book.color;
-    if let Some(reason) = context.statistics.disqualified(segment, context.book) {
+    if let Some(reason) = context.statistics.evidence_flaw(segment, context.book) {
         return Err(reason);
     }
-    if context.statistics.area(segment) < rule.area_ppm || segment.core < rule.eroded_px {
+    if context.statistics.area_ppm(segment) < rule.area_ppm || segment.core < rule.eroded_px {
         return Err(Reason::Small);
     }
     if !unique(context, segment) {
         return Err(Reason::NotUnique);
     }
-    let word = segment.called(context.book).ok_or(Reason::Wordless)?;
+    let word = segment
+        .question_word(context.book)
+        .ok_or(Reason::Wordless)?;
     let color = dominant_color(segment, rule, palette)?;
     check_light(context, segment, color, palette)?;
-    if context.views.disagree(context.statistics, segment, color) {
+    if context
+        .views
+        .has_other_color(context.statistics, segment, color)
+    {
         return Err(Reason::Disagreed);
     }
     let (choices, truth) = offered(context, color).ok_or(Reason::NotOffered)?;
@@ -57,7 +62,7 @@ fn candidate(
         "light_rgb": context.statistics.light,
         "around_luma": segment.around,
     });
-    let text = context.book.filled(&rule.text, &rule.plural, word);
+    let text = context.book.fill_template(&rule.text, &rule.plural, word);
     Ok(context.viable(
         Candidate {
             family: Family::Color,
@@ -76,7 +81,9 @@ fn candidate(
 fn unique(context: &RuleContext<'_>, segment: &Segment) -> bool {
     let (statistics, least) = (context.statistics, context.book.color.lone_ppm);
     let others = statistics.segments.iter().filter(|other| {
-        other.class == segment.class && other.id != segment.id && statistics.area(other) >= least
+        other.class == segment.class
+            && other.id != segment.id
+            && statistics.area_ppm(other) >= least
     });
     let loose = statistics.loose.get(&segment.class).copied().unwrap_or(0);
     others.count() == 0 && statistics.ppm(loose) < least
@@ -117,7 +124,7 @@ fn check_light(
     ];
     if lights.into_iter().flatten().all(|light: [u8; 3]| {
         palette.color(
-            [0, 1, 2].map(|channel: usize| relative(segment.median[channel], light[channel])),
+            [0, 1, 2].map(|channel: usize| relative_code(segment.median[channel], light[channel])),
         ) == Some(color)
     }) {
         Ok(())

@@ -18,7 +18,7 @@ impl Frequency {
         let evidence = statistics.evidence(book);
         let classes: BTreeSet<&str> = evidence
             .map(|segment| segment.class.as_str())
-            .filter(|class| book.is(class, ClassFlag::Asked))
+            .filter(|class| book.has_flag(class, ClassFlag::Asked))
             .collect();
         for room in [Some(""), room].into_iter().flatten() {
             let scenes = self.counts.entry(room.to_owned()).or_default();

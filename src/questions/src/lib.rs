@@ -12,6 +12,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod affordance;
+pub mod appearance;
 pub mod balance;
 mod closest;
 mod color;
@@ -20,7 +21,6 @@ mod color_tree;
 pub mod colors;
 pub mod frequency;
 pub mod generate;
-pub mod look;
 pub mod observer;
 pub mod pick;
 pub mod predicted;

@@ -12,7 +12,7 @@ use darkqa_ground::types::{DepthKind, Digest, Frame, FrameId, Question, Rgb, Seg
 use ndarray::{Array2, ShapeError};
 
 use crate::colors::{Color, Palette};
-use crate::observer::wording::QuestionTopic;
+use crate::observer::question_topic::QuestionTopic;
 use crate::rule_context::YES_NO;
 use crate::rules::Rules;
 use crate::statistics::{FrameStatistics, Segment, measure};

@@ -51,7 +51,10 @@ fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason
     let mut shown: BTreeMap<&str, &Segment> = BTreeMap::new();
     let mut first_flaw = None;
     for segment in segments {
-        match (flaw(context, segment, rule), segment.called(context.book)) {
+        match (
+            flaw(context, segment, rule),
+            segment.question_word(context.book),
+        ) {
             (None, Some(word)) => drop(shown.entry(word).or_insert(segment)),
             (flaw, _) => {
                 first_flaw.get_or_insert(flaw.unwrap_or(Reason::Wordless));
@@ -69,10 +72,10 @@ fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason
 }
 
 fn flaw(context: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Option<Reason> {
-    if let Some(reason) = context.statistics.disqualified(segment, context.book) {
+    if let Some(reason) = context.statistics.evidence_flaw(segment, context.book) {
         return Some(reason);
     }
-    let area = context.statistics.area(segment);
+    let area = context.statistics.area_ppm(segment);
     if area < rule.area_ppm {
         Some(Reason::Small)
     } else if ppm(segment.pure, segment.area) < rule.purity_ppm {
@@ -152,7 +155,7 @@ fn candidate(
     evidence: serde_json::Value,
 ) -> RuleResult {
     let rule = &context.book.presence;
-    let text = context.book.filled(&rule.text, &rule.plural, word);
+    let text = context.book.fill_template(&rule.text, &rule.plural, word);
     context.viable(
         Candidate {
             family: Family::Presence,

@@ -104,7 +104,7 @@ impl<'a> Signs<'a> {
         if clue
             .unseen
             .iter()
-            .any(|token| self.statistics.shows(token, self.book))
+            .any(|token| self.statistics.has_token(token, self.book))
         {
             return None;
         }
@@ -119,7 +119,7 @@ impl<'a> Signs<'a> {
         let segments = self.tokens.get(sign.token.as_str())?;
         let large: Vec<&Segment> = segments
             .iter()
-            .filter(|segment| self.statistics.area(segment) >= sign.area_ppm)
+            .filter(|segment| self.statistics.area_ppm(segment) >= sign.area_ppm)
             .copied()
             .collect();
         let enough = large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
@@ -145,7 +145,7 @@ impl<'a> Signs<'a> {
             && !contest
                 .unseen
                 .iter()
-                .any(|token| self.statistics.shows(token, self.book))
+                .any(|token| self.statistics.has_token(token, self.book))
     }
 
     /// Whether the second room is seen through a door: its segments are small and all far behind the first's.
@@ -162,7 +162,7 @@ impl<'a> Signs<'a> {
         let area = |list: &[&Segment]| -> u64 { list.iter().map(|segment| segment.area).sum() };
         let medians = |list: &[&Segment]| -> Option<Vec<u64>> {
             list.iter()
-                .map(|segment| Some(segment.measured(self.book)?.median.into()))
+                .map(|segment| Some(segment.reliable_depth(self.book)?.median.into()))
                 .collect()
         };
         let (Some(near), Some(far)) = (medians(&first), medians(&second)) else {

@@ -21,11 +21,11 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     }
     let asked: Vec<&Segment> = statistics
         .evidence(book)
-        .filter(|segment| book.is(&segment.class, ClassFlag::Asked))
+        .filter(|segment| book.has_flag(&segment.class, ClassFlag::Asked))
         .collect();
     let large = asked
         .iter()
-        .any(|segment| statistics.area(segment) >= rule.large_ppm);
+        .any(|segment| statistics.area_ppm(segment) >= rule.large_ppm);
     if asked.len() < rule.least_asked && !large {
         return reject(Reason::Bare);
     }
@@ -43,6 +43,6 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
             truth,
             evidence,
         },
-        &context.signs_of(room),
+        &context.room_evidence(room),
     )]
 }

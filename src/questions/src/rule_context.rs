@@ -122,7 +122,7 @@ impl RuleContext<'_> {
             "id": segment.id,
             "class": segment.class,
             "word": segment.word,
-            "area_ppm": self.statistics.area(segment),
+            "area_ppm": self.statistics.area_ppm(segment),
             "bbox": segment.bbox,
         });
         if let (Some(depth), Some(json)) = (segment.depth, json.as_object_mut()) {
@@ -135,7 +135,7 @@ impl RuleContext<'_> {
     }
 
     /// The segments that are evidence for a room type.
-    pub(super) fn signs_of(&self, room: &str) -> Vec<&Segment> {
+    pub(super) fn room_evidence(&self, room: &str) -> Vec<&Segment> {
         let signs = self.signs.segments.get(room);
         self.statistics
             .segments
@@ -169,7 +169,7 @@ impl RuleContext<'_> {
 
     /// Whether the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word
     /// always passes, because its class is unknown.
-    pub(super) fn expressible(&self, token: &str) -> bool {
+    pub(super) fn is_expressible(&self, token: &str) -> bool {
         !self.book.class.contains_key(token) || self.labels.expressible.contains(token)
     }
 }

@@ -36,7 +36,12 @@ impl Views {
     }
 
     /// Whether some view of the thing shows another colour than this one.
-    pub fn disagree(&self, frame: &FrameStatistics, segment: &Segment, color: Color) -> bool {
+    pub fn has_other_color(
+        &self,
+        frame: &FrameStatistics,
+        segment: &Segment,
+        color: Color,
+    ) -> bool {
         let colors = self.0.get(&Self::key(frame, segment));
         segment.source == WordSource::Name
             && colors.is_some_and(|colors| colors.iter().any(|other| *other != Some(color)))

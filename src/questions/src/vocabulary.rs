@@ -31,7 +31,7 @@ impl Vocabulary {
         if !segments().any(|segment| segment.source == WordSource::Name) {
             for label in labels.labels.values() {
                 let (word, _) = plain_word(&label.name);
-                if book.coarse.says(&labels.space, &word) {
+                if book.coarse.identifies_object(&labels.space, &word) {
                     vocabulary.add(&label.canonical, &word, book);
                 }
             }
@@ -41,7 +41,7 @@ impl Vocabulary {
 
     fn add(&mut self, class: &str, word: &str, book: &RuleBook) {
         self.tokens.insert(book.token(word, class).to_owned());
-        if let Some(question_word) = book.called(class, word) {
+        if let Some(question_word) = book.question_word(class, word) {
             let words = self.words.entry(class.to_owned()).or_default();
             words.insert(question_word.to_owned());
         }

@@ -115,7 +115,7 @@ const DONE_IN: [(&str, &[&str]); 10] = [
 /// The word by which questions call a thing; its class if they do not name it.
 fn called(thing: &ThingTruth) -> String {
     static RULES: LazyLock<Rules> = LazyLock::new(|| Rules::built_in().unwrap());
-    let word = RULES.book().called(thing.class, thing.word);
+    let word = RULES.book().question_word(thing.class, thing.word);
     word.unwrap_or(thing.class).to_owned()
 }
 

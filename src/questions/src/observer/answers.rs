@@ -1,7 +1,7 @@
 //! Answers from visible evidence alone: [`Observation::answer`].
 
-use super::wording::{QuestionTopic, ThingWord};
-use super::{Observation, Shade};
+use super::question_topic::{QuestionTopic, ThingWord};
+use super::{ColorPosterior, Observation};
 use crate::colors::{Color, Palette};
 use crate::room::classify;
 use crate::rule_context::YES_NO;
@@ -11,7 +11,7 @@ use darkqa_ground::types::Question;
 
 impl Observation {
     /// The answer to a question, as an index of its choices. `None` if nothing that is seen bears on it, or if the question is
-    /// not one of the rulebook (see [`understood`](super::understood)).
+    /// not one of the rulebook (see [`is_in_rulebook`](super::is_in_rulebook)).
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules, palette: &Palette) -> Option<usize> {
         let answer = match QuestionTopic::from_question(question, rules.book())? {
@@ -48,7 +48,7 @@ impl Observation {
         let enabled = activity.enablers.iter().any(|tokens| {
             tokens
                 .iter()
-                .all(|token| self.statistics.shows(token, book))
+                .all(|token| self.statistics.has_token(token, book))
         });
         let yes = enabled || activity.rooms.contains(&self.room(rules)?);
         Some(yes_no(yes))
@@ -68,7 +68,7 @@ impl Observation {
     /// Whether at least half of the area of the frame's things is seen; of all segments, if there is no thing.
     fn sees_half(&self, rules: &Rules) -> bool {
         let book = rules.book();
-        let is_thing = |segment: &&Segment| !book.is(&segment.class, ClassFlag::Structural);
+        let is_thing = |segment: &&Segment| !book.has_flag(&segment.class, ClassFlag::Structural);
         let has_things = self.frame.segments.iter().any(|segment| is_thing(&segment));
         let area = |segments: &[Segment]| -> u64 {
             segments
@@ -95,7 +95,7 @@ impl Observation {
             .iter()
             .filter(|segment| thing.calls(segment, rules.book()))
             .max_by_key(|segment| (segment.area, std::cmp::Reverse(segment.id)))?;
-        let shade: &Shade = self.shades.get(&largest.id)?.as_ref()?;
+        let shade: &ColorPosterior = self.colors.get(&largest.id)?.as_ref()?;
         let texts = question.choices.texts();
         let offered: Vec<Color> = Color::ALL
             .into_iter()
@@ -114,11 +114,11 @@ impl Observation {
             .segments
             .iter()
             .filter(|segment| {
-                let word = segment.called(book);
-                book.is(&segment.class, ClassFlag::Asked)
+                let word = segment.question_word(book);
+                book.has_flag(&segment.class, ClassFlag::Asked)
                     && texts.iter().any(|text| Some(&**text) == word)
             })
-            .filter_map(|segment| Some((segment.measured(book)?, segment)))
+            .filter_map(|segment| Some((segment.reliable_depth(book)?, segment)))
             .collect();
         let (_, nearest) = measured
             .iter()
@@ -126,7 +126,7 @@ impl Observation {
         let has_two = measured
             .iter()
             .any(|(_, segment)| segment.class != nearest.class);
-        has_two.then(|| nearest.called(book).map(str::to_owned))?
+        has_two.then(|| nearest.question_word(book).map(str::to_owned))?
     }
 }
 

@@ -1,5 +1,5 @@
 //! The images of the observer's controls, in which there is nothing to see of a frame, so that the observer must guess:
-//! [`spoiled`].
+//! [`control_image`].
 //!
 //! An observer that answers more than chance on one of them answers from the labels and not from the pixels.
 
@@ -14,27 +14,27 @@ const BOX: usize = 41;
 
 /// An image as a control shows it. Random numbers are drawn from `key` and the name of the control.
 #[must_use]
-pub fn spoiled(control: Control, image: &Rgb, frame: &ObservedFrame, key: &Digest) -> Rgb {
-    let mut draws = Draws::new(key, control);
+pub fn control_image(control: Control, image: &Rgb, frame: &ObservedFrame, key: &Digest) -> Rgb {
+    let mut rng = SplitMix64::new(key, control);
     let [width, height] = [image.width(), image.height()];
-    let at = |from: &dyn Fn(usize, usize) -> [usize; 2]| moved(image, from);
+    let at = |from: &dyn Fn(usize, usize) -> [usize; 2]| remap(image, from);
     match control {
         Control::OtherRoom => image.clone(),
         Control::Mosaic12 => mosaic(image, 12),
         Control::Mosaic40 => mosaic(image, 40),
         Control::Mirrored => at(&|x, y| [width - 1 - x, y]),
         Control::UpsideDown => at(&|x, y| [x, height - 1 - y]),
-        Control::Tiles => tiles(image, &mut draws),
+        Control::Tiles => shuffle_tiles(image, &mut rng),
         Control::Black => Rgb::black(height, width),
         Control::Flat => mosaic(image, width.max(height)),
         Control::WhiteNoise => {
             let mut noise = image.clone();
             for code in noise.samples_mut() {
-                *code = (draws.next() >> 56) as u8;
+                *code = (rng.next() >> 56) as u8;
             }
             noise
         }
-        Control::PinkNoise => pink_noise(image, &mut draws),
+        Control::PinkNoise => pink_noise(image, &mut rng),
         Control::Negative => {
             let mut negative = image.clone();
             for code in negative.samples_mut() {
@@ -42,18 +42,18 @@ pub fn spoiled(control: Control, image: &Rgb, frame: &ObservedFrame, key: &Diges
             }
             negative
         }
-        Control::Blur => blurred(image),
+        Control::Blur => blur(image),
         Control::Shift32 => at(&|x, y| shifted([x, y], [width, height], 32)),
         Control::Shift4 => at(&|x, y| shifted([x, y], [width, height], 4)),
-        Control::RandomMasks => random_masks(frame, &mut draws),
-        Control::Outlines => drawn_outlines(frame),
+        Control::RandomMasks => random_masks(frame, &mut rng),
+        Control::Outlines => draw_outlines(frame),
     }
 }
 
 /// Random numbers: `SplitMix64` (Steele, Lea and Flood, OOPSLA 2014).
-struct Draws(u64);
+struct SplitMix64(u64);
 
-impl Draws {
+impl SplitMix64 {
     fn new(key: &Digest, control: Control) -> Self {
         let seed = Digest::from_parts([&key.as_bytes()[..], control.name().as_bytes()]);
         let (words, _) = seed.as_bytes().as_chunks::<8>();
@@ -80,7 +80,7 @@ impl Draws {
 }
 
 /// An image whose pixel at (x, y) is the one of `image` that `from` names.
-fn moved(image: &Rgb, from: &dyn Fn(usize, usize) -> [usize; 2]) -> Rgb {
+fn remap(image: &Rgb, from: &dyn Fn(usize, usize) -> [usize; 2]) -> Rgb {
     let width = image.width();
     let mut moved = image.clone();
     for (i, pixel) in moved.samples_mut().chunks_exact_mut(3).enumerate() {
@@ -118,15 +118,15 @@ fn mosaic(image: &Rgb, side: usize) -> Rgb {
 
 /// The tiles in a cyclic order at random (Sattolo 1986), so that none stays in its place. At the right and lower edges a tile is
 /// cut, or its last pixels are repeated.
-fn tiles(image: &Rgb, draws: &mut Draws) -> Rgb {
+fn shuffle_tiles(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
     let [width, height] = [image.width(), image.height()];
     let side = TILE.min(width.min(height) / 3).max(1);
     let columns = width.div_ceil(side);
     let mut order: Vec<usize> = (0..columns * height.div_ceil(side)).collect();
     for last in (1..order.len()).rev() {
-        order.swap(last, draws.below(last));
+        order.swap(last, rng.below(last));
     }
-    moved(image, &|x, y| {
+    remap(image, &|x, y| {
         let tile = order[y / side * columns + x / side];
         let from = [
             tile % columns * side + x % side,
@@ -138,7 +138,7 @@ fn tiles(image: &Rgb, draws: &mut Draws) -> Rgb {
 
 /// A sum of noise fields, each twice as coarse as the one before, all with the same variance; scaled to mean 128 and a standard
 /// deviation of 50 codes.
-fn pink_noise(image: &Rgb, draws: &mut Draws) -> Rgb {
+fn pink_noise(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
     let [width, height] = [image.width(), image.height()];
     let mut noise = image.clone();
     for channel in 0..3 {
@@ -147,7 +147,7 @@ fn pink_noise(image: &Rgb, draws: &mut Draws) -> Rgb {
         while side < width.max(height) {
             let columns = width / side + 2;
             let count = columns * (height / side + 2);
-            let knots: Vec<f64> = (0..count).map(|_| draws.unit() - 0.5).collect();
+            let knots: Vec<f64> = (0..count).map(|_| rng.unit() - 0.5).collect();
             for (i, value) in field.iter_mut().enumerate() {
                 let (x, y) = (i % width, i / width);
                 let [right, below] = [x % side, y % side].map(|rest| rest as f64 / side as f64);
@@ -173,7 +173,7 @@ fn pink_noise(image: &Rgb, draws: &mut Draws) -> Rgb {
 }
 
 /// Three box means along each axis.
-fn blurred(image: &Rgb) -> Rgb {
+fn blur(image: &Rgb) -> Rgb {
     let [width, height] = [image.width(), image.height()];
     let mut planes: Vec<f64> = image
         .samples()
@@ -211,9 +211,9 @@ fn box_mean(values: &mut [f64], start: usize, step: usize, count: usize) {
 }
 
 /// The masks of a frame, each in a colour at random.
-fn random_masks(frame: &ObservedFrame, draws: &mut Draws) -> Rgb {
+fn random_masks(frame: &ObservedFrame, rng: &mut SplitMix64) -> Rgb {
     let colours: Vec<[u8; 3]> = (0..=frame.cells.masks)
-        .map(|_| [0; 3].map(|_: u8| (draws.next() >> 56) as u8))
+        .map(|_| [0; 3].map(|_: u8| (rng.next() >> 56) as u8))
         .collect();
     let masks = frame.cells.mask_of_pixels();
     let mut image = frame.untouched.clone();
@@ -224,7 +224,7 @@ fn random_masks(frame: &ObservedFrame, draws: &mut Draws) -> Rgb {
 }
 
 /// Black where the pixel to the right or below belongs to another mask, grey elsewhere.
-fn drawn_outlines(frame: &ObservedFrame) -> Rgb {
+fn draw_outlines(frame: &ObservedFrame) -> Rgb {
     let masks = frame.cells.mask_of_pixels();
     let width = frame.untouched.width();
     let mut image = frame.untouched.clone();

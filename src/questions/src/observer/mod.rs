@@ -31,32 +31,32 @@
 mod answers;
 mod cells;
 mod channel;
+mod color_posterior;
 pub mod controls;
 mod local;
 mod outlines;
+pub(crate) mod question_topic;
 pub mod resample;
-mod shade;
 #[cfg(test)]
 mod tests;
 mod tiles;
-pub(crate) mod wording;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::colors::Palette;
 use super::rules::Rules;
-use super::statistics::scene::SceneMaps;
+use super::statistics::scene_maps::SceneMaps;
 use super::statistics::{FrameStatistics, measure};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Digest, Frame, Labels, Rgb};
 
 use cells::{Cells, TILE};
+use color_posterior::{ColorPosterior, Light};
 use outlines::{MIN_CONFIRMED, Outline, outlines, patch_sums};
+pub use question_topic::is_in_rulebook;
 use resample::area_mean;
-use shade::{Light, Shade};
 use tiles::Tiles;
-pub use wording::understood;
 
 /// Version of the observer's method; it enters the digest of the model.
 pub const VERSION: u32 = 3;
@@ -93,13 +93,13 @@ impl ObservedFrame {
 
     /// Observes a degraded or enhanced image of the frame. An image of another size is resampled to that of the masks.
     #[must_use]
-    pub fn look(&self, image: &Rgb) -> Observation {
-        self.look_with(image, MIN_CONFIRMED)
+    pub fn observe(&self, image: &Rgb) -> Observation {
+        self.observe_with(image, MIN_CONFIRMED)
     }
 
     /// The same with another share of the elements that must be confirmed for a thing to be seen.
     #[must_use]
-    pub fn look_with(&self, image: &Rgb, min_confirmed: f64) -> Observation {
+    pub fn observe_with(&self, image: &Rgb, min_confirmed: f64) -> Observation {
         let image = area_mean(image, [self.untouched.width(), self.untouched.height()]);
         let untouched = self.untouched.samples();
         let fit = local::fit(&self.tiles, &self.tiles.sums(untouched, image.samples()));
@@ -119,20 +119,20 @@ impl ObservedFrame {
             .iter()
             .filter(|(_, outline)| outline.confirmed >= min_confirmed);
         let light = Light::new(&self.cells, &self.tiles, &sums, &fit);
-        let shades: BTreeMap<u32, Option<Shade>> = seen
+        let colors: BTreeMap<u32, Option<ColorPosterior>> = seen
             .map(|(id, _)| (*id, light.shade(masks[id] as u32)))
             .collect();
         Observation {
             explained: fit.explained,
-            statistics: self.seen_only(&shades),
+            statistics: self.seen_only(&colors),
             frame: Arc::clone(&self.statistics),
             outlines,
-            shades,
+            colors,
         }
     }
 
     /// The statistics of the frame, with the seen segments only.
-    fn seen_only(&self, seen: &BTreeMap<u32, Option<Shade>>) -> FrameStatistics {
+    fn seen_only(&self, seen: &BTreeMap<u32, Option<ColorPosterior>>) -> FrameStatistics {
         let mut statistics = (*self.statistics).clone();
         statistics
             .segments
@@ -162,31 +162,31 @@ pub struct Observation {
     /// Outline of each segment, by its number.
     outlines: BTreeMap<u32, Outline>,
     /// Colour of each seen segment, by its number.
-    shades: BTreeMap<u32, Option<Shade>>,
+    colors: BTreeMap<u32, Option<ColorPosterior>>,
 }
 
 impl Observation {
     /// The share of the image's variance that the untouched frame explains (R²), from 0 to 1.
     #[must_use]
-    pub fn explained(&self) -> f64 {
+    pub fn explained_variance(&self) -> f64 {
         self.explained
     }
 
     /// The number of things of the frame: segments that are not tiny.
     #[must_use]
-    pub fn things(&self) -> usize {
+    pub fn thing_count(&self) -> usize {
         self.frame.segments.len()
     }
 
     /// The number of things that are seen.
     #[must_use]
-    pub fn seen(&self) -> usize {
+    pub fn seen_count(&self) -> usize {
         self.statistics.segments.len()
     }
 
     /// The number of things that are detected by their whole outline. This does not decide answers.
     #[must_use]
-    pub fn detected(&self) -> usize {
+    pub fn detected_count(&self) -> usize {
         self.outlines
             .values()
             .filter(|outline| outline.is_detected())
@@ -195,8 +195,8 @@ impl Observation {
 
     /// Whether the segment of this number is seen.
     #[must_use]
-    pub fn sees(&self, segment: u32) -> bool {
-        self.shades.contains_key(&segment)
+    pub fn is_seen(&self, segment: u32) -> bool {
+        self.colors.contains_key(&segment)
     }
 
     /// The segments of the frame that are not tiny, each with its number and class.

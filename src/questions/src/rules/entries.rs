@@ -101,7 +101,7 @@ impl CoarseRule {
 
     /// True if the word of a label space identifies an object.
     #[must_use]
-    pub fn says(&self, space: &str, word: &str) -> bool {
+    pub fn identifies_object(&self, space: &str, word: &str) -> bool {
         let words = self.spaces.get(space);
         words.is_none_or(|words| words.contains(word)) && !word.is_empty()
     }

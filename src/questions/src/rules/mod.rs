@@ -121,7 +121,7 @@ impl Rules {
 impl RuleBook {
     /// Whether a class has a property; false for unknown classes.
     #[must_use]
-    pub fn is(&self, class: &str, flag: ClassFlag) -> bool {
+    pub fn has_flag(&self, class: &str, flag: ClassFlag) -> bool {
         let class = self.class.get(class);
         class.is_some_and(|class| class.flags.contains(&flag))
     }
@@ -129,7 +129,7 @@ impl RuleBook {
     /// The word in questions for a thing that an annotator calls by `word`; `None` if questions do not use this word for things
     /// of the class.
     #[must_use]
-    pub fn called(&self, class: &str, word: &str) -> Option<&str> {
+    pub fn question_word(&self, class: &str, word: &str) -> Option<&str> {
         let plain = word.replace('_', " ");
         let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
         let words = &self.class.get(class)?.words;
@@ -141,7 +141,7 @@ impl RuleBook {
 
     /// A template with the word of a thing filled in; `plural` is used for plural words.
     #[must_use]
-    pub fn filled(&self, singular: &str, plural: &str, word: &str) -> String {
+    pub fn fill_template(&self, singular: &str, plural: &str, word: &str) -> String {
         if self.words.plural.contains(word) {
             return plural.replace("{object}", word);
         }

@@ -1,6 +1,6 @@
 //! Connected components of equal label: [`components`].
 
-use super::rim::runs;
+use super::erosion::runs;
 
 /// A run of one label in a row.
 struct LabelRun {

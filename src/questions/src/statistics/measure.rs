@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::FrameStatistics;
-use super::light::{frame_depth, luma};
-use super::reference::LightSamples;
-use super::scene::SceneMaps;
-use super::shape::MaskShapes;
+use super::light_samples::LightSamples;
+use super::mask_core::{frame_depth, luma};
+use super::mask_shapes::MaskShapes;
+use super::scene_maps::SceneMaps;
 use crate::colors::Palette;
 use crate::rules::Rules;
 use darkqa_ground::error::Result;

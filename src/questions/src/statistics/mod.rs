@@ -3,13 +3,13 @@
 //! The rules see nothing else of a frame, so changed rules do not need the images again.
 
 mod components;
-mod light;
+mod erosion;
+mod light_samples;
+mod mask_core;
+mod mask_shapes;
 mod measure;
 mod opening;
-mod reference;
-mod rim;
-pub(crate) mod scene;
-mod shape;
+pub(crate) mod scene_maps;
 #[cfg(test)]
 mod tests;
 
@@ -226,29 +226,29 @@ impl FrameStatistics {
 
     /// The area of a segment, in millionths of the frame.
     #[must_use]
-    pub fn area(&self, segment: &Segment) -> u64 {
+    pub fn area_ppm(&self, segment: &Segment) -> u64 {
         self.ppm(segment.area)
     }
 
     /// Whether a segment is evidence: large enough, of one class and not cut by the border.
     #[must_use]
-    pub fn qualified(&self, segment: &Segment, book: &RuleBook) -> bool {
-        self.disqualified(segment, book).is_none()
+    pub fn is_evidence(&self, segment: &Segment, book: &RuleBook) -> bool {
+        self.evidence_flaw(segment, book).is_none()
     }
 
     /// Why a segment is not evidence; `None` if it is.
     #[must_use]
-    pub fn disqualified(&self, segment: &Segment, book: &RuleBook) -> Option<Reason> {
+    pub fn evidence_flaw(&self, segment: &Segment, book: &RuleBook) -> Option<Reason> {
         let rule = &book.qualified;
         let [left, top, right, bottom] = segment.bbox;
         let side = (right - left).min(bottom - top) as u64;
-        let area = self.area(segment);
+        let area = self.area_ppm(segment);
         let on_border = ppm(segment.rim_on_border, segment.rim);
         if segment.stands == SegmentPlace::Elsewhere {
             Some(Reason::Elsewhere)
-        } else if segment.mixed(book) {
+        } else if segment.is_mixed(book) {
             Some(Reason::Mixed)
-        } else if segment.unlike(book) {
+        } else if segment.has_unfitting_word(book) {
             Some(Reason::Unlike)
         } else if area < rule.area_ppm {
             Some(Reason::Small)
@@ -265,12 +265,12 @@ impl FrameStatistics {
     pub fn evidence<'a>(&'a self, book: &'a RuleBook) -> impl Iterator<Item = &'a Segment> {
         self.segments
             .iter()
-            .filter(|segment| self.qualified(segment, book))
+            .filter(|segment| self.is_evidence(segment, book))
     }
 
     /// Whether the frame has any pixel of a token, tiny segments included.
     #[must_use]
-    pub fn shows(&self, token: &str, book: &RuleBook) -> bool {
+    pub fn has_token(&self, token: &str, book: &RuleBook) -> bool {
         if book.class.contains_key(token) && self.class_pixels(token) > 0 {
             return true;
         }
@@ -286,23 +286,23 @@ impl FrameStatistics {
 impl Segment {
     /// Whether too many pixels have other classes.
     #[must_use]
-    pub fn mixed(&self, book: &RuleBook) -> bool {
+    pub fn is_mixed(&self, book: &RuleBook) -> bool {
         ppm(self.pure, self.area) < book.measure.purity_ppm
     }
 
     /// Whether the word of the segment does not fit its class in plain English.
     #[must_use]
-    pub fn unlike(&self, book: &RuleBook) -> bool {
+    pub fn has_unfitting_word(&self, book: &RuleBook) -> bool {
         let words = book.names.unlike.get(&self.class);
         words.is_some_and(|words| words.contains(&self.word))
     }
 
     /// The word by which questions call the segment; `None` if it has no word of its own, or one that questions do not use.
     #[must_use]
-    pub fn called<'a>(&self, book: &'a RuleBook) -> Option<&'a str> {
+    pub fn question_word<'a>(&self, book: &'a RuleBook) -> Option<&'a str> {
         match self.source {
             WordSource::Coarse => None,
-            WordSource::Name | WordSource::Label => book.called(&self.class, &self.word),
+            WordSource::Name | WordSource::Label => book.question_word(&self.class, &self.word),
         }
     }
 
@@ -314,13 +314,13 @@ impl Segment {
 
     /// Whether the segment lies flat on a surface.
     #[must_use]
-    pub fn flat(&self, book: &RuleBook) -> bool {
-        book.is(&self.class, ClassFlag::Flat) || book.names.flat.contains(&self.word)
+    pub fn is_flat(&self, book: &RuleBook) -> bool {
+        book.has_flag(&self.class, ClassFlag::Flat) || book.names.flat.contains(&self.word)
     }
 
     /// The depth of the segment; `None` if too few core pixels have depth.
     #[must_use]
-    pub fn measured(&self, book: &RuleBook) -> Option<SegmentDepth> {
+    pub fn reliable_depth(&self, book: &RuleBook) -> Option<SegmentDepth> {
         self.depth.filter(|depth| {
             depth.valid >= book.measure.valid_depth_px
                 && ppm(depth.valid, self.core) >= book.measure.valid_depth_ppm

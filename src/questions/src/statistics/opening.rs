@@ -1,6 +1,6 @@
 //! Morphological opening of a set of pixels, which removes thin margins: [`open`].
 
-use super::rim::runs;
+use super::erosion::runs;
 
 /// Opens a set of pixels in place with a square of radius `radius`: the pixels remain that are covered by squares lying wholly
 /// within the set. Pixels outside the image are not in the set, so an unlabelled border around the image is also a margin.

@@ -5,8 +5,8 @@
 //! max-RGB of colour constancy (Land and McCann 1971, J. Opt. Soc. Am. 61:1). A quantile replaces the maximum, because single pixels
 //! are glints (Funt and Shi 2010, "The rehabilitation of MaxRGB", CIC 18:256).
 
-use super::light::{pixel_luma, quantile};
-use super::scene::SceneMaps;
+use super::mask_core::{pixel_luma, quantile};
+use super::scene_maps::SceneMaps;
 use crate::rules::MeasureRule;
 use darkqa_ground::types::Frame;
 

@@ -14,7 +14,7 @@ pub(crate) struct ThingWord {
 impl ThingWord {
     /// Whether a segment is called so.
     pub(super) fn calls(&self, segment: &Segment, book: &RuleBook) -> bool {
-        segment.class == self.class && segment.called(book) == Some(&*self.word)
+        segment.class == self.class && segment.question_word(book) == Some(&*self.word)
     }
 }
 
@@ -57,7 +57,7 @@ impl QuestionTopic {
                 let word = rule
                     .words
                     .iter()
-                    .find(|word| text == book.filled(singular, plural, word))?;
+                    .find(|word| text == book.fill_template(singular, plural, word))?;
                 Some(ThingWord {
                     class: class.clone(),
                     word: word.clone(),
@@ -72,6 +72,6 @@ impl QuestionTopic {
 
 /// Whether a question is one of the rulebook, so that the observer can answer it.
 #[must_use]
-pub fn understood(question: &Question, rules: &Rules) -> bool {
+pub fn is_in_rulebook(question: &Question, rules: &Rules) -> bool {
     QuestionTopic::from_question(question, rules.book()).is_some()
 }

@@ -1,4 +1,4 @@
-//! The colour of a thing in the untouched frame, inferred from the received pixels in the light of its surroundings: [`Shade`].
+//! The colour of a thing in the untouched frame, inferred from the received pixels in the light of its surroundings: [`ColorPosterior`].
 
 use super::cells::Cells;
 use super::channel::{ChannelFit, Fit, ROUNDING};
@@ -34,7 +34,7 @@ struct Posterior {
 
 /// Posterior of the untouched colour of a thing.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Shade([Posterior; 3]);
+pub(super) struct ColorPosterior([Posterior; 3]);
 
 /// The light on the objects of a frame, estimated from their surroundings. An object's own colour is no evidence of its light: with a local
 /// light of its own, each object would have the expected colour.
@@ -125,7 +125,7 @@ impl<'a> Light<'a> {
     }
 
     /// The shade of a mask; `None` if it has an eighth of no cell.
-    pub(super) fn shade(&self, mask: u32) -> Option<Shade> {
+    pub(super) fn shade(&self, mask: u32) -> Option<ColorPosterior> {
         let least = (self.cells.side * self.cells.side / 8).max(3) as u32;
         let [finest, _, coarsest] = &self.cells.scales;
         let patches = finest.patches.iter().zip(self.sums).zip(&coarsest.part_of);
@@ -152,7 +152,7 @@ impl<'a> Light<'a> {
         }
         let field = self.field_around(mask, &places);
         let gains: Vec<[f64; 3]> = places.iter().map(|place| field.at(*place)).collect();
-        Some(Shade([0, 1, 2].map(|channel| {
+        Some(ColorPosterior([0, 1, 2].map(|channel| {
             let means = patches
                 .iter()
                 .zip(&gains)
@@ -194,7 +194,7 @@ impl<'a> Light<'a> {
     }
 }
 
-impl Shade {
+impl ColorPosterior {
     /// The most probable of the offered colours. `None` if a channel is too uncertain, or none of them is possible.
     pub(super) fn name(&self, palette: &Palette, offered: &[Color]) -> Option<Color> {
         if self

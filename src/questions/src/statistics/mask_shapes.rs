@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::light::{MaskCore, PixelLight};
-use super::rim::{cores, runs};
-use super::scene::{JointCounts, SceneMaps, rounded};
+use super::erosion::{cores, runs};
+use super::mask_core::{MaskCore, PixelLight};
+use super::scene_maps::{JointCounts, SceneMaps, rounded};
 use super::{Segment, WordSource, plain_word, ppm};
 use crate::colors::{BINS, Palette};
 use crate::rules::{CoarseRule, MeasureRule};
@@ -149,7 +149,7 @@ impl MaskShapes {
         let (word, stands) = plain_word(word);
         let source = if own.is_some() && coarse.is_name(&word) {
             WordSource::Name
-        } else if own.is_none() && coarse.says(&scene.labels.space, &word) {
+        } else if own.is_none() && coarse.identifies_object(&scene.labels.space, &word) {
             WordSource::Label
         } else {
             WordSource::Coarse

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use ndarray::{CowArray, Ix2};
 
 use super::components::components;
+use super::erosion::runs;
 use super::opening::open;
 use super::plain_word;
-use super::rim::runs;
 use crate::rules::{CoarseRule, MeasureRule};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::{Frame, Labels, Segmentation};
@@ -227,7 +227,7 @@ impl<'a> SceneMaps<'a> {
         };
         match name {
             Some(name) => coarse.is_name(&plain_word(&name.name).0),
-            None => coarse.says(&self.labels.space, &plain_word(self.word(id)).0),
+            None => coarse.identifies_object(&self.labels.space, &plain_word(self.word(id)).0),
         }
     }
 

@@ -1,4 +1,4 @@
-//! How a frame looks in numbers that any two sets of frames can be compared by: [`FrameLook`]. No rule reads them.
+//! How a frame looks in numbers that any two sets of frames can be compared by: [`FrameAppearance`]. No rule reads them.
 
 use ndarray::Array2;
 
@@ -11,7 +11,7 @@ use darkqa_ground::types::{Frame, Rgb};
 const ROWS: usize = 480;
 
 /// The minimum gradient of an edge, in codes of luma per pixel (chosen).
-pub const STEEP: f32 = 2.5;
+pub const MIN_EDGE_GRADIENT: f32 = 2.5;
 
 /// The minimum area of a segment that is counted, in millionths of the frame; as in the rulebook.
 const LEAST_PPM: u64 = 500;
@@ -21,7 +21,7 @@ const WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
 /// How a frame looks.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrameLook {
+pub struct FrameAppearance {
     /// Its mean linear light in EV relative to white.
     pub light_ev: f64,
     /// The share of its pixels at edges.
@@ -34,7 +34,7 @@ pub struct FrameLook {
     pub depth: Option<[f64; 3]>,
 }
 
-impl FrameLook {
+impl FrameAppearance {
     /// The look of a frame, its colours named by a palette. The depth is taken as its map has it.
     #[must_use]
     pub fn new(frame: &Frame, palette: &Palette) -> Self {
@@ -78,7 +78,7 @@ fn mean_light(codes: &[[u8; 3]]) -> f64 {
     (sum / codes.len().max(1) as f64).max(light[1] / 2.0)
 }
 
-/// The share of pixels whose luma changes by [`STEEP`] codes per pixel or more: the magnitude of Sobel's gradient (I. Sobel and
+/// The share of pixels whose luma changes by [`MIN_EDGE_GRADIENT`] codes per pixel or more: the magnitude of Sobel's gradient (I. Sobel and
 /// G. Feldman 1968), an eighth of the sums of its masks. Images of more than [`ROWS`] rows are reduced first.
 fn edges(image: &Rgb) -> f64 {
     let luma = reduced(&luma(image));
@@ -94,7 +94,8 @@ fn edges(image: &Rgb) -> f64 {
             let side = |right| at(y, x, 0, right) + 2.0 * at(y, x, 1, right) + at(y, x, 2, right);
             let row = |down| at(y, x, down, 0) + 2.0 * at(y, x, down, 1) + at(y, x, down, 2);
             let (across, along) = (side(2) - side(0), row(2) - row(0));
-            steep += usize::from((across * across + along * along).sqrt() / 8.0 >= STEEP);
+            steep +=
+                usize::from((across * across + along * along).sqrt() / 8.0 >= MIN_EDGE_GRADIENT);
         }
     }
     steep as f64 / (height * width).max(1) as f64
