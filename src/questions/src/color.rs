@@ -10,7 +10,7 @@ use super::rules::{ClassFlag, ColorChoices, ColorRule};
 use super::statistics::{Segment, ppm};
 use darkqa_ground::types::Family;
 
-/// One candidate for every segment of a class whose colour may be asked.
+/// Returns one candidate for every segment of a class whose colour may be asked.
 pub(super) fn candidates(context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
     context
         .statistics
@@ -36,7 +36,7 @@ fn candidate(
     if context.statistics.area_ppm(segment) < rule.area_ppm || segment.core < rule.eroded_px {
         return Err(Reason::Small);
     }
-    if !unique(context, segment) {
+    if !is_unique(context, segment) {
         return Err(Reason::NotUnique);
     }
     let word = segment
@@ -50,7 +50,7 @@ fn candidate(
     {
         return Err(Reason::Disagreed);
     }
-    let (choices, truth) = offered(context, color).ok_or(Reason::NotOffered)?;
+    let (choices, truth) = choices(context, color).ok_or(Reason::NotOffered)?;
     let (_, most, next, none) = segment.leading_color();
     let share = |part| ppm(part, segment.core);
     let evidence = json!({
@@ -76,20 +76,19 @@ fn candidate(
     ))
 }
 
-/// Whether a segment is the only visible one of its class. Pixels of the class outside of all segments count as another
-/// segment.
-fn unique(context: &RuleContext<'_>, segment: &Segment) -> bool {
-    let (statistics, least) = (context.statistics, context.book.color.lone_ppm);
-    let others = statistics.segments.iter().filter(|other| {
+/// True if a segment is the only visible one of its class. Pixels of the class outside all segments count as another segment.
+fn is_unique(context: &RuleContext<'_>, segment: &Segment) -> bool {
+    let (statistics, min_ppm) = (context.statistics, context.book.color.lone_ppm);
+    let loose = statistics.loose.get(&segment.class).copied().unwrap_or(0);
+    let has_other = statistics.segments.iter().any(|other| {
         other.class == segment.class
             && other.id != segment.id
-            && statistics.area_ppm(other) >= least
+            && statistics.area_ppm(other) >= min_ppm
     });
-    let loose = statistics.loose.get(&segment.class).copied().unwrap_or(0);
-    others.count() == 0 && statistics.ppm(loose) < least
+    !has_other && statistics.ppm(loose) < min_ppm
 }
 
-/// The colour of a segment, if one colour clearly dominates.
+/// Colour of a segment, if one colour clearly dominates.
 fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Result<Color, Reason> {
     let (color, most, next, none) = segment.leading_color();
     let share = |part| ppm(part, segment.core);
@@ -103,15 +102,15 @@ fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Res
     if share(none) >= rule.none_ppm {
         return Err(Reason::Nameless);
     }
-    let dominant = share(most) >= rule.dominant_ppm && most >= rule.lead * next;
-    if !dominant || palette.color(segment.median) != Some(color) {
+    let is_dominant = share(most) >= rule.dominant_ppm && most >= rule.lead * next;
+    if !is_dominant || palette.color(segment.median) != Some(color) {
         return Err(Reason::Motley);
     }
     Ok(color)
 }
 
-/// Checks that the colour has the same name relative to the light of the frame, channel by channel, and relative to the light
-/// around the segment, whose colour is that of the neighbours and does not count.
+/// Checks that the colour keeps its name relative to the light of the frame, channel by channel, and relative to the luma around the segment.
+/// The colour around the segment is ignored, because it is that of its neighbours.
 fn check_light(
     context: &RuleContext<'_>,
     segment: &Segment,
@@ -133,21 +132,21 @@ fn check_light(
     }
 }
 
-/// The colours that are offered, and the index of the true one; `None` if it is not among them.
-fn offered(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
+/// Returns the colours offered as choices, and the index of the true one; `None` if it is not among them.
+fn choices(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
     let rule = &context.book.color;
     let mut colors = match rule.candidates {
         ColorChoices::All11 => Color::ALL.to_vec(),
         ColorChoices::Fixed8 => rule.fixed8.clone(),
         ColorChoices::K5 => {
-            let near = |color: Color| {
+            let is_neighbour = |color: Color| {
                 rule.neighbours
                     .iter()
                     .any(|pair| *pair == [color, truth] || *pair == [truth, color])
             };
             let mut others: Vec<Color> = Color::ALL
                 .into_iter()
-                .filter(|color| *color != truth && !near(*color))
+                .filter(|color| *color != truth && !is_neighbour(*color))
                 .collect();
             context.picker.shuffle("color", &mut others);
             others.truncate(4);

@@ -1,9 +1,8 @@
 //! Stage 2a, WORDS: frames → questions, by rule (DarkQA, arXiv 2512.24985, Algorithm 1).
 //!
-//! First each frame is measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) see only these
-//! measurements. They find the type of room ([`room`]) and then the questions, one file per family. [`generate()`] is the
-//! entry point. There is no random state: a pick is a function of the frame's name ([`pick`]), so the order of the frames
-//! does not matter.
+//! Each frame is first measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) use only these measurements: they
+//! classify the room ([`room`]) and then generate the questions, one file per family. [`generate()`] is the entry point. Random picks are
+//! hashes of the frame's name ([`pick`]), so the order of the frames does not matter.
 
 #![allow(
     missing_docs,

@@ -39,7 +39,7 @@ fn yes_needs_one_good_segment() {
         (|c| c.bbox = [0, 0, 20, 900], None),
         (|c| c.bbox = [0, 0, 19, 900], Some(Reason::Thin)),
         (
-            |c| c.stands = SegmentPlace::Elsewhere,
+            |c| c.place = SegmentPlace::Elsewhere,
             Some(Reason::Elsewhere),
         ),
     ] {
