@@ -6,8 +6,8 @@ use super::colors::{BINS, Palette};
 use super::statistics::ppm;
 use darkqa_ground::types::{Frame, Rgb};
 
-/// Maximum number of rows for detecting edges (chosen). Higher images are reduced, because the luma of a large image changes less from pixel
-/// to pixel.
+/// Maximum number of rows for detecting edges (chosen). Higher images are reduced, because the luma of a large image changes less from
+/// pixel to pixel.
 const MAX_ROWS: usize = 480;
 
 /// Minimum gradient of an edge, in codes of luma per pixel (chosen).
@@ -76,8 +76,8 @@ fn mean_light(codes: &[[u8; 3]]) -> f64 {
     (sum / codes.len().max(1) as f64).max(light[1] / 2.0)
 }
 
-/// Share of pixels whose luma changes by at least [`MIN_EDGE_GRADIENT`] codes per pixel, by the magnitude of the Sobel gradient (I. Sobel and
-/// G. Feldman 1968): an eighth of the response of its kernels. Images of more than [`MAX_ROWS`] rows are reduced first.
+/// Share of pixels whose luma changes by at least [`MIN_EDGE_GRADIENT`] codes per pixel, by the magnitude of the Sobel gradient (I. Sobel
+/// and G. Feldman 1968): an eighth of the response of its kernels. Images of more than [`MAX_ROWS`] rows are reduced first.
 fn edges(image: &Rgb) -> f64 {
     let luma = reduce(&luma(image));
     let (height, width) = luma.dim();

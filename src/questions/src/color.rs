@@ -109,8 +109,8 @@ fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Res
     Ok(color)
 }
 
-/// Checks that the colour keeps its name relative to the light of the frame, channel by channel, and relative to the luma around the segment.
-/// The colour around the segment is ignored, because it is that of its neighbours.
+/// Checks that the colour keeps its name relative to the light of the frame, channel by channel, and relative to the luma around the
+/// segment. The colour around the segment is ignored, because it is that of its neighbours.
 fn check_light(
     context: &RuleContext<'_>,
     segment: &Segment,

@@ -29,8 +29,8 @@ impl Frequency {
         }
     }
 
-    /// Classes to expect in a room of a scene: the `max` most common ones in such rooms of other scenes, or in all frames if no other scene has
-    /// such a room. `None` if fewer than `max` classes occur, which is too little evidence.
+    /// Classes to expect in a room of a scene: the `max` most common ones in such rooms of other scenes, or in all frames if no other scene
+    /// has such a room. `None` if fewer than `max` classes occur, which is too little evidence.
     #[must_use]
     pub fn expected(&self, room: &str, scene: &str, max: usize) -> Option<BTreeSet<String>> {
         let elsewhere = self.total(room, Some(scene));

@@ -7,8 +7,8 @@ const DOMAIN: &[u8] = b"darkqa-eval questions 1";
 
 /// Pseudo-random picks for one frame.
 ///
-/// There is no state: a pick is the BLAKE3 digest of seed, data set, frame, family and purpose, scaled to the range. The order of the frames
-/// therefore does not matter.
+/// There is no state: a pick is the BLAKE3 digest of seed, data set, frame, family and purpose, scaled to the range. The order of the
+/// frames therefore does not matter.
 #[derive(Debug, Clone, Copy)]
 pub struct Picker<'a> {
     /// Seed of the rulebook.

@@ -74,8 +74,8 @@ impl PredictedFrame {
         })
     }
 
-    /// Answers a question with the index of a choice. `None` if the subject of the question is not found in the image, or if the question is
-    /// not one of the rulebook.
+    /// Answers a question with the index of a choice. `None` if the subject of the question is not found in the image, or if the question
+    /// is not one of the rulebook.
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules, palette: &Palette) -> Option<usize> {
         let book = rules.book();
@@ -115,7 +115,8 @@ impl PredictedFrame {
             .filter(move |segment| segment.class == class)
     }
 
-    /// Colour of the largest segment of a class: the name of its median if that is offered, else the most common offered name of its pixels.
+    /// Colour of the largest segment of a class: the name of its median if that is offered, else the most common offered name of its
+    /// pixels.
     fn color(&self, class: &str, offered: &[String], palette: &Palette) -> Option<&'static str> {
         let is_offered = |name: &str| offered.iter().any(|text| text == name);
         let largest = self

@@ -10,8 +10,8 @@ use super::rules::{ClassFlag, PresenceRule};
 use super::statistics::{Segment, ppm};
 use darkqa_ground::types::Family;
 
-/// Returns the candidates for every asked class: if it has a pixel in the frame, a yes for each word of its segments, else a no for each word
-/// that the data set has for it.
+/// Returns the candidates for every asked class: if it has a pixel in the frame, a yes for each word of its segments, else a no for each
+/// word that the data set has for it.
 pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     let rule = &context.book.presence;
     let expected = context.room.and_then(|room| {
@@ -90,8 +90,8 @@ fn flaw(context: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Op
     }
 }
 
-/// Candidates with the answer no: neither the class nor anything that may be mistaken for it has a pixel, no coarse class may hide it, absence
-/// can be shown in this frame, and the class is common in such rooms.
+/// Candidates with the answer no: neither the class nor anything that may be mistaken for it has a pixel, no coarse class may hide it,
+/// absence can be shown in this frame, and the class is common in such rooms.
 fn absent(
     context: &RuleContext<'_>,
     class: &str,

@@ -46,9 +46,9 @@ pub enum RoomSource {
 
 /// Classifies the room of a frame by the objects visible in it.
 ///
-/// Each clue of the rulebook counts once. The room type with the highest score wins if the score is high enough and it has no rival. If it has
-/// a single rival, a contest of the rulebook decides between the two. Without a decision, one wins if the segments of the other are small and
-/// far behind, because that room is seen through a door.
+/// Each clue of the rulebook counts once. The room type with the highest score wins if the score is high enough and it has no rival. If it
+/// has a single rival, a contest of the rulebook decides between the two. Without a decision, one wins if the segments of the other are
+/// small and far behind, because that room is seen through a door.
 #[must_use]
 pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
     let evidence = Evidence::new(statistics, book);

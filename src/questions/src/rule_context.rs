@@ -170,8 +170,8 @@ impl RuleContext<'_> {
             .any(|other| self.statistics.unnamed.contains_key(other))
     }
 
-    /// True if the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word always passes,
-    /// because its class is unknown.
+    /// True if the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word always
+    /// passes, because its class is unknown.
     pub(super) fn is_expressible(&self, token: &str) -> bool {
         !self.book.class.contains_key(token) || self.labels.expressible.contains(token)
     }

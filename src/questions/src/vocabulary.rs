@@ -8,8 +8,8 @@ use darkqa_ground::types::Labels;
 
 /// Words that a data set uses for objects: the names of its segments if they have any, otherwise its labels.
 ///
-/// A question whose answer is "no" uses only these words, and an activity is asked about only if these words could enable it. Otherwise, "no"
-/// would always be the answer to questions with a word that no annotator of the data set used.
+/// A question whose answer is "no" uses only these words, and an activity is asked about only if these words could enable it. Otherwise,
+/// "no" would always be the answer to questions with a word that no annotator of the data set used.
 #[derive(Debug, Default)]
 pub struct Vocabulary {
     /// Words used in questions, by class.

@@ -55,8 +55,8 @@ impl FloorPlan {
         }
     }
 
-    /// Adds the room behind an open door, given the pose of the door and the distances from its middle to the ends of the wall. The words of
-    /// all things in it end in `/otherroom`.
+    /// Adds the room behind an open door, given the pose of the door and the distances from its middle to the ends of the wall. The words
+    /// of all things in it end in `/otherroom`.
     fn add_next_room(&mut self, pose: &Pose, sides: [f32; 2]) {
         let [left, right] = sides.map(|side| side.min(self.rng.between(1.2, 2.4)));
         let (back, high) = (-WALL_THICKNESS - self.rng.between(1.6, 3.6), self.size.y);
@@ -155,8 +155,8 @@ impl FloorPlan {
         }
     }
 
-    /// Adds a window with its curtains or blinds to one of these walls, if it has enough free space. `sill` is the height of the window sill
-    /// in metres.
+    /// Adds a window with its curtains or blinds to one of these walls, if it has enough free space. `sill` is the height of the window
+    /// sill in metres.
     pub(super) fn add_window(
         &mut self,
         choices: &[Wall],

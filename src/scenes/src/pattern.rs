@@ -194,8 +194,8 @@ impl PatternPoint {
 }
 
 impl Pattern {
-    /// Applies the pattern to a colour at a position with a surface normal, both in the coordinates of the thing. `pixel_width` is the width
-    /// of a pixel there, in metres.
+    /// Applies the pattern to a colour at a position with a surface normal, both in the coordinates of the thing. `pixel_width` is the
+    /// width of a pixel there, in metres.
     pub(super) fn color(self, color: Vec3, position: Vec3, normal: Vec3, pixel_width: f32) -> Vec3 {
         let point = PatternPoint {
             position,

@@ -1,4 +1,4 @@
-//! Answers from visible evidence alone: [`Observation::answer`].
+//! Answers from the seen objects: [`Observation::answer`].
 
 use super::question_topic::{QuestionTopic, ThingWord};
 use super::{ColorPosterior, Observation};
@@ -10,8 +10,8 @@ use crate::statistics::Segment;
 use darkqa_ground::types::Question;
 
 impl Observation {
-    /// The answer to a question, as an index of its choices. `None` if nothing that is seen bears on it, or if the question is
-    /// not one of the rulebook (see [`is_in_rulebook`](super::is_in_rulebook)).
+    /// Answers a question with the index of a choice. `None` if no seen object decides it, or if the question is not one of the rulebook
+    /// (see [`is_in_rulebook`](super::is_in_rulebook)).
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules, palette: &Palette) -> Option<usize> {
         let answer = match QuestionTopic::from_question(question, rules.book())? {
@@ -28,7 +28,7 @@ impl Observation {
             .position(|text| *text == answer)
     }
 
-    /// The room type by the seen segments. If the rulebook gives none, the type with the highest score, if it is alone with it.
+    /// Room type by the seen segments; if the rulebook gives none, the type with the highest score, unless several types share it.
     fn room(&self, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let signs = classify(&self.statistics, book);
@@ -41,7 +41,7 @@ impl Observation {
         })
     }
 
-    /// Yes if the things that the activity needs are seen. Else by the type of room, if there is one.
+    /// Yes if all objects that the activity needs are seen; else the answer follows from the room type, if it is known.
     fn affordance(&self, activity: usize, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let activity = book.activity.get(activity)?;
@@ -54,18 +54,18 @@ impl Observation {
         Some(yes_no(yes))
     }
 
-    /// Yes if the thing is seen. No if at least half of the area of all things is seen, and the thing is not among it: without
-    /// this, a black image would be answered with no.
+    /// Yes if the object is seen. No if it is not, although at least half of the area of all objects is seen: otherwise, the answers for a
+    /// black image would be no.
     fn presence(&self, thing: &ThingWord, rules: &Rules) -> Option<String> {
         let is_seen = self
             .statistics
             .segments
             .iter()
-            .any(|segment| thing.calls(segment, rules.book()));
+            .any(|segment| thing.matches(segment, rules.book()));
         (is_seen || self.sees_half(rules)).then(|| yes_no(is_seen))
     }
 
-    /// Whether at least half of the area of the frame's things is seen; of all segments, if there is no thing.
+    /// True if at least half of the area of the frame's objects is seen, or of all segments if the frame has no objects.
     fn sees_half(&self, rules: &Rules) -> bool {
         let book = rules.book();
         let is_thing = |segment: &&Segment| !book.has_flag(&segment.class, ClassFlag::Structural);
@@ -81,7 +81,7 @@ impl Observation {
         all > 0 && 2 * seen >= all
     }
 
-    /// The colour of the largest segment that is called so, if that one is seen, among the colours offered.
+    /// Colour of the largest segment with this word, among the colours offered; `None` if the segment is not seen.
     fn color(
         &self,
         thing: &ThingWord,
@@ -93,19 +93,19 @@ impl Observation {
             .frame
             .segments
             .iter()
-            .filter(|segment| thing.calls(segment, rules.book()))
+            .filter(|segment| thing.matches(segment, rules.book()))
             .max_by_key(|segment| (segment.area, std::cmp::Reverse(segment.id)))?;
-        let shade: &ColorPosterior = self.colors.get(&largest.id)?.as_ref()?;
+        let color: &ColorPosterior = self.colors.get(&largest.id)?.as_ref()?;
         let texts = question.choices.texts();
         let offered: Vec<Color> = Color::ALL
             .into_iter()
             .filter(|color| texts.iter().any(|text| text == color.name()))
             .collect();
-        let color = shade.name(palette, &offered)?;
+        let color = color.name(palette, &offered)?;
         Some(color.name().to_owned())
     }
 
-    /// The nearest of the offered things that are seen, if at least two of the classes offered are: nearness is a comparison.
+    /// Nearest of the offered objects that are seen; `None` unless objects of at least two offered classes are seen.
     fn closest(&self, question: &Question, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let texts = question.choices.texts();

@@ -1,7 +1,7 @@
 //! Rulebook with all thresholds, tables and templates for generating questions: [`Rules`].
 //!
-//! A rulebook is a TOML file. The built-in one is `rules.toml`; its comments explain each entry and give its source. The fields here have the
-//! same names.
+//! A rulebook is a TOML file. The built-in one is `rules.toml`; its comments explain each entry and give its source. The fields here have
+//! the same names.
 
 mod check;
 mod entries;

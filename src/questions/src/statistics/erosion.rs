@@ -3,8 +3,8 @@
 /// Calls `visit(y, left, right, mask)`, row by row, for every run of pixels whose square of radius `radius` is within their own mask. Masks
 /// continue beyond the edge of the image, because depth has no flying pixels there. Mask 0 is skipped.
 ///
-/// Each run of a row is shortened by the radius. For each column, `streaks` counts the consecutive rows in which the column was inside such a
-/// shortened run of the same mask.
+/// Each run of a row is shortened by the radius. For each column, `streaks` counts the consecutive rows in which the column was inside such
+/// a shortened run of the same mask.
 pub(super) fn cores(
     masks: &[u32],
     [width, height]: [usize; 2],

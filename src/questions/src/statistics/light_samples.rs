@@ -1,9 +1,9 @@
 //! Light of a frame, estimated from its surfaces: [`LightSamples`].
 //!
 //! A surface that looks grey may be a white one in shade, so colours are judged relative to the brightest surfaces in the same light: the
-//! "highest luminance is white" rule of anchoring (Gilchrist et al. 1999, Psychol. Rev. 106:795), which is max-RGB of colour constancy (Land
-//! and McCann 1971, J. Opt. Soc. Am. 61:1). A quantile replaces the maximum, because single bright pixels may be glints (Funt and Shi 2010,
-//! "The rehabilitation of MaxRGB", CIC 18:256).
+//! "highest luminance is white" rule of anchoring (Gilchrist et al. 1999, Psychol. Rev. 106:795), which is max-RGB of colour constancy
+//! (Land and McCann 1971, J. Opt. Soc. Am. 61:1). A quantile replaces the maximum, because single bright pixels may be glints (Funt and Shi
+//! 2010, "The rehabilitation of MaxRGB", CIC 18:256).
 
 use super::mask_core::{pixel_luma, quantile};
 use super::scene_maps::SceneMaps;
@@ -64,8 +64,8 @@ impl LightSamples {
         })
     }
 
-    /// Light around a mask: a high quantile of luma over the other surfaces in its bounding box, enlarged by half of the longer side on each
-    /// side. `None` without such surfaces.
+    /// Light around a mask: a high quantile of luma over the other surfaces in its bounding box, enlarged by half of the longer side on
+    /// each side. `None` without such surfaces.
     pub(super) fn around(&self, mask: u32, [left, top, right, bottom]: [usize; 4]) -> Option<u8> {
         let reach = (right - left).max(bottom - top) / 2;
         let columns = left.saturating_sub(reach)..right + reach;

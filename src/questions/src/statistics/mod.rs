@@ -95,8 +95,8 @@ pub enum DepthAxis {
 /// Measurements of a segment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Segment {
-    /// Number in the segment map. Without such a map, or if it maps parts of objects, the number of the connected component, counted row by row
-    /// from 1.
+    /// Number in the segment map. Without such a map, or if it maps parts of objects, the number of the connected component, counted row by
+    /// row from 1.
     pub id: u32,
     /// Most common canonical class of the pixels; the first by name if two are equally common.
     pub class: String,
@@ -341,8 +341,8 @@ impl Segment {
         })
     }
 
-    /// Most common colour name, its number of pixels, the number of pixels of the second most common bin (a name or none), and the number of
-    /// pixels without a name. If two names are equally common, the first in order counts.
+    /// Most common colour name, its number of pixels, the number of pixels of the second most common bin (a name or none), and the number
+    /// of pixels without a name. If two names are equally common, the first in order counts.
     #[must_use]
     pub fn leading_color(&self) -> (Option<Color>, u64, u64, u64) {
         let mut bins: Vec<(usize, u64)> = self.colors.iter().copied().enumerate().collect();
@@ -359,8 +359,8 @@ impl Segment {
     }
 }
 
-/// Normalizes a word of a data set (lower case, single spaces) and returns the place that it gives. The suffixes `/otherroom` and `/outside`
-/// of HM3D-Sem are removed.
+/// Normalizes a word of a data set (lower case, single spaces) and returns the place that it gives. The suffixes `/otherroom` and
+/// `/outside` of HM3D-Sem are removed.
 #[must_use]
 pub fn plain_word(word: &str) -> (String, SegmentPlace) {
     let lower = word.to_lowercase();

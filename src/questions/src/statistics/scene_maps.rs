@@ -243,7 +243,8 @@ impl<'a> SceneMaps<'a> {
         unknown
     }
 
-    /// Numbers of pixels without a class: of all pixels, after a morphological opening, and after the opening in the lower half of the frame.
+    /// Numbers of pixels without a class: of all pixels, after a morphological opening, and after the opening in the lower half of the
+    /// frame.
     pub(super) fn void(&self, joint: &JointCounts, rule: &MeasureRule) -> (u64, u64, u64) {
         let [width, height] = self.size;
         let all = joint

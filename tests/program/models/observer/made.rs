@@ -171,9 +171,9 @@ impl Set {
             score: interval(&sums, n),
             chance: all().map(|(_, guess, _)| guess).sum::<f64>() / n as f64,
             evidence: all().map(|(.., evidence)| evidence).sum(),
-            things: count(Observation::things),
-            seen: count(Observation::seen),
-            detected: count(Observation::detected),
+            things: count(Observation::thing_count),
+            seen: count(Observation::seen_count),
+            detected: count(Observation::detected_count),
             explained: explained / looks.len() as f64,
         }
     }
