@@ -104,8 +104,11 @@ fn luma(image: &Rgb) -> Array2<f32> {
     let (codes, _) = image.samples().as_chunks::<3>();
     let width = image.width();
     Array2::from_shape_fn((image.height(), width), |(y, x)| {
-        let code = codes[y * width + x].iter().zip(WEIGHTS);
-        code.map(|(code, weight)| f32::from(*code) * weight).sum()
+        codes[y * width + x]
+            .iter()
+            .zip(WEIGHTS)
+            .map(|(code, weight)| f32::from(*code) * weight)
+            .sum()
     })
 }
 

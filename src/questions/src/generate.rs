@@ -333,15 +333,17 @@ fn into_question(
 /// Id of a question: the family and a digest of frame, text, choices and answer. It depends neither on the position in the file nor on the
 /// evidence or the rulebook.
 fn question_id(candidate: &Candidate, frame: &FrameStatistics, dataset: &str) -> QuestionId {
-    let head = [
+    let parts = [
         dataset,
         &frame.scene,
         &frame.frame.0,
         candidate.family.name(),
         &candidate.text,
-    ];
-    let choices = candidate.choices.iter().map(String::as_str);
-    let parts = head.into_iter().chain(choices).chain([candidate.answer()]);
-    let digest = Digest::from_parts(parts.map(str::as_bytes)).to_string();
+    ]
+    .into_iter()
+    .chain(candidate.choices.iter().map(String::as_str))
+    .chain([candidate.answer()])
+    .map(str::as_bytes);
+    let digest = Digest::from_parts(parts).to_string();
     QuestionId(format!("{}-{}", candidate.family, &digest[..16]))
 }

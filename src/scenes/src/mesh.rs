@@ -241,7 +241,8 @@ impl Mesh {
     ) {
         // Each section between two radii gets its own normals, so that the edges are sharp.
         for pair in profile.windows(2) {
-            let rings = [pair[0], pair[1]].map(|at| ring(foot, at, depth));
+            let rings =
+                [pair[0], pair[1]].map(|(radius, height)| ring(foot, radius, height, depth));
             self.grid(&rings, surface);
         }
     }
@@ -254,7 +255,10 @@ impl Mesh {
         depth: f32,
         surface: &Surface,
     ) {
-        let rings: Vec<_> = profile.iter().map(|at| ring(foot, *at, depth)).collect();
+        let rings: Vec<_> = profile
+            .iter()
+            .map(|(radius, height)| ring(foot, *radius, *height, depth))
+            .collect();
         self.grid(&rings, surface);
     }
 
@@ -401,7 +405,7 @@ pub(super) fn bounds(faces: &[Face]) -> [Vec3; 2] {
 }
 
 /// Closed ring of points about y, given by its radius and its height above `foot`; `depth` stretches it along z.
-fn ring(foot: Vec3, (radius, height): (f32, f32), depth: f32) -> Vec<Vec3> {
+fn ring(foot: Vec3, radius: f32, height: f32, depth: f32) -> Vec<Vec3> {
     (0..=SIDES)
         .map(|side: usize| {
             let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);

@@ -34,10 +34,16 @@ impl Observation {
         let signs = classify(&self.statistics, book);
         signs.room.ok().or_else(|| {
             let highest = signs.scores.values().max()?;
-            let mut first = signs.scores.iter().filter(|(_, score)| *score == highest);
-            let (room, _) = first.next()?;
-            let is_alone = first.next().is_none();
-            (is_alone && book.room.order.contains(room)).then(|| room.clone())
+            let best: Vec<&String> = signs
+                .scores
+                .iter()
+                .filter(|(_, score)| *score == highest)
+                .map(|(room, _)| room)
+                .collect();
+            match best[..] {
+                [room] if book.room.order.contains(room) => Some(room.clone()),
+                _ => None,
+            }
         })
     }
 

@@ -181,12 +181,14 @@ fn measure_scale(
         whole[element.mask as usize].add(filter);
     }
     let single = [false, true].map(|is_disturbed| {
-        let alike = scale
-            .elements
-            .iter()
-            .zip(&filters)
-            .filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
-        inflation(alike.map(|(_, filter)| filter))
+        inflation(
+            scale
+                .elements
+                .iter()
+                .zip(&filters)
+                .filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed)
+                .map(|(_, filter)| filter),
+        )
     });
     let shared = inflation(whole.iter());
     let mut counts = vec![[0_u32; 2]; outlines.len()];

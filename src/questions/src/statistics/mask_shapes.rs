@@ -137,11 +137,11 @@ impl MaskShapes {
         };
         let word = own.map_or_else(
             || {
-                let most_common = labels
+                labels
                     .filter(|((_, id), _)| scene.class(*id) == Some(class))
                     .rev()
-                    .max_by_key(|(_, count)| **count);
-                most_common.map_or("", |((_, id), _)| scene.word(*id))
+                    .max_by_key(|(_, count)| **count)
+                    .map_or("", |((_, id), _)| scene.word(*id))
             },
             |name| &name.name,
         );
