@@ -9,8 +9,8 @@ use crate::types::replies::OBSERVER;
 use crate::types::values::Recent;
 use crate::types::{AnswerSource, Control, Digest, FrameId, Labels, Observed, Question};
 use darkqa_questions::colors::Palette;
-use darkqa_questions::observer::controls::spoiled;
-use darkqa_questions::observer::{Observation, ObservedFrame, VERSION, understood};
+use darkqa_questions::observer::controls::control_image;
+use darkqa_questions::observer::{Observation, ObservedFrame, VERSION, is_in_rulebook};
 use darkqa_questions::rules::Rules;
 
 /// Number of cached observations. A few are enough, because questions about one image follow each other; with all controls,
@@ -52,7 +52,7 @@ impl Observer {
         })?;
         if let Some(unknown) = questions
             .iter()
-            .find(|question| !understood(question, &rules))
+            .find(|question| !is_in_rulebook(question, &rules))
         {
             return Err(unusable(format!(
                 "the question {:?} ({:?}) is not one of the rulebook's, and the observer understands no others; if another \
@@ -115,9 +115,9 @@ impl Observer {
             let mut pixels = image.decode().map_err(|e| e.to_string())?;
             if let Some(control) = control {
                 let key = Digest::from_parts([&seed.to_le_bytes()[..], frame.0.as_bytes()]);
-                pixels = spoiled(control, &pixels, &observed, &key);
+                pixels = control_image(control, &pixels, &observed, &key);
             }
-            Ok::<_, String>(Arc::new(observed.look(&pixels)))
+            Ok::<_, String>(Arc::new(observed.observe(&pixels)))
         })?;
         let choice = observation.answer(question, &self.rules, &self.palette);
         Ok(LocalAnswer {
@@ -136,10 +136,10 @@ fn observed(observation: &Observation, choice: Option<usize>) -> Observed {
             Some(_) => AnswerSource::Evidence,
             None => AnswerSource::Guess,
         },
-        things: observation.things(),
-        seen: observation.seen(),
-        detected: observation.detected(),
-        explained_ppm: (1e6 * observation.explained() + 0.5) as u32,
+        things: observation.thing_count(),
+        seen: observation.seen_count(),
+        detected: observation.detected_count(),
+        explained_ppm: (1e6 * observation.explained_variance() + 0.5) as u32,
         outlines: outlines
             .map(|(id, confirmed, _)| (id, (100.0 * confirmed) as u8))
             .collect(),

@@ -43,7 +43,7 @@ use crate::text::words::{counted, plural};
 use crate::types::manifests::{Counts, RunManifest};
 use crate::types::{EnhancerName, TrialKey, View};
 use darkqa_enhance::{Enhancer, Usage};
-use darkqa_score::answers::FEWEST;
+use darkqa_score::answers::MIN_REPLIES;
 
 /// Share of `--max-cost` below which a cost that no server stated is not mentioned; chosen.
 const SMALL_SHARE: f64 = 0.01;
@@ -324,7 +324,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
         if models.iter().any(|model| model.model.is_remote()) {
             let of_all = |trials: usize| trials * models.len();
-            plan.ask_untouched_first(of_all(FEWEST), of_all(UNTOUCHED_FIRST), |source| {
+            plan.ask_untouched_first(of_all(MIN_REPLIES), of_all(UNTOUCHED_FIRST), |source| {
                 sources[source].frames.len() == 1
             });
         }

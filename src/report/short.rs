@@ -26,7 +26,7 @@ use crate::types::{Axis, AxisLevel};
 use darkqa_score::accuracies::{AccuracyCell, Health};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::Grid;
-use darkqa_score::subject::judged;
+use darkqa_score::subject::models_under_test;
 
 /// Width of the interval column, in characters.
 const INTERVAL_WIDTH: usize = 15;
@@ -89,7 +89,7 @@ fn models<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
 /// model ran.
 pub(super) fn who_is_judged(grid: &Grid<'_>) -> String {
     let mut models = models(grid);
-    let judged = judged(models.iter().copied());
+    let judged = models_under_test(models.iter().copied());
     models.retain(|model| judged.contains(model));
     models_and_people(grid, models)
 }

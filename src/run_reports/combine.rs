@@ -28,14 +28,14 @@ impl Combined {
     /// The results that follow from the records.
     pub(super) fn findings(&self) -> Findings<'_> {
         let offers = offers(&self.trials, &self.questions);
-        let findings = Findings::listed(
+        let findings = Findings::with_listing(
             &self.trials,
             &ties(&self.questions),
             offers,
             &self.fidelity,
             &self.listing,
         );
-        let findings = findings.for_set(self.set()).for_groups(&self.questions);
+        let findings = findings.with_set(self.set()).with_groups(&self.questions);
         // Replies differ from time to time: that is no other model.
         let apart = self.models.apart.iter();
         apart

@@ -96,7 +96,7 @@ fn found(combined: &Combined) -> SelfAgreement<'_> {
         &combined.questions,
         &combined.listing,
     )
-    .for_set(combined.set())
+    .with_set(combined.set())
 }
 
 fn report<'a>(

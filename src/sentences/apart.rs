@@ -81,8 +81,9 @@ impl OnSameQuestions {
         (level, variant): (AxisLevel, &Variant),
     ) -> Option<Self> {
         let grid = &findings.grid;
-        let find =
-            |model: &str| grid.stand_in(&ModelInCondition::seeing(model, level, variant, None));
+        let find = |model: &str| {
+            grid.find_up_to_group(&ModelInCondition::with_images(model, level, variant, None))
+        };
         let own = find(name)?;
         let cell = findings
             .summary

@@ -6,7 +6,7 @@ use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::comparisons::{BaselineRow, MIN_PAIRS};
 use darkqa_score::estimate::largest;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::judged;
+use darkqa_score::subject::models_under_test;
 
 /// Largest number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;
@@ -18,7 +18,7 @@ pub(crate) fn against_baseline(
     old: &str,
     unit: ClusterUnit,
 ) -> Vec<Sentence> {
-    let judged = judged(rows.iter().map(|row| &*row.subject.model));
+    let judged = models_under_test(rows.iter().map(|row| &*row.subject.model));
     let rows: Vec<&BaselineRow> = rows
         .iter()
         .filter(|row| judged.contains(&*row.subject.model))

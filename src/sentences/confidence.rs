@@ -3,7 +3,7 @@
 use super::sentence::{Numbers, Sentence, Tone};
 use crate::types::{AxisLevel, Variant};
 use darkqa_score::calibration::Calibration;
-use darkqa_score::calibration::LEAST_CONFIDENT_REPLIES;
+use darkqa_score::calibration::MIN_CONFIDENT_REPLIES;
 use darkqa_score::cluster::{ClusterUnit, MIN_SCENES};
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::ModelInCondition;
@@ -29,7 +29,7 @@ impl<'f> Confidence<'f> {
             findings
                 .calibrations
                 .iter()
-                .filter(|row| row.replies >= LEAST_CONFIDENT_REPLIES)
+                .filter(|row| row.replies >= MIN_CONFIDENT_REPLIES)
         };
         let dark = rows().filter(|row| {
             let subject = &row.subject;
@@ -43,7 +43,7 @@ impl<'f> Confidence<'f> {
         dark.filter(|row| row.subject.level == Some(level))
             .map(|dark| {
                 let model = &*dark.subject.model;
-                let clean = ModelInCondition::seeing(model, AxisLevel::L0, variant, None);
+                let clean = ModelInCondition::with_images(model, AxisLevel::L0, variant, None);
                 Self {
                     model,
                     level,

@@ -7,11 +7,11 @@ use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::judged;
+use darkqa_score::subject::models_under_test;
 
 /// Sentences about each model and each photograph: against the light, against synthetic images that are as dark, and enhanced.
 pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
-    let models = judged(findings.grid.subjects.iter().map(|subject| &*subject.model));
+    let models = models_under_test(findings.grid.subjects.iter().map(|subject| &*subject.model));
     let mut sentences = Vec::new();
     for pair in &findings.pairs {
         let rows: Vec<&Comparison> = findings

@@ -10,7 +10,7 @@ use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::comparisons::self_agreement::light::LightReplies;
 use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::significance::Significance;
-use darkqa_score::subject::judged;
+use darkqa_score::subject::models_under_test;
 
 /// All sentences of a run without true answers: models against each other at L0 first, then each model.
 #[must_use]
@@ -89,7 +89,7 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
 
 /// Each pair of models at L0.
 fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
-    let models = judged(found.models());
+    let models = models_under_test(found.models());
     let pairs = found.between.iter();
     let pairs =
         pairs.filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
@@ -362,7 +362,9 @@ fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (T
 
 /// How often a model states that it cannot tell, where it may.
 fn way_out(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
-    let light = found.light_of(model).filter(|light| light.has_way_out)?;
+    let light = found
+        .light_of(model)
+        .filter(|light| light.offers_cannot_tell)?;
     let dark = found
         .whole()
         .filter(|cell| {

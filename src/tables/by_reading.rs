@@ -53,7 +53,7 @@ fn file(found: &[FindingByReading]) -> Table {
         .column(P, "csv p", |row| tested(row).map(|effect| effect.p))
         .column(P, "csv p_holm", |row| tested(row).map(|effect| effect.holm))
         .column(Text, "csv verdict", |row| {
-            tested(row).map_or("not asked", |effect| effect.standing.word())
+            tested(row).map_or("not asked", |effect| effect.support.word())
         })
         .column(Text, "csv holds", |(finding, _)| finding.robustness.word())
         .column(Count, "csv dropped", |(finding, _)| finding.dropped)
@@ -176,7 +176,7 @@ fn effect(effect: Option<&TestedEffect>) -> String {
         |effect| {
             let value = points(effect.difference.value);
             let ends = ends_in_points(effect.difference);
-            format!("{value} [{ends}] {}", effect.standing.word())
+            format!("{value} [{ends}] {}", effect.support.word())
         },
     )
 }
@@ -257,13 +257,13 @@ fn clause(finding: &FindingByReading) -> String {
 
 /// The findings by reading, as `Noise compounds the drop under paper, eld; open under physical (−1.2 to 5.0 points).`
 fn sentence(finding: &FindingByReading) -> String {
-    let of = |standing: Support| -> Vec<String> {
+    let of = |support: Support| -> Vec<String> {
         finding
             .effects
             .iter()
             .filter_map(|one| Some((&one.reading, one.effect.as_ref()?)))
-            .filter(|(_, effect)| effect.standing == standing)
-            .map(|(reading, effect)| match standing {
+            .filter(|(_, effect)| effect.support == support)
+            .map(|(reading, effect)| match support {
                 Support::Holds => reading.to_string(),
                 Support::Opposite | Support::Open => {
                     format!(
@@ -327,7 +327,7 @@ mod tests {
     use crate::types::Severity;
     use darkqa_score::estimate::Estimate;
 
-    fn effect_of(reading: &str, low: f64, high: f64, standing: Support) -> EffectInReading {
+    fn effect_of(reading: &str, low: f64, high: f64, support: Support) -> EffectInReading {
         let value = f64::midpoint(low, high);
         let difference = Estimate {
             value,
@@ -340,7 +340,7 @@ mod tests {
             reading: ReadingName::new(reading).unwrap(),
             effect: Some(TestedEffect {
                 difference,
-                standing,
+                support,
                 p,
                 holm,
             }),

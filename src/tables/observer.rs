@@ -128,7 +128,7 @@ pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
     if !observer.is_asked() {
         return Vec::new();
     }
-    if let Some(control) = observer.refutations().next() {
+    if let Some(control) = observer.failed_controls().next() {
         let [value, low, high] =
             [control.score.value, control.score.low, control.score.high].map(percent);
         let place = match control.subject.level {

@@ -43,7 +43,7 @@ pub(super) fn darkness(pairs: &[PairDarkness]) -> Table {
         .column(Number, "csv ev_of_synthesis", |pair| Some(pair.synthesis))
         .build();
     table.heading = (!pairs.is_empty()).then(|| "Photographed in the dark".to_owned());
-    table.notes = pairs.iter().flat_map(PairDarkness::oddities).collect();
+    table.notes = pairs.iter().flat_map(PairDarkness::warnings).collect();
     table
 }
 

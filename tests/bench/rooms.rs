@@ -54,7 +54,7 @@ fn of_size(c: &mut Criterion, size: [usize; 2]) {
     group.bench_function("prepare the observer", |b| b.iter(|| black_box(observed())));
     let observed = observed();
     group.bench_function("look at an image", |b| {
-        b.iter(|| black_box(observed.look(&frame.rgb)));
+        b.iter(|| black_box(observed.observe(&frame.rgb)));
     });
     group.finish();
 }

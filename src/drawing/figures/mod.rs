@@ -146,7 +146,9 @@ impl<'a> Overview<'a> {
             .filter_map(|&level| {
                 let grid = &self.findings.grid;
                 let of = |enhancer| {
-                    grid.stand_in(&ModelInCondition::seeing(model, level, variant, enhancer))
+                    grid.find_up_to_group(&ModelInCondition::with_images(
+                        model, level, variant, enhancer,
+                    ))
                 };
                 let raw = || (level == AxisLevel::L0).then(|| of(None)).flatten();
                 let subject = &grid.subjects[of(enhancer).or_else(raw)?];
@@ -348,7 +350,7 @@ impl<'a> Overview<'a> {
             .grid
             .items
             .iter()
-            .filter(|item| item.is_of(family))
+            .filter(|item| item.is_in_family(family))
             .count()
     }
 

@@ -213,7 +213,8 @@ impl Overview<'_> {
     /// The accuracy of a model on a family at a level.
     fn at(&self, model: &str, level: AxisLevel, variant: &Variant, family: &Family) -> TableCell {
         let grid = &self.findings.grid;
-        let place = grid.stand_in(&ModelInCondition::seeing(model, level, variant, None));
+        let place =
+            grid.find_up_to_group(&ModelInCondition::with_images(model, level, variant, None));
         let subject = place.map(|place| &grid.subjects[place]);
         let of = subject.and_then(|subject| {
             let below = !self.findings.below_blind(subject, Some(family)).is_empty();

@@ -31,7 +31,7 @@ pub(crate) fn names(sources: &[Source]) -> Vec<PhotoName> {
 }
 
 /// Prints how dark the photographs are, on a sample of the frames, and what is odd about them: of how many frames there are none, which
-/// show another scene, and what [`PairDarkness::oddities`] finds. A file that cannot be decoded is left out: its trial states so.
+/// show another scene, and what [`PairDarkness::warnings`] finds. A file that cannot be decoded is left out: its trial states so.
 pub(crate) fn tell(frames: &dyn Frames, sources: &[Source], progress: &Progress) {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     for name in names(sources) {
@@ -79,7 +79,7 @@ pub(crate) fn tell(frames: &dyn Frames, sources: &[Source], progress: &Progress)
             darkness.frames,
             of.len()
         ));
-        for oddity in darkness.oddities() {
+        for oddity in darkness.warnings() {
             tracing::warn!("{oddity}");
         }
     }

@@ -8,7 +8,7 @@ use super::rules::ActivityRule;
 use super::statistics::Segment;
 use darkqa_ground::types::Family;
 
-/// Two candidates for every activity: yes and no.
+/// Returns two candidates for every activity: yes and no.
 pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     context
         .book
@@ -19,15 +19,15 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
                 rejected(Family::Affordance, &activity.activity, Some(answer), reason)
             };
             [
-                yes(context, activity).unwrap_or_else(|reason| reject(true, reason)),
-                no(context, activity).unwrap_or_else(|reason| reject(false, reason)),
+                suitable(context, activity).unwrap_or_else(|reason| reject(true, reason)),
+                unsuitable(context, activity).unwrap_or_else(|reason| reject(false, reason)),
             ]
         })
         .collect()
 }
 
-/// Yes: the activity belongs to this type of room, and all objects of one of its enablers are evidence.
-fn yes(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
+/// Candidate with the answer yes: the activity belongs to this type of room, and all objects of one of its enablers are evidence.
+fn suitable(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
     let Some(room) = context.any_room else {
         return Err(Reason::NoRoom);
     };
@@ -38,15 +38,15 @@ fn yes(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult,
         return Err(Reason::Inexpressible);
     }
     let evidence: Vec<&Segment> = context.statistics.evidence(context.book).collect();
-    let segment_of = |token: &String| {
+    let find_segment = |token: &String| {
         evidence
             .iter()
-            .find(|segment| segment.token(context.book) == token && is_called(context, segment))
+            .find(|segment| segment.token(context.book) == token && is_typical(context, segment))
     };
     let found = activity.enablers.iter().find_map(|tokens| {
         tokens
             .iter()
-            .map(|token| segment_of(token).copied())
+            .map(|token| find_segment(token).copied())
             .collect::<Option<Vec<&Segment>>>()
     });
     let Some(segments) = found else {
@@ -55,8 +55,7 @@ fn yes(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult,
     Ok(candidate(context, activity, room, 0, &segments))
 }
 
-/// Whether a yes is possible in this data set: it can name all objects of one enabler. Else "no" would be the answer to every
-/// question about the activity.
+/// True if the data set has words for all objects of one enabler. Otherwise, "no" would be the answer to every question about the activity.
 fn can_be_enabled(context: &RuleContext<'_>, activity: &ActivityRule) -> bool {
     activity.enablers.iter().any(|tokens| {
         tokens
@@ -65,15 +64,15 @@ fn can_be_enabled(context: &RuleContext<'_>, activity: &ActivityRule) -> bool {
     })
 }
 
-/// True if a segment is a typical member of its class: its token is its own word, or questions call it by its word. The sofa of a coarse
-/// label space may be an armchair.
-fn is_called(context: &RuleContext<'_>, segment: &Segment) -> bool {
-    segment.token(context.book) != segment.class || segment.called(context.book).is_some()
+/// True if a segment is a typical member of its class: it has a token of its own, or questions use its word. Counterexample: the sofa of a
+/// coarse label space may be an armchair.
+fn is_typical(context: &RuleContext<'_>, segment: &Segment) -> bool {
+    segment.token(context.book) != segment.class || segment.question_word(context.book).is_some()
 }
 
-/// No: the room is known and of another type, and no object that the activity needs, or that could substitute one, has a
+/// Candidate with the answer no: the room is of another, known type, and no object that the activity needs, or a substitute for one, has a
 /// pixel.
-fn no(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
+fn unsuitable(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
     let Some(room) = context.room else {
         return Err(Reason::NoRoom);
     };
@@ -86,12 +85,11 @@ fn no(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, 
     if let Some(reason) = context.absence_blocker() {
         return Err(reason);
     }
-    let pinch = activity
-        .pinch
-        .iter()
-        .filter(|_| context.book.affordance.strict);
-    let tokens: Vec<&String> = activity.enablers.iter().flatten().chain(pinch).collect();
-    if !tokens.iter().all(|token| context.expressible(token)) {
+    let mut tokens: Vec<&String> = activity.enablers.iter().flatten().collect();
+    if context.book.affordance.strict {
+        tokens.extend(&activity.pinch);
+    }
+    if !tokens.iter().all(|token| context.is_expressible(token)) {
         return Err(Reason::Inexpressible);
     }
     if tokens.iter().any(|token| context.may_be_hidden(token)) {
@@ -99,7 +97,7 @@ fn no(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, 
     }
     if tokens
         .iter()
-        .any(|token| context.statistics.shows(token, context.book))
+        .any(|token| context.statistics.has_token(token, context.book))
     {
         return Err(Reason::Seen);
     }
@@ -108,7 +106,7 @@ fn no(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, 
         activity,
         room,
         1,
-        &context.signs_of(room),
+        &context.room_evidence(room),
     ))
 }
 

@@ -32,7 +32,8 @@ pub(super) struct BalancedSet {
     pub(super) uneven: Vec<String>,
 }
 
-/// Drops questions until the answers are balanced. The digests of the ids decide which of several are dropped.
+/// Drops questions until the answers are balanced. Among questions with the same answer, those with the largest digests of their ids are
+/// dropped.
 pub(super) fn balance(
     asked: Vec<GeneratedQuestion>,
     mode: BalanceMode,
@@ -46,23 +47,17 @@ pub(super) fn balance(
         }
     }
     if rule.least_entropy_ppm > 0 {
-        let lists = groups(&asked, &dropped, |asked| Some(asked.question.text.clone()));
-        for (_, list) in lists {
-            if !varied(&asked, &list, rule) {
+        for (_, list) in groups(&asked, &dropped, |asked| Some(asked.question.text.clone())) {
+            if !is_varied(&asked, &list, rule) {
                 dropped.extend(list);
             }
         }
     }
     if mode != BalanceMode::None {
-        let binary = |asked: &GeneratedQuestion| {
-            let family = &asked.question.family;
-            matches!(family, Family::Affordance | Family::Presence)
-                .then(|| (family.clone(), asked.question.text.clone()))
-        };
-        for (_, list) in groups(&asked, &dropped, binary) {
-            let truth = |i: &usize| asked[*i].question.choices.truth();
-            let (yes, no): (Vec<usize>, Vec<usize>) =
-                list.into_iter().partition(|i| truth(i) == Some(0));
+        for (_, list) in groups(&asked, &dropped, binary_key) {
+            let (yes, no): (Vec<usize>, Vec<usize>) = list
+                .into_iter()
+                .partition(|i| asked[*i].question.choices.truth() == Some(0));
             let max = yes.len().min(no.len()) + 1;
             dropped.extend(yes.into_iter().skip(max));
             dropped.extend(no.into_iter().skip(max));
@@ -75,15 +70,23 @@ pub(super) fn balance(
         .iter()
         .map(|i| asked[*i].question.family.clone())
         .collect();
-    let remaining = asked
-        .into_iter()
-        .enumerate()
-        .filter(|(i, _)| !dropped.contains(i));
     BalancedSet {
-        asked: remaining.map(|(_, asked)| asked).collect(),
+        asked: asked
+            .into_iter()
+            .enumerate()
+            .filter(|(i, _)| !dropped.contains(i))
+            .map(|(_, asked)| asked)
+            .collect(),
         dropped: families,
         uneven,
     }
+}
+
+/// Family and text of a yes-no question; `None` for other questions.
+fn binary_key(asked: &GeneratedQuestion) -> Option<(Family, String)> {
+    let family = &asked.question.family;
+    matches!(family, Family::Affordance | Family::Presence)
+        .then(|| (family.clone(), asked.question.text.clone()))
 }
 
 /// Drops questions whose room type or colour exceeds its share of the answers. Returns a warning for each family that cannot
@@ -102,7 +105,7 @@ fn cap_shares(
             (asked.question.family == family).then(|| asked.answer().to_owned())
         };
         let lists = groups(asked, dropped, answer);
-        match caps(&lists, share) {
+        match max_per_answer(&lists, share) {
             Some(max) => {
                 let surplus = lists
                     .into_values()
@@ -120,7 +123,7 @@ fn cap_shares(
     uneven
 }
 
-/// Indexes of the remaining questions by key, each list sorted by the digests of the ids.
+/// Indices of the remaining questions by key, each list sorted by the digests of the ids.
 fn groups<K: Ord>(
     asked: &[GeneratedQuestion],
     dropped: &BTreeSet<usize>,
@@ -138,9 +141,8 @@ fn groups<K: Ord>(
     groups
 }
 
-/// The maximum number of questions for each answer that keeps every answer within its share of all. `None` if there are too
-/// few different answers.
-fn caps(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Option<usize> {
+/// Maximum number of questions with the same answer that keeps every answer within its share of all. `None` with too few different answers.
+fn max_per_answer(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Option<usize> {
     let total: usize = lists.values().map(Vec::len).sum();
     let remaining = |max: usize| -> usize { lists.values().map(|list| list.len().min(max)).sum() };
     (1..=total)
@@ -150,9 +152,9 @@ fn caps(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Option<usize> {
         .map(|(_, max)| max)
 }
 
-/// Whether a question occurs in enough scenes and its answers differ enough: their entropy, relative to the entropy of
-/// uniform answers (EmbodiedQA, `entropy_based_filtering.py`).
-fn varied(asked: &[GeneratedQuestion], list: &[usize], rule: &BalanceRule) -> bool {
+/// True if a question occurs in enough scenes and the entropy of its answers, relative to that of uniform answers, is high enough
+/// (EmbodiedQA, `entropy_based_filtering.py`).
+fn is_varied(asked: &[GeneratedQuestion], list: &[usize], rule: &BalanceRule) -> bool {
     let scenes: BTreeSet<&str> = list.iter().map(|i| asked[*i].scene.as_str()).collect();
     if scenes.len() < rule.least_scenes {
         return false;

@@ -8,13 +8,18 @@ use super::rules::{ClassFlag, GapScope, RuleBook};
 use super::statistics::{Segment, SegmentDepth};
 use darkqa_ground::types::Family;
 
-/// The single candidate of a frame.
+/// Returns the single candidate of a frame.
 pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     let result = candidate(context);
     vec![result.unwrap_or_else(|reason| rejected(Family::Closest, "", None, reason))]
 }
 
-type NearObject<'a> = (&'a Segment, SegmentDepth);
+/// A segment with its depth.
+#[derive(Debug, Clone, Copy)]
+struct NearObject<'a> {
+    segment: &'a Segment,
+    depth: SegmentDepth,
+}
 
 fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     let (book, statistics) = (context.book, context.statistics);
@@ -29,16 +34,21 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     }
     let mut objects: Vec<NearObject<'_>> = statistics
         .evidence(book)
-        .filter(|segment| eligible(context, segment))
-        .filter_map(|segment| Some((segment, segment.measured(book)?)))
+        .filter(|segment| is_eligible(context, segment))
+        .filter_map(|segment| {
+            let depth = segment.reliable_depth(book)?;
+            Some(NearObject { segment, depth })
+        })
         .collect();
-    objects.sort_by_key(|(segment, depth)| (depth.median, segment.id));
+    objects.sort_by_key(|object| (object.depth.median, object.segment.id));
     let [first, rest @ ..] = &objects[..] else {
         return Err(Reason::Few);
     };
     let second = match book.closest.gap_scope {
         GapScope::Instances => rest.first(),
-        GapScope::Classes => rest.iter().find(|(other, _)| other.class != first.0.class),
+        GapScope::Classes => rest
+            .iter()
+            .find(|other| other.segment.class != first.segment.class),
     };
     let second = second.ok_or(Reason::Few)?;
     let mut classes = classes(&objects, book);
@@ -46,7 +56,7 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
         return Err(Reason::Few);
     }
     check_gap(context, &objects, *first, *second)?;
-    check_rivals(context, &objects, first.1.p10, second.1.median)?;
+    check_rivals(context, &objects, first.depth.p10, second.depth.median)?;
 
     let winner = classes[0];
     classes.truncate(book.closest.choices);
@@ -57,7 +67,7 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
         .position(|class| *class == winner)
         .unwrap_or(0);
     let choices = classes.iter().map(|(_, word)| (*word).to_owned()).collect();
-    let segments: Vec<&Segment> = objects.iter().map(|(segment, _)| *segment).collect();
+    let segments: Vec<&Segment> = objects.iter().map(|object| object.segment).collect();
     Ok(context.viable(
         Candidate {
             family: Family::Closest,
@@ -66,7 +76,7 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
             choices,
             truth,
             evidence: json!({
-                "gap_mm": second.1.median - first.1.median,
+                "gap_mm": second.depth.median - first.depth.median,
                 "near_gap_mm": near_gap(&objects, *first),
                 "along": depth.along,
             }),
@@ -75,11 +85,11 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     ))
 }
 
-/// The different classes, nearest first, each with the word of its nearest object.
+/// Returns the different classes, nearest first, each with the word of its nearest object.
 fn classes<'a>(objects: &[NearObject<'a>], book: &'a RuleBook) -> Vec<(&'a str, &'a str)> {
     let mut classes: Vec<(&str, &str)> = Vec::new();
-    for (segment, _) in objects {
-        let Some(word) = segment.called(book) else {
+    for NearObject { segment, .. } in objects {
+        let Some(word) = segment.question_word(book) else {
             continue;
         };
         if classes
@@ -92,25 +102,25 @@ fn classes<'a>(objects: &[NearObject<'a>], book: &'a RuleBook) -> Vec<(&'a str, 
     classes
 }
 
-/// Whether a segment may be offered.
-fn eligible(context: &RuleContext<'_>, segment: &Segment) -> bool {
+/// True if a segment may be one of the choices.
+fn is_eligible(context: &RuleContext<'_>, segment: &Segment) -> bool {
     let book = context.book;
-    book.is(&segment.class, ClassFlag::Asked)
-        && !book.is(&segment.class, ClassFlag::Structural)
-        && !segment.flat(book)
-        && segment.called(book).is_some()
-        && context.statistics.area(segment) >= book.closest.area_ppm
+    book.has_flag(&segment.class, ClassFlag::Asked)
+        && !book.has_flag(&segment.class, ClassFlag::Structural)
+        && !segment.is_flat(book)
+        && segment.question_word(book).is_some()
+        && context.statistics.area_ppm(segment) >= book.closest.area_ppm
 }
 
-/// The distance in mm from the first object's 10 % depth quantile to the smallest one of the others. `None` if another is
-/// nearer or there is none.
+/// Distance in mm from the first object's 10 % depth quantile to the smallest one of the others. `None` if another object is nearer, or
+/// without other objects.
 fn near_gap(objects: &[NearObject<'_>], first: NearObject<'_>) -> Option<u32> {
     let nearest = objects
         .iter()
-        .filter(|(segment, _)| segment.id != first.0.id)
-        .map(|(_, depth)| depth.p10)
+        .filter(|object| object.segment.id != first.segment.id)
+        .map(|object| object.depth.p10)
         .min()?;
-    nearest.checked_sub(first.1.p10)
+    nearest.checked_sub(first.depth.p10)
 }
 
 /// Checks that the first object is clearly nearer than the second, and that no other object's 10 % quantile is nearer.
@@ -121,14 +131,19 @@ fn check_gap(
     second: NearObject<'_>,
 ) -> Result<(), Reason> {
     let rule = &context.book.closest;
-    let (near, far) = (u64::from(first.1.median), u64::from(second.1.median));
+    let (near, far) = (
+        u64::from(first.depth.median),
+        u64::from(second.depth.median),
+    );
     let gap = far - near;
     if gap < rule.gap_mm.into() || gap * 1_000_000 < near * rule.gap_ppm {
         return Err(Reason::Gap);
     }
     let others: Vec<NearObject<'_>> = objects
         .iter()
-        .filter(|other| rule.gap_scope == GapScope::Instances || other.0.class != first.0.class)
+        .filter(|other| {
+            rule.gap_scope == GapScope::Instances || other.segment.class != first.segment.class
+        })
         .copied()
         .collect();
     match near_gap(&others, first) {
@@ -138,8 +153,8 @@ fn check_gap(
     }
 }
 
-/// Checks the objects that are not offered: none may be nearer than the second, or have a 10 % quantile nearer than the
-/// first's.
+/// Checks the objects that are not among the choices: none may have a smaller median depth than `second`, or a smaller 10 % quantile than
+/// `nearest`, both in millimetres.
 fn check_rivals(
     context: &RuleContext<'_>,
     objects: &[NearObject<'_>],
@@ -147,17 +162,18 @@ fn check_rivals(
     second: u32,
 ) -> Result<(), Reason> {
     let (book, statistics) = (context.book, context.statistics);
-    let background_class =
-        |class: &str| book.is(class, ClassFlag::Structural) || book.is(class, ClassFlag::Flat);
+    let is_background_class = |class: &str| {
+        book.has_flag(class, ClassFlag::Structural) || book.has_flag(class, ClassFlag::Flat)
+    };
     for segment in &statistics.segments {
         // A segment of several classes may be any object.
-        let background =
-            (background_class(&segment.class) || segment.flat(book)) && !segment.mixed(book);
-        if background || objects.iter().any(|(object, _)| object.id == segment.id) {
+        let is_background = (is_background_class(&segment.class) || segment.is_flat(book))
+            && !segment.is_mixed(book);
+        if is_background || objects.iter().any(|object| object.segment.id == segment.id) {
             continue;
         }
-        let area = statistics.area(segment);
-        match segment.measured(book) {
+        let area = statistics.area_ppm(segment);
+        match segment.reliable_depth(book) {
             None if area >= book.closest.unmeasured_ppm => return Err(Reason::Unmeasured),
             Some(depth)
                 if area >= book.closest.rival_ppm
@@ -171,7 +187,7 @@ fn check_rivals(
     let loose: u64 = statistics
         .loose
         .iter()
-        .filter(|(class, _)| !background_class(class))
+        .filter(|(class, _)| !is_background_class(class))
         .map(|(_, pixels)| pixels)
         .sum();
     if statistics.ppm(loose) >= book.closest.rival_ppm {

@@ -4,19 +4,19 @@ use serde_json::json;
 
 use super::colors::{Color, Palette};
 use super::reason::Reason;
-use super::relative::relative;
+use super::relative::relative_code;
 use super::rule_context::{Candidate, RuleContext, RuleResult, rejected};
 use super::rules::{ClassFlag, ColorChoices, ColorRule};
 use super::statistics::{Segment, ppm};
 use darkqa_ground::types::Family;
 
-/// One candidate for every segment of a class whose colour may be asked.
+/// Returns one candidate for every segment of a class whose colour may be asked.
 pub(super) fn candidates(context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
     context
         .statistics
         .segments
         .iter()
-        .filter(|segment| context.book.is(&segment.class, ClassFlag::Color))
+        .filter(|segment| context.book.has_flag(&segment.class, ClassFlag::Color))
         .map(|segment| {
             let result = candidate(context, segment, palette);
             result.unwrap_or_else(|reason| rejected(Family::Color, &segment.class, None, reason))
@@ -30,22 +30,27 @@ fn candidate(
     palette: &Palette,
 ) -> Result<RuleResult, Reason> {
     let rule = &context.book.color;
-    if let Some(reason) = context.statistics.disqualified(segment, context.book) {
+    if let Some(reason) = context.statistics.evidence_flaw(segment, context.book) {
         return Err(reason);
     }
-    if context.statistics.area(segment) < rule.area_ppm || segment.core < rule.eroded_px {
+    if context.statistics.area_ppm(segment) < rule.area_ppm || segment.core < rule.eroded_px {
         return Err(Reason::Small);
     }
-    if !unique(context, segment) {
+    if !is_unique(context, segment) {
         return Err(Reason::NotUnique);
     }
-    let word = segment.called(context.book).ok_or(Reason::Wordless)?;
+    let word = segment
+        .question_word(context.book)
+        .ok_or(Reason::Wordless)?;
     let color = dominant_color(segment, rule, palette)?;
     check_light(context, segment, color, palette)?;
-    if context.views.disagree(context.statistics, segment, color) {
+    if context
+        .views
+        .has_other_color(context.statistics, segment, color)
+    {
         return Err(Reason::Disagreed);
     }
-    let (choices, truth) = offered(context, color).ok_or(Reason::NotOffered)?;
+    let (choices, truth) = choices(context, color).ok_or(Reason::NotOffered)?;
     let (_, most, next, none) = segment.leading_color();
     let share = |part| ppm(part, segment.core);
     let evidence = json!({
@@ -57,7 +62,7 @@ fn candidate(
         "light_rgb": context.statistics.light,
         "around_luma": segment.around,
     });
-    let text = context.book.filled(&rule.text, &rule.plural, word);
+    let text = context.book.fill_template(&rule.text, &rule.plural, word);
     Ok(context.viable(
         Candidate {
             family: Family::Color,
@@ -71,18 +76,19 @@ fn candidate(
     ))
 }
 
-/// Whether a segment is the only visible one of its class. Pixels of the class outside of all segments count as another
-/// segment.
-fn unique(context: &RuleContext<'_>, segment: &Segment) -> bool {
-    let (statistics, least) = (context.statistics, context.book.color.lone_ppm);
-    let others = statistics.segments.iter().filter(|other| {
-        other.class == segment.class && other.id != segment.id && statistics.area(other) >= least
-    });
+/// True if a segment is the only visible one of its class. Pixels of the class outside all segments count as another segment.
+fn is_unique(context: &RuleContext<'_>, segment: &Segment) -> bool {
+    let (statistics, min_ppm) = (context.statistics, context.book.color.lone_ppm);
     let loose = statistics.loose.get(&segment.class).copied().unwrap_or(0);
-    others.count() == 0 && statistics.ppm(loose) < least
+    let has_other = statistics.segments.iter().any(|other| {
+        other.class == segment.class
+            && other.id != segment.id
+            && statistics.area_ppm(other) >= min_ppm
+    });
+    !has_other && statistics.ppm(loose) < min_ppm
 }
 
-/// The colour of a segment, if one colour clearly dominates.
+/// Colour of a segment, if one colour clearly dominates.
 fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Result<Color, Reason> {
     let (color, most, next, none) = segment.leading_color();
     let share = |part| ppm(part, segment.core);
@@ -96,15 +102,15 @@ fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Res
     if share(none) >= rule.none_ppm {
         return Err(Reason::Nameless);
     }
-    let dominant = share(most) >= rule.dominant_ppm && most >= rule.lead * next;
-    if !dominant || palette.color(segment.median) != Some(color) {
+    let is_dominant = share(most) >= rule.dominant_ppm && most >= rule.lead * next;
+    if !is_dominant || palette.color(segment.median) != Some(color) {
         return Err(Reason::Motley);
     }
     Ok(color)
 }
 
-/// Checks that the colour has the same name relative to the light of the frame, channel by channel, and relative to the light
-/// around the segment, whose colour is that of the neighbours and does not count.
+/// Checks that the colour keeps its name relative to the light of the frame, channel by channel, and relative to the luma around the
+/// segment. The colour around the segment is ignored, because it is that of its neighbours.
 fn check_light(
     context: &RuleContext<'_>,
     segment: &Segment,
@@ -117,7 +123,7 @@ fn check_light(
     ];
     if lights.into_iter().flatten().all(|light: [u8; 3]| {
         palette.color(
-            [0, 1, 2].map(|channel: usize| relative(segment.median[channel], light[channel])),
+            [0, 1, 2].map(|channel: usize| relative_code(segment.median[channel], light[channel])),
         ) == Some(color)
     }) {
         Ok(())
@@ -126,21 +132,21 @@ fn check_light(
     }
 }
 
-/// The colours that are offered, and the index of the true one; `None` if it is not among them.
-fn offered(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
+/// Returns the colours offered as choices, and the index of the true one; `None` if it is not among them.
+fn choices(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usize)> {
     let rule = &context.book.color;
     let mut colors = match rule.candidates {
         ColorChoices::All11 => Color::ALL.to_vec(),
         ColorChoices::Fixed8 => rule.fixed8.clone(),
         ColorChoices::K5 => {
-            let near = |color: Color| {
+            let is_neighbour = |color: Color| {
                 rule.neighbours
                     .iter()
                     .any(|pair| *pair == [color, truth] || *pair == [truth, color])
             };
             let mut others: Vec<Color> = Color::ALL
                 .into_iter()
-                .filter(|color| *color != truth && !near(*color))
+                .filter(|color| *color != truth && !is_neighbour(*color))
                 .collect();
             context.picker.shuffle("color", &mut others);
             others.truncate(4);

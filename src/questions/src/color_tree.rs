@@ -1,10 +1,10 @@
-//! The decision tree over CIELAB that names colours; it generates the table of [`super::colors`].
+//! Decision tree over CIELAB that names colours. It generates the table of [`super::colors`].
 //!
-//! The bounds were set by eye on photographs of rooms. A colour on whose name people disagree has no name.
+//! The bounds were set by eye on photographs of rooms. A colour has no name if people disagree about it.
 
 use super::colors::Color;
 
-/// The name of an sRGB colour; `None` if people do not agree on one.
+/// Name of an sRGB colour; `None` if people do not agree on one.
 pub(super) fn name(rgb: [u8; 3]) -> Option<Color> {
     let [lightness, a, b] = lab(rgb);
     let chroma = libm::hypot(a, b);
@@ -27,6 +27,7 @@ pub(super) fn name(rgb: [u8; 3]) -> Option<Color> {
     chromatic(lightness, chroma, hue)
 }
 
+/// Name of a colour that is not black, grey or white.
 fn chromatic(lightness: f64, chroma: f64, hue: f64) -> Option<Color> {
     // Beige, cream, ivory.
     if chroma < 16.0 && (75.0..110.0).contains(&hue) && lightness >= 55.0 {

@@ -15,10 +15,10 @@ pub struct Frequency {
 impl Frequency {
     /// Counts the classes of a frame.
     pub fn add(&mut self, statistics: &FrameStatistics, room: Option<&str>, book: &RuleBook) {
-        let evidence = statistics.evidence(book);
-        let classes: BTreeSet<&str> = evidence
+        let classes: BTreeSet<&str> = statistics
+            .evidence(book)
             .map(|segment| segment.class.as_str())
-            .filter(|class| book.is(class, ClassFlag::Asked))
+            .filter(|class| book.has_flag(class, ClassFlag::Asked))
             .collect();
         for room in [Some(""), room].into_iter().flatten() {
             let scenes = self.counts.entry(room.to_owned()).or_default();
@@ -29,8 +29,8 @@ impl Frequency {
         }
     }
 
-    /// The classes to expect in a room of a scene: the `max` most common ones in such rooms of other scenes. If no other scene
-    /// has such a room, all frames count. `None` if fewer than `max` classes occur, which is too little evidence.
+    /// Classes to expect in a room of a scene: the `max` most common ones in such rooms of other scenes, or in all frames if no other scene
+    /// has such a room. `None` if fewer than `max` classes occur, which is too little evidence.
     #[must_use]
     pub fn expected(&self, room: &str, scene: &str, max: usize) -> Option<BTreeSet<String>> {
         let elsewhere = self.total(room, Some(scene));
@@ -53,6 +53,7 @@ impl Frequency {
         )
     }
 
+    /// Number of frames that show each class in a type of room, over all scenes but one.
     fn total(&self, room: &str, except: Option<&str>) -> BTreeMap<&str, u64> {
         let mut total = BTreeMap::new();
         for (_, counts) in self

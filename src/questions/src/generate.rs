@@ -19,7 +19,7 @@ use super::{affordance, closest, color, presence, room_type};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Choices, Digest, Family, FrameId, Labels, Question, QuestionId};
 
-/// The settings of one generation of questions.
+/// Settings for generating questions.
 #[derive(Debug, Clone)]
 pub struct QuestionRequest<'a> {
     /// Name of the data set; it enters the ids of questions.
@@ -34,13 +34,12 @@ pub struct QuestionRequest<'a> {
     pub families: BTreeSet<Family>,
     /// Source of a frame's room type.
     pub room_source: RoomSource,
-    /// How far the answers are balanced.
     pub balance: BalanceMode,
     /// Ids of the questions that a person has rejected.
     pub rejected: BTreeSet<QuestionId>,
 }
 
-/// Why a viable question is not asked.
+/// Reason why a viable question is not asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum OmissionReason {
     /// Another question of the same family is asked of the frame.
@@ -94,7 +93,7 @@ pub struct Generated {
     pub asked: Vec<GeneratedQuestion>,
     /// Numbers of candidates by outcome, for each family.
     pub counts: BTreeMap<Family, FamilyCounts>,
-    /// The signs of each frame's room, sorted by scene and frame.
+    /// Evidence for the room type of each frame, sorted by scene and frame.
     pub rooms: Vec<(FrameId, RoomSigns)>,
     /// Frames that are too dark to ask anything about.
     pub dark: Vec<FrameId>,
@@ -102,7 +101,7 @@ pub struct Generated {
     pub uneven: Vec<String>,
 }
 
-/// Generates the questions about frames and calls `explain` for every candidate.
+/// Generates questions about frames and calls `explain` for every candidate.
 ///
 /// At most one question of a family is asked of a frame, because `Rule_k: (Φ_f, r_f) → (q, a)` of the paper returns one
 /// pair. The frames are sorted by scene and name first, so their order does not matter.
@@ -123,14 +122,14 @@ pub fn generate(
     let (dark, light): (Vec<_>, Vec<_>) = frames
         .into_iter()
         .partition(|frame| frame.luma[1] < book.measure.dark_luma);
-    generated.dark = dark.into_iter().map(|frame| frame.frame.clone()).collect();
+    generated.dark = dark.iter().map(|frame| frame.frame.clone()).collect();
 
     let mut frequency = Frequency::default();
     let rooms: Vec<(RoomSigns, Option<String>)> = light
         .iter()
         .map(|frame| {
             let signs = classify(frame, book);
-            let room = room(frame, &signs, request.room_source, book);
+            let room = asked_room(frame, &signs, request.room_source, book);
             frequency.add(frame, room.as_deref(), book);
             (signs, room)
         })
@@ -170,7 +169,7 @@ pub fn generate(
                 continue;
             };
             counts.omit(OmissionReason::NotChosen, others);
-            let asked = question(candidate, frame, request)?;
+            let asked = into_question(candidate, frame, request)?;
             if request.rejected.contains(&asked.question.id) {
                 counts.omit(OmissionReason::Rejected, 1);
             } else {
@@ -178,15 +177,16 @@ pub fn generate(
             }
         }
     }
-    let classified = light.iter().zip(rooms);
-    generated.rooms = classified
+    generated.rooms = light
+        .iter()
+        .zip(rooms)
         .map(|(frame, (signs, _))| (frame.frame.clone(), signs))
         .collect();
-    Ok(finish(generated, request))
+    Ok(balance_answers(generated, request))
 }
 
 /// Balances the answers and completes the counts.
-fn finish(mut generated: Generated, request: &QuestionRequest<'_>) -> Generated {
+fn balance_answers(mut generated: Generated, request: &QuestionRequest<'_>) -> Generated {
     let balanced = balance(
         std::mem::take(&mut generated.asked),
         request.balance,
@@ -204,8 +204,8 @@ fn finish(mut generated: Generated, request: &QuestionRequest<'_>) -> Generated 
     generated
 }
 
-/// The room type that the rules use for a frame; `None` if it is unknown.
-fn room(
+/// Room type of a frame; `None` if it is unknown or if questions do not ask about it.
+fn asked_room(
     frame: &FrameStatistics,
     signs: &RoomSigns,
     source: RoomSource,
@@ -213,11 +213,11 @@ fn room(
 ) -> Option<String> {
     match source {
         RoomSource::Signature => signs.room.clone().ok(),
-        RoomSource::Stated => stated(frame, book),
+        RoomSource::Stated => stated_room(frame, book),
     }
 }
 
-/// The room type of a frame, also one that questions do not ask about; `None` if it is unknown.
+/// Room type of a frame, even if questions do not ask about it; `None` if it is unknown.
 fn any_room<'a>(
     frame: &'a FrameStatistics,
     signs: &'a RoomSigns,
@@ -229,9 +229,9 @@ fn any_room<'a>(
     }
 }
 
-/// The room type that the data set states for a frame; `None` if questions do not ask about such rooms.
+/// Room type that the data set states for a frame; `None` if questions do not ask about such rooms.
 #[must_use]
-pub fn stated(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
+pub fn stated_room(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
     let stated = frame
         .room
         .as_deref()?
@@ -262,8 +262,8 @@ struct AnswerCounts(BTreeMap<(Family, String), [u64; 2]>);
 impl AnswerCounts {
     /// Chooses one of a family's candidates.
     ///
-    /// For yes-no families, the answer is picked first, if both are possible. Among the candidates with this answer, the
-    /// question that lacks it most comes first, then the question asked least. A pick decides the rest.
+    /// For yes-no families, the answer is picked first, if both are possible. Among the candidates with this answer, the question whose
+    /// answers it balances best is preferred, then the question asked least. Hashes break ties.
     fn choose(
         &mut self,
         candidates: Vec<Candidate>,
@@ -295,13 +295,13 @@ impl AnswerCounts {
     }
 }
 
-/// The question that a candidate becomes, with the digests of the rules in its evidence.
-fn question(
+/// Turns a candidate into a question, with the digests of the rules in its evidence.
+fn into_question(
     candidate: Candidate,
     frame: &FrameStatistics,
     request: &QuestionRequest<'_>,
 ) -> Result<GeneratedQuestion> {
-    let id = id(&candidate, frame, request.dataset);
+    let id = question_id(&candidate, frame, request.dataset);
     let mut evidence = candidate.evidence;
     let rules = json!({
         "version": request.rules.book().version,
@@ -330,18 +330,20 @@ fn question(
     })
 }
 
-/// The id of a question: the family and a digest of all that is asked. It does not change with the place in the file, the
-/// evidence, or a rulebook that asks the same question.
-fn id(candidate: &Candidate, frame: &FrameStatistics, dataset: &str) -> QuestionId {
-    let head = [
+/// Id of a question: the family and a digest of frame, text, choices and answer. It depends neither on the position in the file nor on the
+/// evidence or the rulebook.
+fn question_id(candidate: &Candidate, frame: &FrameStatistics, dataset: &str) -> QuestionId {
+    let parts = [
         dataset,
         &frame.scene,
         &frame.frame.0,
         candidate.family.name(),
         &candidate.text,
-    ];
-    let choices = candidate.choices.iter().map(String::as_str);
-    let parts = head.into_iter().chain(choices).chain([candidate.answer()]);
-    let digest = Digest::from_parts(parts.map(str::as_bytes)).to_string();
+    ]
+    .into_iter()
+    .chain(candidate.choices.iter().map(String::as_str))
+    .chain([candidate.answer()])
+    .map(str::as_bytes);
+    let digest = Digest::from_parts(parts).to_string();
     QuestionId(format!("{}-{}", candidate.family, &digest[..16]))
 }

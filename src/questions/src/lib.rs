@@ -1,9 +1,8 @@
 //! Stage 2a, WORDS: frames → questions, by rule (DarkQA, arXiv 2512.24985, Algorithm 1).
 //!
-//! First each frame is measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) see only these
-//! measurements. They find the type of room ([`room`]) and then the questions, one file per family. [`generate()`] is the
-//! entry point. There is no random state: a pick is a function of the frame's name ([`pick`]), so the order of the frames
-//! does not matter.
+//! Each frame is first measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) use only these measurements: they
+//! classify the room ([`room`]) and then generate the questions, one file per family. [`generate()`] is the entry point. Random picks are
+//! hashes of the frame's name ([`pick`]), so the order of the frames does not matter.
 
 #![allow(
     missing_docs,
@@ -12,6 +11,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod affordance;
+pub mod appearance;
 pub mod balance;
 mod closest;
 mod color;
@@ -20,7 +20,6 @@ mod color_tree;
 pub mod colors;
 pub mod frequency;
 pub mod generate;
-pub mod look;
 pub mod observer;
 pub mod pick;
 pub mod predicted;

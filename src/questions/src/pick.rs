@@ -5,10 +5,10 @@ use darkqa_ground::types::{Digest, FrameId};
 /// Prefix of every digest; changing it changes all questions.
 const DOMAIN: &[u8] = b"darkqa-eval questions 1";
 
-/// Picks for one frame.
+/// Pseudo-random picks for one frame.
 ///
-/// There is no state: a pick is the BLAKE3 digest of seed, data set, frame, family and purpose, scaled to the range. So the
-/// order of the frames does not matter.
+/// There is no state: a pick is the BLAKE3 digest of seed, data set, frame, family and purpose, scaled to the range. The order of the
+/// frames therefore does not matter.
 #[derive(Debug, Clone, Copy)]
 pub struct Picker<'a> {
     /// Seed of the rulebook.
@@ -19,7 +19,7 @@ pub struct Picker<'a> {
 }
 
 impl Picker<'_> {
-    /// The first 64 bits of the digest for a purpose.
+    /// Returns the first 64 bits of the digest for a purpose.
     #[must_use]
     pub fn bits(&self, family: &str, purpose: &str) -> u64 {
         let seed = self.seed.to_le_bytes();
@@ -31,21 +31,20 @@ impl Picker<'_> {
             family.as_bytes(),
             purpose.as_bytes(),
         ];
-        let digest = Digest::from_parts(parts);
-        digest
+        Digest::from_parts(parts)
             .as_bytes()
             .iter()
             .take(8)
             .fold(0, |bits, byte| (bits << 8) | u64::from(*byte))
     }
 
-    /// A number from 0 to `count` − 1; `count` must be above 0.
+    /// Picks a number from 0 to `count` − 1; `count` must be above 0.
     #[must_use]
     pub fn pick(&self, family: &str, purpose: &str, count: usize) -> usize {
         ((u128::from(self.bits(family, purpose)) * count as u128) >> 64) as usize
     }
 
-    /// Shuffles a list; all orders are equally likely (Fisher and Yates).
+    /// Shuffles a list; all orders are equally likely (Fisher–Yates).
     pub fn shuffle<T>(&self, family: &str, list: &mut [T]) {
         for last in (1..list.len()).rev() {
             let other = self.pick(family, &format!("shuffle {last}"), last + 1);

@@ -1,7 +1,7 @@
-//! Answers from maps that a network predicted for an image: [`PredictedMaps`], [`PredictedFrame`].
+//! Answers from the maps that a network predicts for an image: [`PredictedMaps`], [`PredictedFrame`].
 //!
-//! The predicted maps are measured like those of a frame, and each family of questions is answered from the measurements. The
-//! subject of a question comes from its text and its choices; nothing else is known of it.
+//! The predicted maps are measured like those of a frame, and each family of questions is answered from the measurements. Only the text and
+//! the choices of a question are used.
 
 use std::cmp::Reverse;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use darkqa_ground::types::{DepthKind, Digest, Frame, FrameId, Question, Rgb, Seg
 use ndarray::{Array2, ShapeError};
 
 use crate::colors::{Color, Palette};
-use crate::observer::wording::QuestionTopic;
+use crate::observer::question_topic::QuestionTopic;
 use crate::rule_context::YES_NO;
 use crate::rules::Rules;
 use crate::statistics::{FrameStatistics, Segment, measure};
@@ -20,24 +20,24 @@ use crate::statistics::{FrameStatistics, Segment, measure};
 /// Label space of predicted classes.
 const SPACE: &str = "mpcat40";
 
-/// Number of pixels from which on a class is present, in millionths of the image: half of those that a question about presence
-/// needs (chosen).
+/// Minimum area of a class that counts as present, in millionths of the image: half of the area that a question about presence needs
+/// (chosen).
 const PRESENT_PPM: u64 = 1_500;
 
 /// Maps that a network predicted for an image.
 #[derive(Debug)]
 pub struct PredictedMaps {
-    /// The image in the size of the maps.
+    /// Image in the size of the maps.
     pub image: Rgb,
-    /// The class of each pixel, row by row, as a number of mpcat40.
+    /// Class of each pixel, row by row, as a number of mpcat40.
     pub classes: Vec<u16>,
-    /// The distance of each pixel from the camera in millimetres, row by row.
+    /// Distance of each pixel from the camera in millimetres, row by row.
     pub distance_mm: Vec<u32>,
-    /// Type of the room, each with its share of certainty.
+    /// Room types, each with its probability.
     pub rooms: Vec<(&'static str, f32)>,
 }
 
-/// The measurements of predicted maps.
+/// Measurements of predicted maps.
 #[derive(Debug)]
 pub struct PredictedFrame {
     statistics: FrameStatistics,
@@ -48,7 +48,7 @@ impl PredictedFrame {
     /// Measures predicted maps by the rules.
     ///
     /// # Errors
-    /// If the maps have another size than the image.
+    /// If the maps and the image differ in size.
     pub fn new(maps: PredictedMaps, rules: &Rules, palette: &Palette) -> Result<Self> {
         let fault = |e: ShapeError| Error::data("predicted maps", e);
         let size = (maps.image.height(), maps.image.width());
@@ -74,35 +74,35 @@ impl PredictedFrame {
         })
     }
 
-    /// The answer to a question, as an index of its choices. `None` if the subject of the question is not found in the image, or
-    /// if the question is not one of the rulebook.
+    /// Answers a question with the index of a choice. `None` if the subject of the question is not found in the image, or if the question
+    /// is not one of the rulebook.
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules, palette: &Palette) -> Option<usize> {
         let book = rules.book();
         let choices = question.choices.texts();
-        let place = |answer: &str| choices.iter().position(|text| text == answer);
+        let index = |answer: &str| choices.iter().position(|text| text == answer);
         match QuestionTopic::from_question(question, book)? {
-            QuestionTopic::Room => place(self.room()?),
+            QuestionTopic::Room => index(self.room()?),
             QuestionTopic::Activity(activity) => {
                 let suitable = &book.activity.get(activity)?.rooms;
-                let certainty: f32 = self
+                let probability: f32 = self
                     .rooms
                     .iter()
                     .filter(|(room, _)| suitable.iter().any(|suitable| suitable == room))
                     .map(|(_, share)| share)
                     .sum();
-                place(yes_no(certainty >= 0.5))
+                index(yes_no(probability >= 0.5))
             }
             QuestionTopic::Presence(thing) => {
                 let pixels = self.statistics.class_pixels(&thing.class);
-                place(yes_no(self.statistics.ppm(pixels) >= PRESENT_PPM))
+                index(yes_no(self.statistics.ppm(pixels) >= PRESENT_PPM))
             }
-            QuestionTopic::Color(thing) => place(self.color(&thing.class, choices, palette)?),
+            QuestionTopic::Color(thing) => index(self.color(&thing.class, choices, palette)?),
             QuestionTopic::Closest => self.closest(choices, rules),
         }
     }
 
-    /// The likeliest type of the room.
+    /// Most probable room type.
     fn room(&self) -> Option<&'static str> {
         let (room, _) = self.rooms.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(room)
@@ -115,8 +115,8 @@ impl PredictedFrame {
             .filter(move |segment| segment.class == class)
     }
 
-    /// The colour of the largest segment of a class: the name of its median, or else the offered name that most of its pixels
-    /// have.
+    /// Colour of the largest segment of a class: the name of its median if that is offered, else the most common offered name of its
+    /// pixels.
     fn color(&self, class: &str, offered: &[String], palette: &Palette) -> Option<&'static str> {
         let is_offered = |name: &str| offered.iter().any(|text| text == name);
         let largest = self
@@ -136,8 +136,8 @@ impl PredictedFrame {
             })
     }
 
-    /// Index of the choice whose nearest segment has the smallest median distance, if at least two of the offered things are found:
-    /// nearness is a comparison.
+    /// Index of the choice whose nearest segment has the smallest median distance; `None` unless at least two of the offered things are
+    /// found.
     fn closest(&self, choices: &[String], rules: &Rules) -> Option<usize> {
         let distance = |word: &String| {
             let (class, _) = rules
@@ -145,8 +145,7 @@ impl PredictedFrame {
                 .class
                 .iter()
                 .find(|(_, rule)| rule.words.contains(word))?;
-            let segments = self.segments(class);
-            segments
+            self.segments(class)
                 .filter_map(|segment| Some(segment.depth?.median))
                 .min()
         };

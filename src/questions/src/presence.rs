@@ -10,8 +10,8 @@ use super::rules::{ClassFlag, PresenceRule};
 use super::statistics::{Segment, ppm};
 use darkqa_ground::types::Family;
 
-/// Candidates for every asked class: if it has a pixel in the frame, a yes for each word by which its segments are called, else
-/// a no for each word that the data set has for it.
+/// Returns the candidates for every asked class: if it has a pixel in the frame, a yes for each word of its segments, else a no for each
+/// word that the data set has for it.
 pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     let rule = &context.book.presence;
     let expected = context.room.and_then(|room| {
@@ -25,21 +25,21 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
         .iter()
         .filter(|(_, class)| class.flags.contains(&ClassFlag::Asked))
         .flat_map(|(class, _)| {
-            let present = context.statistics.class_pixels(class) > 0;
-            let result = if present {
-                yes(context, class)
+            let is_present = context.statistics.class_pixels(class) > 0;
+            let result = if is_present {
+                present(context, class)
             } else {
-                no(context, class, expected.as_ref())
+                absent(context, class, expected.as_ref())
             };
             result.unwrap_or_else(|reason| {
-                vec![rejected(Family::Presence, class, Some(present), reason)]
+                vec![rejected(Family::Presence, class, Some(is_present), reason)]
             })
         })
         .collect()
 }
 
-/// Yes: one segment that is called so is large enough, of one class and not cut by the border.
-fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason> {
+/// Candidates with the answer yes, one for each word: a segment with this word is large enough, of one class and not cut by the border.
+fn present(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason> {
     let rule = &context.book.presence;
     let mut segments: Vec<&Segment> = context
         .statistics
@@ -48,31 +48,35 @@ fn yes(context: &RuleContext<'_>, class: &str) -> Result<Vec<RuleResult>, Reason
         .filter(|segment| segment.class == class)
         .collect();
     segments.sort_by_key(|segment| (std::cmp::Reverse(segment.area), segment.id));
-    let mut shown: BTreeMap<&str, &Segment> = BTreeMap::new();
+    let mut largest: BTreeMap<&str, &Segment> = BTreeMap::new();
     let mut first_flaw = None;
     for segment in segments {
-        match (flaw(context, segment, rule), segment.called(context.book)) {
-            (None, Some(word)) => drop(shown.entry(word).or_insert(segment)),
+        match (
+            flaw(context, segment, rule),
+            segment.question_word(context.book),
+        ) {
+            (None, Some(word)) => drop(largest.entry(word).or_insert(segment)),
             (flaw, _) => {
                 first_flaw.get_or_insert(flaw.unwrap_or(Reason::Wordless));
             }
         }
     }
-    if shown.is_empty() {
-        // The reason is that of the largest segment. If none is listed, all are tiny.
+    if largest.is_empty() {
+        // The reason of the largest segment. Without a listed segment, all are tiny.
         return Err(first_flaw.unwrap_or(Reason::Small));
     }
-    let found = shown
+    Ok(largest
         .into_iter()
-        .map(|(word, segment)| candidate(context, class, word, 0, &[segment], json!({})));
-    Ok(found.collect())
+        .map(|(word, segment)| candidate(context, class, word, 0, &[segment], json!({})))
+        .collect())
 }
 
+/// Reason why a segment does not show that its class is present; `None` if it does.
 fn flaw(context: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Option<Reason> {
-    if let Some(reason) = context.statistics.disqualified(segment, context.book) {
+    if let Some(reason) = context.statistics.evidence_flaw(segment, context.book) {
         return Some(reason);
     }
-    let area = context.statistics.area(segment);
+    let area = context.statistics.area_ppm(segment);
     if area < rule.area_ppm {
         Some(Reason::Small)
     } else if ppm(segment.pure, segment.area) < rule.purity_ppm {
@@ -86,9 +90,9 @@ fn flaw(context: &RuleContext<'_>, segment: &Segment, rule: &PresenceRule) -> Op
     }
 }
 
-/// No: the class and the classes and words that may be mistaken for it have no pixel, nothing of it can be hidden in a coarse
-/// class, absence can be shown in this frame, and the class is common in such rooms.
-fn no(
+/// Candidates with the answer no: neither the class nor anything that may be mistaken for it has a pixel, no coarse class may hide it,
+/// absence can be shown in this frame, and the class is common in such rooms.
+fn absent(
     context: &RuleContext<'_>,
     class: &str,
     expected: Option<&BTreeSet<String>>,
@@ -108,7 +112,7 @@ fn no(
         .confusable
         .iter()
         .filter(|group| group.classes.contains(class));
-    let confused = groups.clone().any(|group| {
+    let is_confusable = groups.clone().any(|group| {
         group
             .classes
             .iter()
@@ -119,7 +123,7 @@ fn no(
                 .keys()
                 .any(|word| group.names.contains(word))
     });
-    if confused
+    if is_confusable
         || context
             .statistics
             .words
@@ -152,7 +156,7 @@ fn candidate(
     evidence: serde_json::Value,
 ) -> RuleResult {
     let rule = &context.book.presence;
-    let text = context.book.filled(&rule.text, &rule.plural, word);
+    let text = context.book.fill_template(&rule.text, &rule.plural, word);
     context.viable(
         Candidate {
             family: Family::Presence,

@@ -1,8 +1,8 @@
-//! The reasons why a candidate cannot be asked: [`Reason`].
+//! Reasons why a candidate cannot be asked: [`Reason`].
 
 use serde::{Deserialize, Serialize};
 
-/// Why a candidate cannot be asked.
+/// Reason why a candidate cannot be asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
@@ -10,25 +10,25 @@ pub enum Reason {
     NoRoom,
     /// Too little of the frame is labelled.
     Unlabelled,
-    /// Too few objects are visible: a bare wall does not show a type of room.
+    /// Too few objects are visible, such as only a bare wall.
     Bare,
     /// The answer needs another type of room.
     OtherRoom,
     /// The objects that make the answer true are not visible well enough.
     Unseen,
-    /// An object that the answer denies, or a substitute for it, is visible.
+    /// An object that the activity needs, or a substitute for it, is visible.
     Seen,
-    /// Too large a part of the frame has no label; any object may be there.
+    /// Too much of the frame has no label; any object may be there.
     Void,
     /// A large mirror shows objects that are elsewhere.
     Mirror,
-    /// The data set has no label or word for the thing; it may be part of another label.
+    /// The data set has no label or word for the object; it may be part of another label.
     Inexpressible,
-    /// A coarse class in which such a thing may be hidden is visible.
+    /// A coarse class that may contain the object is visible.
     Hidden,
-    /// The segment has no word of its own, or one that questions do not use.
+    /// The segment has no specific word, or one that questions do not use.
     Wordless,
-    /// An object that may be mistaken for it is visible.
+    /// An object that may be mistaken for the class is visible.
     Confusable,
     /// The class is rare in such rooms, so the answer could be guessed without the image.
     Implausible,
@@ -54,9 +54,9 @@ pub enum Reason {
     Motley,
     /// People do not agree on a name for the colour.
     Nameless,
-    /// Relative to the light of the frame, or around the thing, the colour has another name: a white thing in shade looks grey.
+    /// Relative to the light of the frame or around the object, the colour has another name: a white object in shade looks grey.
     Lit,
-    /// Another view of the thing shows another colour.
+    /// The object has another colour in another view.
     Disagreed,
     /// The colour is not one of the choices.
     NotOffered,
@@ -64,13 +64,13 @@ pub enum Reason {
     NoDepth,
     /// The median depth does not fit a room: the scale of the depth is wrong.
     Scale,
-    /// Fewer than two objects, or objects of one class only.
+    /// Fewer than two objects are visible, or objects of one class only.
     Few,
     /// The depths of the two nearest objects differ too little.
     Gap,
     /// The object with the smallest median depth does not have the smallest 10 % quantile.
     Disputed,
-    /// An object that is not offered may be nearer.
+    /// An object that is not among the choices may be nearer.
     Rival,
     /// A large object has no depth.
     Unmeasured,

@@ -1,4 +1,4 @@
-//! Colours relative to the light: [`relative`].
+//! Colours relative to the light: [`relative_code`].
 
 use std::sync::LazyLock;
 
@@ -16,9 +16,9 @@ static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
     std::array::from_fn(linear)
 });
 
-/// The code that a surface would have if light with code `light` were white: linear light, divided by that of `light` (von Kries
-/// 1902, for each channel), and the nearest code again. White where the surface is brighter than the light.
-pub(super) fn relative(code: u8, light: u8) -> u8 {
+/// Returns the code that a surface would have if light with code `light` were white: the nearest code of the linear light of `code` divided
+/// by that of `light` (von Kries 1902, for each channel). White if the surface is brighter than the light.
+pub(super) fn relative_code(code: u8, light: u8) -> u8 {
     let white = LINEAR[usize::from(light)].max(1);
     let share = (LINEAR[usize::from(code)] * 65_535 / white).min(65_535);
     let above = LINEAR.partition_point(|value| *value < share).min(255);
@@ -32,17 +32,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn relative_to_white_nothing_changes() {
+    fn code_relative_to_white_is_unchanged() {
         for code in 0..=255 {
-            assert_eq!(relative(code, 255), code);
-            assert_eq!(relative(code, code.max(1)), if code == 0 { 0 } else { 255 });
+            assert_eq!(relative_code(code, 255), code);
+            assert_eq!(
+                relative_code(code, code.max(1)),
+                if code == 0 { 0 } else { 255 }
+            );
         }
     }
 
     #[test]
-    fn half_the_light_is_made_up_for() {
+    fn half_the_light_doubles_the_linear_code() {
         // Code 188 is half of the linear light of white (0.5029); code 137 (0.2502) is 0.4975 of that, and 187 is 0.4969 of white.
-        assert_eq!((relative(188, 188), relative(137, 188)), (255, 187));
-        assert_eq!(relative(200, 188), 255);
+        assert_eq!(
+            (relative_code(188, 188), relative_code(137, 188)),
+            (255, 187)
+        );
+        assert_eq!(relative_code(200, 188), 255);
     }
 }

@@ -1,4 +1,4 @@
-//! ClassifyRoom of the paper's Algorithm 1: the type of room that a frame shows, [`classify`].
+//! Room type of a frame, `ClassifyRoom` of the paper's Algorithm 1: [`classify`].
 
 use std::collections::BTreeMap;
 
@@ -7,30 +7,30 @@ use serde::{Deserialize, Serialize};
 use super::rules::{Clue, Contest, RuleBook, Sign};
 use super::statistics::{FrameStatistics, Segment};
 
-/// The evidence in a frame for each type of room, and the resulting type.
+/// Evidence in a frame for each room type, and the resulting room type.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RoomSigns {
     /// Score of each room type: the sum of the weights of its clues. Room types without a clue are left out.
     pub scores: BTreeMap<String, u32>,
     /// Numbers of the segments that are evidence for each room type.
     pub segments: BTreeMap<String, Vec<u32>>,
-    /// The room type, or why there is none.
+    /// Room type, or the reason why the frame has none.
     pub room: Result<String, NoRoom>,
-    /// The winner, also if questions do not ask about this room type.
+    /// Winning room type, even if questions do not ask about it.
     pub winner: Option<String>,
 }
 
-/// Why a frame has no room type.
+/// Reason why a frame has no room type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum NoRoom {
-    /// No clue of the rulebook holds.
+    /// No clue of the rulebook matches.
     NoSigns,
     /// The highest score is too low.
     Weak,
     /// Two or more room types have similar scores, and none wins.
     Contested,
-    /// Questions do not ask about the winning room type.
+    /// Questions do not ask about the winning type.
     NotAsked,
 }
 
@@ -46,24 +46,24 @@ pub enum RoomSource {
 
 /// Classifies the room of a frame by the objects visible in it.
 ///
-/// Each clue of the rulebook counts once. The room type with the highest score wins if the score is high enough and no other
-/// type is a rival. Against a single rival, one of the two wins by a contest of the rulebook. One also wins if the other is
-/// small and far behind, because that is a room seen through a door.
+/// Each clue of the rulebook counts once. The room type with the highest score wins if the score is high enough and it has no rival. If it
+/// has a single rival, a contest of the rulebook decides between the two. Without a decision, one wins if the segments of the other are
+/// small and far behind, because that room is seen through a door.
 #[must_use]
 pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
-    let signs = Signs::new(statistics, book);
+    let evidence = Evidence::new(statistics, book);
     let mut scores = BTreeMap::new();
     let mut segments: BTreeMap<String, Vec<u32>> = BTreeMap::new();
     for clue in &book.clue {
-        if let Some(seen) = signs.holds(clue) {
+        if let Some(matched) = evidence.matching_segments(clue) {
             *scores.entry(clue.room.clone()).or_insert(0) += clue.weight;
             let list = segments.entry(clue.room.clone()).or_default();
-            list.extend(seen.iter().map(|segment| segment.id));
+            list.extend(matched.iter().map(|segment| segment.id));
             list.sort_unstable();
             list.dedup();
         }
     }
-    let winner = winner(&signs, &scores, &segments);
+    let winner = find_winner(&evidence, &scores, &segments);
     let room = winner.clone().and_then(|room| {
         if book.room.order.contains(&room) {
             Ok(room)
@@ -79,14 +79,14 @@ pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
     }
 }
 
-/// The segments that are evidence, by token.
-struct Signs<'a> {
+/// Segments that are evidence, by token.
+struct Evidence<'a> {
     statistics: &'a FrameStatistics,
     book: &'a RuleBook,
     tokens: BTreeMap<&'a str, Vec<&'a Segment>>,
 }
 
-impl<'a> Signs<'a> {
+impl<'a> Evidence<'a> {
     fn new(statistics: &'a FrameStatistics, book: &'a RuleBook) -> Self {
         let mut tokens: BTreeMap<&str, Vec<&Segment>> = BTreeMap::new();
         for segment in statistics.evidence(book) {
@@ -99,33 +99,36 @@ impl<'a> Signs<'a> {
         }
     }
 
-    /// The segments that make a clue hold; `None` if it does not hold.
-    fn holds(&self, clue: &Clue) -> Option<Vec<&'a Segment>> {
+    /// Segments that match a clue; `None` if it does not match.
+    fn matching_segments(&self, clue: &Clue) -> Option<Vec<&'a Segment>> {
         if clue
             .unseen
             .iter()
-            .any(|token| self.statistics.shows(token, self.book))
+            .any(|token| self.statistics.has_token(token, self.book))
         {
             return None;
         }
-        let mut seen = Vec::new();
+        let mut matched = Vec::new();
         for sign in &clue.seen {
-            seen.extend(self.seen(sign)?);
+            matched.extend(self.segments_of_sign(sign)?);
         }
-        Some(seen)
+        Some(matched)
     }
 
-    fn seen(&self, sign: &Sign) -> Option<Vec<&'a Segment>> {
+    /// Segments that match a sign of a clue; `None` if their number is out of its range.
+    fn segments_of_sign(&self, sign: &Sign) -> Option<Vec<&'a Segment>> {
         let segments = self.tokens.get(sign.token.as_str())?;
         let large: Vec<&Segment> = segments
             .iter()
-            .filter(|segment| self.statistics.area(segment) >= sign.area_ppm)
+            .filter(|segment| self.statistics.area_ppm(segment) >= sign.area_ppm)
             .copied()
             .collect();
-        let enough = large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
-        enough.then_some(large)
+        let in_range =
+            large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
+        in_range.then_some(large)
     }
 
+    /// Total area of the segments of a token, in pixels.
     fn area(&self, token: &str) -> u64 {
         self.tokens
             .get(token)
@@ -135,21 +138,22 @@ impl<'a> Signs<'a> {
             .sum()
     }
 
+    /// True if the winner of a contest, with this score, meets its conditions.
     fn wins(&self, contest: &Contest, score: u32) -> bool {
-        let larger = contest
+        let is_larger = contest
             .tokens
             .as_ref()
             .is_none_or(|[own, other]| self.area(own) >= contest.area_ratio * self.area(other));
         score >= contest.least_score
-            && larger
+            && is_larger
             && !contest
                 .unseen
                 .iter()
-                .any(|token| self.statistics.shows(token, self.book))
+                .any(|token| self.statistics.has_token(token, self.book))
     }
 
-    /// Whether the second room is seen through a door: its segments are small and all far behind the first's.
-    fn behind(&self, first: &[u32], second: &[u32]) -> bool {
+    /// True if the second room is seen through a door: its segments are small and all far behind the first's.
+    fn is_behind(&self, first: &[u32], second: &[u32]) -> bool {
         let rule = &self.book.doorway;
         let listed = |ids: &[u32]| -> Vec<&Segment> {
             self.statistics
@@ -162,7 +166,7 @@ impl<'a> Signs<'a> {
         let area = |list: &[&Segment]| -> u64 { list.iter().map(|segment| segment.area).sum() };
         let medians = |list: &[&Segment]| -> Option<Vec<u64>> {
             list.iter()
-                .map(|segment| Some(segment.measured(self.book)?.median.into()))
+                .map(|segment| Some(segment.reliable_depth(self.book)?.median.into()))
                 .collect()
         };
         let (Some(near), Some(far)) = (medians(&first), medians(&second)) else {
@@ -176,12 +180,13 @@ impl<'a> Signs<'a> {
     }
 }
 
-fn winner(
-    signs: &Signs<'_>,
+/// Determines the winning room type from the scores and the segments of all room types.
+fn find_winner(
+    evidence: &Evidence<'_>,
     scores: &BTreeMap<String, u32>,
     segments: &BTreeMap<String, Vec<u32>>,
 ) -> Result<String, NoRoom> {
-    let rule = &signs.book.room;
+    let rule = &evidence.book.room;
     let position = |room: &str| {
         rule.order
             .iter()
@@ -210,19 +215,19 @@ fn winner(
             Err(NoRoom::Contested)
         };
     };
-    for contest in &signs.book.contest {
+    for contest in &evidence.book.contest {
         let pair = [(first, second, score), (second, first, other)];
         for (winner, loser, score) in pair {
             let applies = contest.winner == *winner && contest.loser == *loser;
-            if applies && score >= rule.least_score && signs.wins(contest, score) {
+            if applies && score >= rule.least_score && evidence.wins(contest, score) {
                 return Ok(winner.clone());
             }
         }
     }
     let own = |room: &str| segments.get(room).map_or(&[][..], Vec::as_slice);
-    if signs.behind(own(first), own(second)) {
+    if evidence.is_behind(own(first), own(second)) {
         Ok(first.clone())
-    } else if score == other && signs.behind(own(second), own(first)) {
+    } else if score == other && evidence.is_behind(own(second), own(first)) {
         Ok(second.clone())
     } else {
         Err(NoRoom::Contested)

@@ -8,7 +8,7 @@ use super::rules::ClassFlag;
 use super::statistics::Segment;
 use darkqa_ground::types::Family;
 
-/// The single candidate of a frame.
+/// Returns the single candidate of a frame.
 pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     let (book, statistics) = (context.book, context.statistics);
     let rule = &book.room_type;
@@ -21,12 +21,12 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     }
     let asked: Vec<&Segment> = statistics
         .evidence(book)
-        .filter(|segment| book.is(&segment.class, ClassFlag::Asked))
+        .filter(|segment| book.has_flag(&segment.class, ClassFlag::Asked))
         .collect();
-    let large = asked
+    let has_large = asked
         .iter()
-        .any(|segment| statistics.area(segment) >= rule.large_ppm);
-    if asked.len() < rule.least_asked && !large {
+        .any(|segment| statistics.area_ppm(segment) >= rule.large_ppm);
+    if asked.len() < rule.least_asked && !has_large {
         return reject(Reason::Bare);
     }
     let rooms = &book.room.order;
@@ -43,6 +43,6 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
             truth,
             evidence,
         },
-        &context.signs_of(room),
+        &context.room_evidence(room),
     )]
 }

@@ -1,4 +1,4 @@
-//! The input of the rules for one frame, [`RuleContext`], and their output, [`RuleResult`].
+//! Input of the rules for one frame, [`RuleContext`], and their output, [`RuleResult`].
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -13,28 +13,28 @@ use super::views::Views;
 use super::vocabulary::Vocabulary;
 use darkqa_ground::types::{Family, Labels, Question};
 
-/// All that the rules see of a frame.
+/// Input of the rules for one frame.
 #[derive(Debug, Clone, Copy)]
 pub struct RuleContext<'a> {
     pub book: &'a RuleBook,
     pub labels: &'a Labels,
     pub statistics: &'a FrameStatistics,
     pub signs: &'a RoomSigns,
-    /// Room type of the frame, from `signs` or from the data set; `None` if it is unknown, or if questions do not ask about it.
+    /// Room type of the frame, from `signs` or from the data set; `None` if it is unknown or if questions do not ask about it.
     pub room: Option<&'a str>,
-    /// The same, also of a type that questions do not ask about, such as a laundry room.
+    /// Room type of the frame, even if questions do not ask about it, such as a laundry room.
     pub any_room: Option<&'a str>,
     /// Classes that are common in each type of room.
     pub frequency: &'a Frequency,
-    /// The words that the data set can name.
+    /// Words that the data set uses for objects.
     pub vocabulary: &'a Vocabulary,
-    /// The colours of things in all views of their scenes.
+    /// Colours of objects in all views of their scenes.
     pub views: &'a Views,
-    /// Picks among candidates that are equally good.
+    /// Picks among equally good candidates.
     pub picker: Picker<'a>,
 }
 
-/// A question that may be asked of a frame, with its one true answer.
+/// A question that may be asked of a frame, with its true answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Candidate {
     pub family: Family,
@@ -45,7 +45,7 @@ pub struct Candidate {
     pub choices: Vec<String>,
     /// Index of the true choice.
     pub truth: usize,
-    /// JSON object of the measurements that make the answer true.
+    /// Measurements that make the answer true, as a JSON object.
     pub evidence: Value,
 }
 
@@ -78,18 +78,18 @@ impl GeneratedQuestion {
             .map_or("", |truth| &self.question.choices.texts()[truth])
     }
 
-    /// The scene, the text and the answer; two questions that share all three repeat each other.
+    /// Scene, text and answer; two questions that share all three repeat each other.
     pub(super) fn repeat_key(&self) -> [String; 3] {
         [&*self.scene, &*self.question.text, self.answer()].map(str::to_owned)
     }
 }
 
-/// The result of a rule for one candidate.
+/// Result of a rule for one candidate.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RuleResult {
     /// The question can be asked.
     Viable(Candidate),
-    /// The question cannot be asked, for the reason given.
+    /// The question cannot be asked.
     Rejected(Rejection),
 }
 
@@ -99,7 +99,7 @@ pub struct Rejection {
     pub family: Family,
     /// Subject of the question: a class or an activity; may be empty.
     pub about: String,
-    /// The answer it would have had, "yes" or "no"; `None` for other families.
+    /// Answer of the rejected question, "yes" or "no"; `None` for other families.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub answer: Option<String>,
     /// Why the question cannot be asked.
@@ -107,22 +107,25 @@ pub struct Rejection {
 }
 
 impl RuleContext<'_> {
-    /// A viable candidate, with these segments added to its evidence.
+    /// Returns a viable candidate, with these segments added to its evidence.
     pub(super) fn viable(&self, mut candidate: Candidate, segments: &[&Segment]) -> RuleResult {
-        let list: Vec<Value> = segments.iter().map(|segment| self.json(segment)).collect();
+        let list: Vec<Value> = segments
+            .iter()
+            .map(|segment| self.segment_json(segment))
+            .collect();
         if let Some(evidence) = candidate.evidence.as_object_mut() {
             evidence.insert("segments".to_owned(), json!(list));
         }
         RuleResult::Viable(candidate)
     }
 
-    /// The facts that a person needs to check a segment, as JSON.
-    fn json(&self, segment: &Segment) -> Value {
+    /// JSON object of the facts that a person needs to check a segment.
+    fn segment_json(&self, segment: &Segment) -> Value {
         let mut json = json!({
             "id": segment.id,
             "class": segment.class,
             "word": segment.word,
-            "area_ppm": self.statistics.area(segment),
+            "area_ppm": self.statistics.area_ppm(segment),
             "bbox": segment.bbox,
         });
         if let (Some(depth), Some(json)) = (segment.depth, json.as_object_mut()) {
@@ -134,8 +137,8 @@ impl RuleContext<'_> {
         json
     }
 
-    /// The segments that are evidence for a room type.
-    pub(super) fn signs_of(&self, room: &str) -> Vec<&Segment> {
+    /// Segments that are evidence for a room type.
+    pub(super) fn room_evidence(&self, room: &str) -> Vec<&Segment> {
         let signs = self.signs.segments.get(room);
         self.statistics
             .segments
@@ -144,7 +147,7 @@ impl RuleContext<'_> {
             .collect()
     }
 
-    /// Why nothing in this frame can be called absent; `None` if absence can be shown.
+    /// Reason why nothing in this frame can be called absent; `None` if absence can be shown.
     pub(super) fn absence_blocker(&self) -> Option<Reason> {
         let rule = &self.book.closed_world;
         if self.statistics.ppm(self.statistics.effective_void) > rule.void_ppm {
@@ -156,7 +159,7 @@ impl RuleContext<'_> {
         }
     }
 
-    /// Whether a thing of a class may be hidden among the unnamed pixels of a coarse class. False for a token that is a word.
+    /// True if an object of a class may be hidden among the unnamed pixels of a coarse class. False for a token that is a word.
     pub(super) fn may_be_hidden(&self, class: &str) -> bool {
         self.book
             .class
@@ -167,14 +170,14 @@ impl RuleContext<'_> {
             .any(|other| self.statistics.unnamed.contains_key(other))
     }
 
-    /// Whether the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word
-    /// always passes, because its class is unknown.
-    pub(super) fn expressible(&self, token: &str) -> bool {
+    /// True if the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word always
+    /// passes, because its class is unknown.
+    pub(super) fn is_expressible(&self, token: &str) -> bool {
         !self.book.class.contains_key(token) || self.labels.expressible.contains(token)
     }
 }
 
-/// The result for a candidate that cannot be asked; `answer` is true for "yes".
+/// Returns the result for a candidate that cannot be asked; `answer` is true for "yes".
 pub(super) fn rejected(
     family: Family,
     about: &str,

@@ -1,10 +1,10 @@
-//! Statistics of a set of questions: those of the paper's figure and more, [`QuestionSummary`].
+//! Statistics of a set of questions, including those of the paper's figure: [`QuestionSummary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use super::generate::{FamilyCounts, Generated, OmissionReason, QuestionRequest, stated};
+use super::generate::{FamilyCounts, Generated, OmissionReason, QuestionRequest, stated_room};
 use super::reason::Reason;
 use super::rule_context::GeneratedQuestion;
 use super::rules::RuleBook;
@@ -14,7 +14,7 @@ use darkqa_ground::types::{Digest, Family};
 /// The schema of the summary as JSON.
 const SCHEMA: &str = "darkqa.questions/1";
 
-/// Statistics of a set of questions. Shares are given as pairs of counts.
+/// Statistics of a set of questions. A share is given as a pair of counts.
 #[derive(Debug, Serialize)]
 pub struct QuestionSummary {
     schema: &'static str,
@@ -24,7 +24,7 @@ pub struct QuestionSummary {
     /// Digest of the colour table.
     pub colors: Digest,
     pub rules_version: String,
-    /// How far the answers were balanced: none, binary or full.
+    /// Balancing of the answers: none, binary or full.
     pub balance: String,
     pub scenes: usize,
     /// Number of frames that were measured.
@@ -50,11 +50,11 @@ pub struct QuestionSummary {
     pub classes: BTreeMap<String, ClassCoverage>,
     /// Frames and questions of each room type.
     pub rooms: BTreeMap<String, RoomCoverage>,
-    /// Number of frames whose room type is both stated and classified, and number of those where both agree.
+    /// Number of frames whose room type is both stated and classified, and number of these frames where both agree.
     pub room_agreement: [usize; 2],
     /// Number of questions by the gap between the two nearest objects, in mm, rounded down to a multiple of 250.
     pub gaps: BTreeMap<u64, usize>,
-    /// Number of questions that repeat another one of their scene: same text, same answer.
+    /// Number of questions that repeat another one of their scene, with the same text and answer.
     pub repeats: usize,
     /// Number of pixels of each map number that the label space does not have.
     pub unknown: BTreeMap<u16, u64>,
@@ -68,14 +68,15 @@ pub struct CandidateCounts {
     /// Number of candidates that the rules accept.
     pub viable: u64,
     pub asked: u64,
-    /// Number of viable candidates of frames that are asked another question of the family.
+    /// Number of viable candidates that lost to another question of their family and frame.
     pub not_chosen: u64,
     /// Number of questions that a person has rejected.
     pub rejected: u64,
     /// Number of questions dropped because their answer would be too frequent.
     pub unbalanced: u64,
     /// Number of candidates that the rules reject, by reason.
-    pub fallen: BTreeMap<Reason, u64>,
+    #[serde(rename = "fallen")]
+    pub rejections: BTreeMap<Reason, u64>,
 }
 
 /// Amounts of one class in a set of frames and questions.
@@ -106,15 +107,15 @@ pub struct Baselines {
     pub questions: usize,
     /// Expected number of right answers of a uniform guess.
     pub chance: f64,
-    /// Number of right answers if the most common answer of the family is always given.
+    /// Number of right answers if every reply is the most common answer of the family.
     pub majority: usize,
-    /// Number of right answers with the most common answer to the same text in other scenes; else of the family there; else
-    /// of a guess. A model can know this from such questions, without the image.
+    /// Expected number of right answers if every reply is the most common answer to the same text in other scenes, else the most common
+    /// one of the family in other scenes, else a guess. A model can know these answers without the image.
     pub prior: f64,
 }
 
 impl QuestionSummary {
-    /// The statistics of generated questions; `failed` is the number of frames that could not be measured.
+    /// Computes the statistics of generated questions; `failed` is the number of frames that could not be measured.
     #[must_use]
     pub fn new(
         frames: &[FrameStatistics],
@@ -168,8 +169,10 @@ impl QuestionSummary {
         for asked in asked {
             summary.add(asked);
         }
-        let by_content = count(asked, GeneratedQuestion::repeat_key);
-        summary.repeats = by_content.values().map(|count| count - 1).sum();
+        summary.repeats = count(asked, GeneratedQuestion::repeat_key)
+            .values()
+            .map(|count| count - 1)
+            .sum();
         summary
     }
 
@@ -209,11 +212,12 @@ impl CandidateCounts {
             not_chosen: omitted(OmissionReason::NotChosen),
             rejected: omitted(OmissionReason::Rejected),
             unbalanced: omitted(OmissionReason::Unbalanced),
-            fallen: counts.rejections.clone(),
+            rejections: counts.rejections.clone(),
         }
     }
 }
 
+/// Counts questions by a key.
 fn count<'a, K: Ord>(
     asked: impl IntoIterator<Item = &'a GeneratedQuestion>,
     key: impl Fn(&'a GeneratedQuestion) -> K,
@@ -225,14 +229,15 @@ fn count<'a, K: Ord>(
     counts
 }
 
-/// Expected number of right answers of uniform guesses, from the numbers of questions by number of choices.
-fn chance(sizes: &BTreeMap<usize, usize>) -> f64 {
+/// Expected number of right answers of uniform guesses, given the number of questions by the number of choices.
+fn expected_by_chance(sizes: &BTreeMap<usize, usize>) -> f64 {
     sizes
         .iter()
         .map(|(size, count)| *count as f64 / *size as f64)
         .sum()
 }
 
+/// Amounts of each class in frames and questions.
 fn coverage(
     frames: &[FrameStatistics],
     asked: &[GeneratedQuestion],
@@ -249,18 +254,17 @@ fn coverage(
         }
     }
     for asked in asked {
-        let of_class = matches!(
+        if matches!(
             asked.question.family,
             Family::Presence | Family::Color | Family::Closest
-        );
-        if of_class {
+        ) {
             classes.entry(asked.about.clone()).or_default().questions += 1;
         }
     }
     classes
 }
 
-/// Number of frames whose room type is both stated and classified, and number of those where both agree.
+/// Number of frames whose room type is both stated and classified, and number of these frames where both agree.
 fn room_agreement(
     frames: &[FrameStatistics],
     generated: &Generated,
@@ -275,7 +279,7 @@ fn room_agreement(
     for frame in frames {
         let signs = signs.get(&frame.frame);
         let classified = signs.and_then(|signs| signs.room.as_ref().ok());
-        if let (Some(classified), Some(stated)) = (classified, stated(frame, book)) {
+        if let (Some(classified), Some(stated)) = (classified, stated_room(frame, book)) {
             agreement[0] += 1;
             agreement[1] += usize::from(*classified == stated);
         }
@@ -283,6 +287,7 @@ fn room_agreement(
     agreement
 }
 
+/// Number of frames of each classified room type.
 fn rooms(generated: &Generated) -> BTreeMap<String, RoomCoverage> {
     let mut rooms: BTreeMap<String, RoomCoverage> = BTreeMap::new();
     for room in generated
@@ -295,6 +300,7 @@ fn rooms(generated: &Generated) -> BTreeMap<String, RoomCoverage> {
     rooms
 }
 
+/// Baselines of each family and of all questions.
 fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
     let mut families: BTreeMap<&Family, Vec<&GeneratedQuestion>> = BTreeMap::new();
     for asked in asked {
@@ -310,7 +316,7 @@ fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
         let sizes = count(list.iter().copied(), |asked| asked.question.choices.len());
         let baselines = Baselines {
             questions: list.len(),
-            chance: chance(&sizes),
+            chance: expected_by_chance(&sizes),
             majority: answers.values().copied().max().unwrap_or(0),
             prior: prior(&list),
         };
@@ -324,7 +330,7 @@ fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
     all
 }
 
-/// The value of [`Baselines::prior`] for the questions of one family.
+/// Computes [`Baselines::prior`] for the questions of one family.
 fn prior(list: &[&GeneratedQuestion]) -> f64 {
     // Counts by text, answer and scene. The empty text stands for all questions of the family.
     let mut counts: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, usize>>> = BTreeMap::new();
@@ -344,8 +350,12 @@ fn prior(list: &[&GeneratedQuestion]) -> f64 {
             .into_iter()
             .flatten()
             .map(|(answer, scenes)| {
-                let others = scenes.iter().filter(|(scene, _)| **scene != except);
-                (*answer, others.map(|(_, count)| count).sum::<usize>())
+                let count: usize = scenes
+                    .iter()
+                    .filter(|(scene, _)| **scene != except)
+                    .map(|(_, count)| count)
+                    .sum();
+                (*answer, count)
             })
             .filter(|(_, count)| *count > 0)
             .min_by_key(|&(answer, count)| (std::cmp::Reverse(count), answer))
@@ -360,5 +370,5 @@ fn prior(list: &[&GeneratedQuestion]) -> f64 {
             None => *guesses.entry(asked.question.choices.len()).or_insert(0) += 1,
         }
     }
-    right as f64 + chance(&guesses)
+    right as f64 + expected_by_chance(&guesses)
 }

@@ -1,4 +1,4 @@
-//! The colours of things in all views of a scene: [`Views`].
+//! Colours of objects in all views of a scene: [`Views`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,15 +6,15 @@ use super::colors::{Color, Palette};
 use super::rules::RuleBook;
 use super::statistics::{FrameStatistics, Segment, WordSource};
 
-/// The colours of each thing, by scene, number and word, over all frames that show it well enough.
+/// Colours of each object, by scene, number and word, over all frames that show it well enough.
 ///
-/// Only segments with names are the same thing in several frames: the names of a scene are those of its numbers. Numbers of
-/// connected components mean another thing in each frame.
+/// Only segments with names can be matched across frames, because the names of a scene belong to its numbers. A connected component has
+/// another number in each frame.
 #[derive(Debug, Default)]
 pub struct Views(BTreeMap<(String, u32, String), BTreeSet<Option<Color>>>);
 
 impl Views {
-    /// The colours in these frames; the colour of a view is that of its median.
+    /// Collects the colours in these frames; the colour of a view is that of its median.
     pub fn new(frames: &[FrameStatistics], palette: &Palette, book: &RuleBook) -> Self {
         let mut views = Self::default();
         for frame in frames {
@@ -35,8 +35,13 @@ impl Views {
         (frame.scene.clone(), segment.id, segment.word.clone())
     }
 
-    /// Whether some view of the thing shows another colour than this one.
-    pub fn disagree(&self, frame: &FrameStatistics, segment: &Segment, color: Color) -> bool {
+    /// True if the object has another colour than this one in some view.
+    pub fn has_other_color(
+        &self,
+        frame: &FrameStatistics,
+        segment: &Segment,
+        color: Color,
+    ) -> bool {
         let colors = self.0.get(&Self::key(frame, segment));
         segment.source == WordSource::Name
             && colors.is_some_and(|colors| colors.iter().any(|other| *other != Some(color)))

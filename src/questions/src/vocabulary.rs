@@ -1,4 +1,4 @@
-//! [`Vocabulary`]: the words for objects that a data set uses.
+//! Words that a data set uses for objects: [`Vocabulary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,9 +8,8 @@ use darkqa_ground::types::Labels;
 
 /// Words that a data set uses for objects: the names of its segments if they have any, otherwise its labels.
 ///
-/// A question whose answer is "no" uses only these words, and an activity is asked about only if these words could enable it.
-/// Otherwise "no" would be the answer to every question with a word that no annotator of the data set used, whatever the image
-/// shows.
+/// A question whose answer is "no" uses only these words, and an activity is asked about only if these words could enable it. Otherwise,
+/// "no" would always be the answer to questions with a word that no annotator of the data set used.
 #[derive(Debug, Default)]
 pub struct Vocabulary {
     /// Words used in questions, by class.
@@ -27,11 +26,11 @@ impl Vocabulary {
         for segment in segments().filter(|segment| segment.source != WordSource::Coarse) {
             vocabulary.add(&segment.class, &segment.word, book);
         }
-        // If segments have names, the labels are coarse classes, by which no segment is called.
+        // If segments have names, the labels are coarse classes and do not name objects.
         if !segments().any(|segment| segment.source == WordSource::Name) {
             for label in labels.labels.values() {
                 let (word, _) = plain_word(&label.name);
-                if book.coarse.says(&labels.space, &word) {
+                if book.coarse.identifies_object(&labels.space, &word) {
                     vocabulary.add(&label.canonical, &word, book);
                 }
             }
@@ -41,7 +40,7 @@ impl Vocabulary {
 
     fn add(&mut self, class: &str, word: &str, book: &RuleBook) {
         self.tokens.insert(book.token(word, class).to_owned());
-        if let Some(question_word) = book.called(class, word) {
+        if let Some(question_word) = book.question_word(class, word) {
             let words = self.words.entry(class.to_owned()).or_default();
             words.insert(question_word.to_owned());
         }
@@ -56,7 +55,7 @@ impl Vocabulary {
             .map(String::as_str)
     }
 
-    /// True if the data set has a word for objects with this token; a class is a token, too.
+    /// True if the data set has a word for objects with this token. A class is also a token.
     pub fn has_token(&self, token: &str) -> bool {
         self.tokens.contains(token) || self.words.contains_key(token)
     }

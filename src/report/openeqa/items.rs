@@ -97,7 +97,7 @@ fn shown<'a>(
 ) -> ModelInCondition<'a> {
     let clean = own.level.and_then(|_| {
         let clean =
-            subject::ModelInCondition::seeing(&own.model, AxisLevel::L0, &own.variant, None);
+            subject::ModelInCondition::with_images(&own.model, AxisLevel::L0, &own.variant, None);
         all.iter()
             .position(|other| other.matches_up_to_group(&clean))
     });

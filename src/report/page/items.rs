@@ -146,13 +146,13 @@ fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<ModelInCondition<'a>> {
 /// Index of the subject of the clean frames of a subject with images.
 fn clean(grid: &Grid<'_>, of: &darkqa_score::subject::ModelInCondition) -> Option<usize> {
     of.level?;
-    let clean = darkqa_score::subject::ModelInCondition::seeing(
+    let clean = darkqa_score::subject::ModelInCondition::with_images(
         &of.model,
         AxisLevel::L0,
         &of.variant,
         None,
     );
-    grid.stand_in(&clean)
+    grid.find_up_to_group(&clean)
 }
 
 /// Why a reply was not read, or why none came.

@@ -26,7 +26,7 @@ enum Fate {
 /// choice depends on the names of the questions alone.
 pub(super) fn sample<'a>(grid: &Grid<'a>) -> Option<Grid<'a>> {
     let most = MOST_REPLIES / grid.subjects.len().max(1);
-    (grid.items.len() > most).then(|| grid.restricted(&chosen(grid, most)))
+    (grid.items.len() > most).then(|| grid.select_items(&chosen(grid, most)))
 }
 
 /// The remark that the page shows a sample of its items; `None` if it shows all.
@@ -83,7 +83,7 @@ fn fates(grid: &Grid<'_>) -> Vec<Fate> {
         let fate = if base.enhancer.take().is_some() {
             [Fate::Harmed, Fate::Rescued]
         } else {
-            base = darkqa_score::subject::ModelInCondition::seeing(
+            base = darkqa_score::subject::ModelInCondition::with_images(
                 &of.model,
                 AxisLevel::L0,
                 &of.variant,
@@ -91,7 +91,7 @@ fn fates(grid: &Grid<'_>) -> Vec<Fate> {
             );
             [Fate::Lost, Fate::Stable]
         };
-        let Some(base) = grid.stand_in(&base) else {
+        let Some(base) = grid.find_up_to_group(&base) else {
             continue;
         };
         for (item, known) in fates.iter_mut().enumerate() {

@@ -237,8 +237,12 @@ struct Seen<'a> {
 impl Seen<'_> {
     /// The result, with an enhancer of the row or without; `None` if the grid has no such subject.
     fn result(self, enhancer: Option<&EnhancerName>) -> Option<TrialResult> {
-        let subject = ModelInCondition::seeing(self.model, self.level, &self.row.variant, enhancer);
-        Some(self.grid.result(self.grid.stand_in(&subject)?, self.item))
+        let subject =
+            ModelInCondition::with_images(self.model, self.level, &self.row.variant, enhancer);
+        Some(
+            self.grid
+                .result(self.grid.find_up_to_group(&subject)?, self.item),
+        )
     }
 
     /// Whether the strict parsing of the reply is right, that at L0 without an enhancer; `None` without a reply or a true choice.

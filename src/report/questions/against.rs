@@ -5,8 +5,8 @@ use serde::Serialize;
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::TableBuilder;
 use crate::text::terminal;
+use darkqa_questions::appearance::{FrameAppearance, MIN_EDGE_GRADIENT};
 use darkqa_questions::colors::{Color, NONE};
-use darkqa_questions::look::{FrameLook, STEEP};
 
 /// Two sets of frames, compared by how they look.
 #[derive(Debug, Serialize)]
@@ -29,10 +29,10 @@ struct LookRow {
 
 impl LookRow {
     fn new(
-        sets: [&[FrameLook]; 2],
+        sets: [&[FrameAppearance]; 2],
         measure: &str,
         decimals: usize,
-        of: impl Fn(&FrameLook) -> Option<f64>,
+        of: impl Fn(&FrameAppearance) -> Option<f64>,
     ) -> Self {
         Self {
             measure: measure.to_owned(),
@@ -72,7 +72,7 @@ fn quartiles(mut numbers: Vec<f64>) -> Option<[f64; 3]> {
 impl LookComparison {
     /// The comparison of two sets, each with its name.
     #[must_use]
-    pub(crate) fn new(sets: [(&str, &[FrameLook]); 2]) -> Self {
+    pub(crate) fn new(sets: [(&str, &[FrameAppearance]); 2]) -> Self {
         let looks = sets.map(|(_, looks)| looks);
         let mut rows = vec![
             LookRow::new(looks, "mean linear light, EV of white", 2, |look| {
@@ -119,7 +119,7 @@ impl LookComparison {
             .column(Text, "terminal median is", |row| row.verdict())
             .build();
         format!(
-            "{}medians (quartiles); edges: {STEEP} codes of luma per pixel, images of 480 rows at most; colours of pixels are named by the table of the rules\n",
+            "{}medians (quartiles); edges: {MIN_EDGE_GRADIENT} codes of luma per pixel, images of 480 rows at most; colours of pixels are named by the table of the rules\n",
             terminal::table(&[table])
         )
     }
@@ -129,8 +129,8 @@ impl LookComparison {
 mod tests {
     use super::*;
 
-    fn look(light_ev: f64, segments: Option<usize>) -> FrameLook {
-        FrameLook {
+    fn look(light_ev: f64, segments: Option<usize>) -> FrameAppearance {
+        FrameAppearance {
             light_ev,
             edges: 0.25,
             colors: [0.0; 12],
@@ -141,9 +141,9 @@ mod tests {
 
     #[test]
     fn a_median_is_judged_by_the_quartiles_of_the_other_set() {
-        let dark: Vec<FrameLook> = (1..=4).map(|ev| look(-f64::from(ev), Some(9))).collect();
+        let dark: Vec<FrameAppearance> = (1..=4).map(|ev| look(-f64::from(ev), Some(9))).collect();
         let bright = [look(-0.5, None)];
-        let of = |first: &[FrameLook], other: &[FrameLook]| {
+        let of = |first: &[FrameAppearance], other: &[FrameAppearance]| {
             let compared = LookComparison::new([("a", first), ("b", other)]);
             let verdicts = [0, 2, 3].map(|row: usize| compared.rows[row].verdict());
             (compared.rows[0].quartiles[0], verdicts)

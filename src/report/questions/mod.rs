@@ -70,7 +70,7 @@ pub(crate) fn table(summary: &QuestionSummary) -> String {
 /// The most frequent reasons for rejected candidates, with counts.
 fn reasons(candidates: &CandidateCounts) -> String {
     let mut rejected: Vec<(String, u64)> = candidates
-        .fallen
+        .rejections
         .iter()
         .map(|(reason, count)| (variant_words(reason), *count))
         .collect();
@@ -197,7 +197,7 @@ pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
         row("candidates", &name, "not_chosen", &candidates.not_chosen);
         row("candidates", &name, "rejected", &candidates.rejected);
         row("candidates", &name, "unbalanced", &candidates.unbalanced);
-        for (reason, count) in &candidates.fallen {
+        for (reason, count) in &candidates.rejections {
             row("fallen", &name, &variant_words(reason), count);
         }
     }

@@ -16,7 +16,7 @@ use crate::text::table::TableBuilder;
 use crate::text::terminal;
 use crate::text::words::counted;
 use darkqa_score::photographs::realism::gain::ReadingFit;
-use darkqa_score::photographs::realism::mean::{LEAST_VALUES, Mean};
+use darkqa_score::photographs::realism::mean::{MIN_VALUES, Mean};
 use darkqa_score::photographs::realism::residual::{Bins, EmptyBins};
 use darkqa_score::photographs::realism::{ImageComparison, PairComparison};
 
@@ -159,7 +159,7 @@ impl RealismSummary {
     #[must_use]
     pub(crate) fn table(&self) -> String {
         let mut text = format!(
-            "Synthetic against real low light, {}: mean ± half of the 95 % interval (Student's t, from {LEAST_VALUES} pairs on)\n{}{}",
+            "Synthetic against real low light, {}: mean ± half of the 95 % interval (Student's t, from {MIN_VALUES} pairs on)\n{}{}",
             counted(self.pairs, "pair"),
             self.methods(),
             self.differences(),

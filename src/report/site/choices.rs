@@ -103,7 +103,7 @@ pub(crate) fn choice_rows(
 
 fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -> ChoiceRow {
     let grid = &findings.grid;
-    let clean = grid.stand_in(&ModelInCondition::seeing(
+    let clean = grid.find_up_to_group(&ModelInCondition::with_images(
         model,
         AxisLevel::L0,
         variant,

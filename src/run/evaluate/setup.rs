@@ -25,7 +25,7 @@ use crate::runs::part::part;
 use crate::types::manifests::PartPlace;
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 use darkqa_enhance::ModelFile;
-use darkqa_questions::observer::understood;
+use darkqa_questions::observer::is_in_rulebook;
 use darkqa_questions::rules::Rules;
 
 /// Data and models of an evaluation, opened and checked. Nothing has been asked or written yet.
@@ -197,7 +197,7 @@ impl<'a> ChoiceSetup<'a> {
 fn warn_of_guesses(questions: &[Question], rules: &Rules) {
     let unknown = questions
         .iter()
-        .filter(|question| !understood(question, rules))
+        .filter(|question| !is_in_rulebook(question, rules))
         .count();
     if unknown > 0 {
         tracing::warn!(

@@ -9,8 +9,8 @@ use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::report::questions::against::LookComparison;
 use crate::types::FrameId;
+use darkqa_questions::appearance::FrameAppearance;
 use darkqa_questions::colors::Palette;
-use darkqa_questions::look::FrameLook;
 
 /// The frames of two sets beside each other.
 ///
@@ -42,7 +42,7 @@ fn looks(
     palette: &Palette,
     threads: ThreadArgs,
     progress: &Progress,
-) -> Result<Vec<FrameLook>> {
+) -> Result<Vec<FrameAppearance>> {
     let (names, tally): (Vec<&FrameId>, _) = (dataset.frames().collect(), InputTally::default());
     let bar = progress.bar("looks", names.len());
     let looks = pool(threads.threads)?.install(|| {
@@ -51,11 +51,11 @@ fn looks(
             .map(|name| {
                 let files = dataset.files(name)?;
                 tally.add(name, &files.note());
-                let look = FrameLook::new(&files.decode()?, palette);
+                let look = FrameAppearance::new(&files.decode()?, palette);
                 bar.inc();
                 Ok(look)
             })
-            .collect::<Result<Vec<FrameLook>>>()
+            .collect::<Result<Vec<FrameAppearance>>>()
     });
     drop(bar);
     tally.warn();

@@ -11,7 +11,7 @@ use crate::picture::ImageFile;
 use crate::report::realism::LeftOut;
 use crate::types::Rgb;
 use crate::types::{FrameId, Pixels};
-use darkqa_score::photographs::realism::scene::{LEAST_CORRELATION, SceneMatch};
+use darkqa_score::photographs::realism::scene::{MIN_CORRELATION, SceneMatch};
 use darkqa_score::photographs::realism::{exposure_drop, same_size};
 
 /// Exposure drop in EV, up or down, below which a pair is hardly one in normal and low light (chosen).
@@ -81,7 +81,7 @@ pub(super) fn check<'a>(
             Ok(light) if light.scene.is_of_two_scenes() => {
                 let found = light.scene.correlation.unwrap_or_default();
                 tracing::error!(
-                    "{name}: its images show two scenes, so it is left out: their structure correlates by {found:.2}, that of one scene by {LEAST_CORRELATION} or more"
+                    "{name}: its images show two scenes, so it is left out: their structure correlates by {found:.2}, that of one scene by {MIN_CORRELATION} or more"
                 );
                 &mut left_out.two_scenes
             }

@@ -57,8 +57,13 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(cluster_alerts(combined, clusters));
     alerts.extend(set_alert(findings.set));
     alerts.extend(many_models_alert(findings));
-    let oddities = findings.pairs.iter().flat_map(PairDarkness::oddities);
-    alerts.extend(oddities.map(|text| Alert::new(AlertKind::Pairs, text)));
+    alerts.extend(
+        findings
+            .pairs
+            .iter()
+            .flat_map(PairDarkness::warnings)
+            .map(|text| Alert::new(AlertKind::Pairs, text)),
+    );
     alerts.sort_by_key(|alert| alert.kind);
     alerts
 }

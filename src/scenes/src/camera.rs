@@ -9,40 +9,40 @@ use darkqa_ground::types::Intrinsics;
 /// A pinhole camera, rotated about y and tilted downwards, without roll.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Camera {
-    pub(super) at: Vec3,
+    pub(super) position: Vec3,
     /// Cosine and sine of the rotation about y; at an angle of 0 the camera looks along −z.
-    turn: Vec2,
+    yaw: Vec2,
     /// Cosine and sine of the upward tilt.
-    tilt: Vec2,
+    pitch: Vec2,
     /// Width and height of the image in pixels.
     pub(super) size: [usize; 2],
-    /// The focal length in pixels.
+    /// Focal length in pixels.
     focal: f32,
 }
 
-/// Half of the width of the view at a distance of 1 (chosen): an angle of about 84° across.
+/// Half of the width of the view at a distance of 1 (chosen): a horizontal field of view of about 84°.
 const HALF_WIDTH: f32 = 0.9;
 
-/// The focal length for images of a size, in pixels.
+/// Focal length for an image size, both in pixels.
 pub(super) fn focal(size: [usize; 2]) -> f32 {
     let longer = size[0].max(size[1] * 4 / 3);
     longer as f32 / 2.0 / HALF_WIDTH
 }
 
 impl Camera {
-    /// A camera at a place, rotated about y and tilted downwards by angles in radians, for images of a size in pixels.
-    pub(super) fn new(at: Vec3, angle: f32, tilt: f32, size: [usize; 2]) -> Self {
+    /// Creates a camera that is rotated about y by `angle` and tilted downwards by `tilt`, both in radians; `size` is in pixels.
+    pub(super) fn new(position: Vec3, angle: f32, tilt: f32, size: [usize; 2]) -> Self {
         Self {
-            at,
-            turn: cos_sin(angle),
-            tilt: cos_sin(-tilt),
+            position,
+            yaw: cos_sin(angle),
+            pitch: cos_sin(-tilt),
             size,
             focal: focal(size),
         }
     }
 
-    /// The same view with another image size.
-    pub(super) fn sized(&self, size: [usize; 2]) -> Self {
+    /// Returns the camera with another image size.
+    pub(super) fn with_size(&self, size: [usize; 2]) -> Self {
         Self {
             size,
             focal: focal(size),
@@ -50,12 +50,12 @@ impl Camera {
         }
     }
 
-    fn middle(&self) -> [f32; 2] {
+    fn principal_point(&self) -> [f32; 2] {
         self.size.map(|side| (side as f32 - 1.0) / 2.0)
     }
 
     pub(super) fn intrinsics(&self) -> Intrinsics {
-        let [cx, cy] = self.middle().map(f64::from);
+        let [cx, cy] = self.principal_point().map(f64::from);
         let focal = f64::from(self.focal);
         Intrinsics {
             fx: focal,
@@ -70,39 +70,36 @@ impl Camera {
         self.to_room(Vec3::NEG_Z)
     }
 
+    /// Rotates a direction from camera to room coordinates.
     fn to_room(self, v: Vec3) -> Vec3 {
-        let (tilt, turn) = (self.tilt, self.turn);
+        let (pitch, yaw) = (self.pitch, self.yaw);
         let v = vec3(
             v.x,
-            v.y * tilt.x - v.z * tilt.y,
-            v.y * tilt.y + v.z * tilt.x,
+            v.y * pitch.x - v.z * pitch.y,
+            v.y * pitch.y + v.z * pitch.x,
         );
-        vec3(
-            v.x * turn.x + v.z * turn.y,
-            v.y,
-            v.z * turn.x - v.x * turn.y,
-        )
+        vec3(v.x * yaw.x + v.z * yaw.y, v.y, v.z * yaw.x - v.x * yaw.y)
     }
 
-    /// The ray through a point of the image; whole numbers are the centers of pixels.
+    /// Ray through a point of the image; integer coordinates are pixel centers.
     pub(super) fn ray(&self, x: f32, y: f32) -> Ray {
-        let [cx, cy] = self.middle();
+        let [cx, cy] = self.principal_point();
         let direction = vec3((x - cx) / self.focal, (cy - y) / self.focal, -1.0);
-        Ray::new(self.at, self.to_room(direction).normalize()).wide(1.0 / self.focal)
+        Ray::new(self.position, self.to_room(direction).normalize()).with_spread(1.0 / self.focal)
     }
 
-    /// Whether a point is within the view, hidden or not.
-    pub(super) fn sees(&self, place: Vec3) -> bool {
-        let offset = place - self.at;
+    /// True if a point is in the field of view, hidden or not.
+    pub(super) fn is_in_view(&self, point: Vec3) -> bool {
+        let offset = point - self.position;
         let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::NEG_Z].map(|axis| offset.dot(self.to_room(axis)));
         let [half_width, half_height] = self.size.map(|side| side as f32 / 2.0 / self.focal);
         z > 0.0 && x.abs() <= half_width * z && y.abs() <= half_height * z
     }
 
-    /// The pose as a matrix from the camera (x right, y up, z backwards) to the room, row by row.
+    /// Row-major matrix from camera coordinates (x right, y up, z backwards) to room coordinates.
     pub(super) fn pose(&self) -> [f32; 16] {
         let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|v| self.to_room(v));
-        let at = self.at;
+        let at = self.position;
         [
             x.x, y.x, z.x, at.x, x.y, y.y, z.y, at.y, x.z, y.z, z.z, at.z, 0.0, 0.0, 0.0, 1.0,
         ]

@@ -2,8 +2,8 @@
 
 use glam::{Vec3, vec2, vec3};
 
-use super::furniture::{at, parts};
-use super::mesh::bounds;
+use super::furniture::parts;
+use super::mesh::{Face, bounds};
 use super::plan::{FloorArea, FloorPlan};
 use super::scene::{Piece, Pose};
 use super::shell::WALLS;
@@ -40,8 +40,8 @@ fn boxes_overlap([low, high]: &[Vec3; 2], [other_low, other_high]: &[Vec3; 2]) -
 
 impl FloorPlan {
     /// Adds small things to a furnished room; `floor` is the place name of the floor things in the parts table.
-    pub(super) fn clutter(&mut self, floor: &str) {
-        let mess = self.dice.between(0.4, 1.6);
+    pub(super) fn add_clutter(&mut self, floor: &str) {
+        let mess = self.rng.between(0.4, 1.6);
         for thing in 0..self.scene.things.len() {
             let word = self.scene.things[thing].kind.word;
             let top = SURFACES.iter().find(|(known, ..)| *known == word);
@@ -50,12 +50,12 @@ impl FloorPlan {
             }
         }
         for _ in 0..(3.5 * mess) as usize {
-            self.drop_on_floor(floor);
+            self.add_on_floor(floor);
         }
-        let on_walls = parts::found("wall");
-        for _ in 0..2 + self.dice.below(4) {
-            let name = self.dice.pick(&on_walls);
-            let piece = parts::piece(name, &mut self.dice);
+        let on_walls = parts::names_found_at("wall");
+        for _ in 0..2 + self.rng.below(4) {
+            let name = self.rng.pick(&on_walls);
+            let piece = parts::piece(name, &mut self.rng);
             self.hang(&piece, &WALLS, 0.0);
         }
     }
@@ -64,18 +64,13 @@ impl FloorPlan {
     /// for the top), `from` the empty share of its depth.
     fn add_on_top(&mut self, thing: usize, place: &str, [height, from]: [f32; 2], mess: f32) {
         let pose = self.scene.things[thing].pose;
-        let corners = self
-            .scene
-            .mesh
-            .faces
-            .iter()
-            .zip(&self.scene.owners)
-            .filter(|(_, owner)| **owner == thing)
-            .flat_map(|(face, _)| face.corners.map(|corner| corner.at));
-        let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
-        for corner in corners.map(|at| pose.to_piece(at)) {
-            (low, high) = (low.min(corner), high.max(corner));
-        }
+        let (mut low, high) = self
+            .faces(thing)
+            .flat_map(|face| face.corners)
+            .map(|corner| pose.to_piece(corner.position))
+            .fold((Vec3::MAX, Vec3::MIN), |(low, high), corner| {
+                (low.min(corner), high.max(corner))
+            });
         // Things on high furniture are invisible from below.
         let top = if height > 0.0 { height } else { high.y };
         if top > 1.7 {
@@ -85,17 +80,17 @@ impl FloorPlan {
         let area = (high.x - low.x) * (high.z - low.z);
         // Seats and beds are mostly empty.
         let count = if from > 0.0 && height < 0.8 {
-            usize::from(self.dice.chance(0.3))
+            usize::from(self.rng.chance(0.3))
         } else {
             (area * DENSITY * mess).clamp(1.0, 7.0) as usize
         };
-        let names = parts::found(place);
+        let names = parts::names_found_at(place);
         for _ in 0..count * 3 {
-            let name = self.dice.pick(&names);
-            let piece = parts::piece(name, &mut self.dice);
-            let [x, z] = [0, 2].map(|axis| self.dice.between(low[axis], high[axis]));
-            let angle = pose.angle + self.dice.between(-0.5, 0.5);
-            let foot = at(pose.to_room(vec3(x, top + 0.001, z)), angle);
+            let name = self.rng.pick(&names);
+            let piece = parts::piece(name, &mut self.rng);
+            let [x, z] = [0, 2].map(|axis| self.rng.between(low[axis], high[axis]));
+            let angle = pose.angle + self.rng.between(-0.5, 0.5);
+            let foot = Pose::new(pose.to_room(vec3(x, top + 0.001, z)), angle);
             let corners = lower_corners(&piece).map(|corner| foot.to_room(corner));
             if corners
                 .iter()
@@ -109,24 +104,29 @@ impl FloorPlan {
     /// True if a point is over or under a horizontal triangle of a thing, within 12 mm in height.
     fn is_on_surface(&self, thing: usize, point: Vec3) -> bool {
         let flat = |v: Vec3| vec2(v.x, v.z);
+        self.faces(thing).any(|face| {
+            let corners = face.corners.map(|corner| corner.position);
+            if !corners
+                .into_iter()
+                .all(|corner| (point.y - corner.y).abs() < 0.012)
+            {
+                return false;
+            }
+            let [a, b, c] = corners.map(|corner| flat(corner) - flat(point));
+            let turns = [a.perp_dot(b), b.perp_dot(c), c.perp_dot(a)];
+            turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
+        })
+    }
+
+    /// Faces of a thing.
+    fn faces(&self, thing: usize) -> impl Iterator<Item = &Face> {
         self.scene
             .mesh
             .faces
             .iter()
-            .zip(&self.scene.owners)
-            .any(|(face, owner)| {
-                let corners = face.corners.map(|corner| corner.at);
-                if *owner != thing
-                    || !corners
-                        .into_iter()
-                        .all(|corner| (point.y - corner.y).abs() < 0.012)
-                {
-                    return false;
-                }
-                let [a, b, c] = corners.map(|corner| flat(corner) - flat(point));
-                let turns = [a.perp_dot(b), b.perp_dot(c), c.perp_dot(a)];
-                turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0)
-            })
+            .zip(&self.scene.face_owners)
+            .filter(move |(_, owner)| **owner == thing)
+            .map(|(face, _)| face)
     }
 
     /// Adds a piece and returns true, unless it would leave the room or overlap a thing other than `below`. Things lower than 2 cm, such as
@@ -137,9 +137,9 @@ impl FloorPlan {
             .faces
             .iter()
             .flat_map(|face| face.corners)
-            .map(|corner| pose.to_room(corner.at))
-            .fold([Vec3::MAX, Vec3::MIN], |[low, high], at| {
-                [low.min(at), high.max(at)]
+            .map(|corner| pose.to_room(corner.position))
+            .fold([Vec3::MAX, Vec3::MIN], |[low, high], corner| {
+                [low.min(corner), high.max(corner)]
             });
         let is_blocked = self.boxes.iter().enumerate().any(|(thing, other)| {
             let is_flat = other[1].y - other[0].y < 0.02;
@@ -157,21 +157,23 @@ impl FloorPlan {
     }
 
     /// Adds a thing on the floor, mostly near a wall.
-    fn drop_on_floor(&mut self, place: &str) {
-        let names = parts::found(place);
-        let name = self.dice.pick(&names);
-        let piece = parts::piece(name, &mut self.dice);
+    fn add_on_floor(&mut self, place: &str) {
+        let names = parts::names_found_at(place);
+        let name = self.rng.pick(&names);
+        let piece = parts::piece(name, &mut self.rng);
         for _ in 0..12 {
-            let wall = self.dice.pick(&WALLS);
-            let along = self.dice.between(0.3, self.width(wall) - 0.3);
-            let out = if self.dice.chance(0.6) { 0.1 } else { 1.4 };
+            let wall = self.rng.pick(&WALLS);
+            let along = self.rng.between(0.3, self.wall_length(wall) - 0.3);
+            let out = if self.rng.chance(0.6) { 0.1 } else { 1.4 };
             let pose = self.wall_pose(wall, along, 0.0);
-            let foot = pose.to_room(vec3(0.0, 0.013, self.dice.between(0.03, out)));
-            let turned = pose.angle + self.dice.between(-0.6, 0.6);
+            let foot = pose.to_room(vec3(0.0, 0.013, self.rng.between(0.03, out)));
+            let angle = pose.angle + self.rng.between(-0.6, 0.6);
             let [low, high] = [foot - 0.16, foot + 0.16];
-            let area = FloorArea([low.x.max(0.01), low.z.max(0.01), high.x, high.z]);
-            if self.is_free(&area) && self.add_if_free(piece.clone(), at(foot, turned), None) {
-                self.reserve_floor(&at(foot, 0.0), vec3(0.36, 0.0, 0.36), -0.18);
+            let floor_area = FloorArea([low.x.max(0.01), low.z.max(0.01), high.x, high.z]);
+            if self.is_free(&floor_area)
+                && self.add_if_free(piece.clone(), Pose::new(foot, angle), None)
+            {
+                self.reserve_floor(&Pose::new(foot, 0.0), vec3(0.36, 0.0, 0.36), -0.18);
                 return;
             }
         }

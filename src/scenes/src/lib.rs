@@ -1,7 +1,7 @@
 //! The built-in rooms: images of furnished rooms with exact ground truth, generated from a seed.
 //!
 //! Each scene is one room of one of six kinds. Rules and random draws furnish the room with parametric pieces (`furniture`); windows
-//! and lamps light it. Each scene has two frames: one from the eye height of a person, one from the camera height of a small robot.
+//! and lamps light it. Each scene has two frames: one from the eye height of a person and one from the camera height of a small robot.
 //! Frames are ray traced, so image, depth, classes and segments agree in every pixel. Seed, frame index and image size determine a
 //! frame: its bytes are the same on every machine and for any number of threads. No model was trained on these rooms.
 
@@ -10,8 +10,6 @@
 mod bvh;
 mod camera;
 mod clutter;
-mod dice;
-mod drawn_room;
 mod furniture;
 mod kinds;
 mod light;
@@ -23,12 +21,14 @@ mod paint;
 mod pattern;
 mod plan;
 mod render;
+mod rendered_frame;
 mod room_light;
 mod scene;
+mod seeded_rng;
 mod settings;
 mod shell;
-mod spot;
 mod surface;
+mod surface_point;
 mod viewpoint;
 
 use std::collections::BTreeMap;
@@ -37,17 +37,18 @@ use std::sync::{Arc, LazyLock};
 
 use self::bvh::Bvh;
 use self::camera::Camera;
-use self::dice::Dice;
-use self::drawn_room::DrawnRoom;
 use self::kinds::RoomKind;
 use self::plan::FloorPlan;
+use self::rendered_frame::RenderedFrame;
 pub use self::room_light::RoomLight;
+use self::scene::ThingKind;
+use self::seeded_rng::SeededRng;
 pub use self::settings::Rooms;
-use self::viewpoint::Height;
+use self::viewpoint::CameraHeight;
 use darkqa_ground::error::Result;
 use darkqa_ground::labels;
 use darkqa_ground::types::values::Recent;
-use darkqa_ground::types::{Digest, Frame, FrameId, Labels, Light, Pixels, Rgb, SegmentName};
+use darkqa_ground::types::{Digest, Frame, FrameId, Labels, Light, Pixels, Rgb};
 
 /// Version of the generator. Any change of a pixel or a name needs a new version.
 pub const VERSION: u32 = 2;
@@ -62,8 +63,8 @@ const CACHE_BYTES: usize = 104 << 20;
 /// Number of frames of a size, in pixels, that fit in the cache; at least one.
 fn cached_frames([width, height]: [usize; 2], light: RoomLight) -> usize {
     let bytes = match light {
-        RoomLight::Display => DrawnRoom::BYTES_PER_PIXEL,
-        RoomLight::Linear => DrawnRoom::BYTES_PER_PIXEL + DrawnRoom::BYTES_OF_LIGHT,
+        RoomLight::Display => RenderedFrame::BYTES_PER_PIXEL,
+        RoomLight::Linear => RenderedFrame::BYTES_PER_PIXEL + RenderedFrame::LIGHT_BYTES_PER_PIXEL,
     };
     (CACHE_BYTES / (width * height * bytes).max(1)).max(1)
 }
@@ -73,7 +74,7 @@ fn cached_frames([width, height]: [usize; 2], light: RoomLight) -> usize {
 pub struct Room {
     rooms: Rooms,
     index: usize,
-    cache: Arc<Recent<usize, Arc<DrawnRoom>>>,
+    cache: Arc<Recent<usize, Arc<RenderedFrame>>>,
 }
 
 /// Ground truth of a frame, for checking questions.
@@ -99,7 +100,7 @@ pub struct ThingTruth {
     pub color: &'static str,
     /// Distance from the camera to the nearest point of the thing in the field of view, even if that point is hidden, in metres. It is
     /// accurate to a few centimetres. `f32::MAX` if no point is in the field of view.
-    pub near: f32,
+    pub distance: f32,
 }
 
 impl Rooms {
@@ -134,11 +135,11 @@ impl Room {
         RoomKind::ALL[self.index / 2 % RoomKind::ALL.len()]
     }
 
-    fn height(&self) -> Height {
+    fn camera_height(&self) -> CameraHeight {
         if self.index.is_multiple_of(2) {
-            Height::Eye
+            CameraHeight::Eye
         } else {
-            Height::Robot
+            CameraHeight::Robot
         }
     }
 
@@ -152,7 +153,7 @@ impl Room {
     /// Name of the frame within its scene, after the camera height: `eye` or `robot`.
     #[must_use]
     pub fn view(&self) -> &'static str {
-        self.height().name()
+        self.camera_height().name()
     }
 
     fn id(&self) -> FrameId {
@@ -195,36 +196,39 @@ impl Room {
     fn plan(&self) -> FloorPlan {
         let scene = self.scene();
         self.kind()
-            .furnish(Dice::new(self.rooms.seed, &[&scene, "furniture"]))
+            .furnish(SeededRng::new(self.rooms.seed, &[&scene, "furniture"]))
     }
 
     fn camera(&self, plan: &FloorPlan, tree: &Bvh) -> Camera {
         let scene = self.scene();
-        let mut dice = Dice::new(self.rooms.seed, &[&scene, self.view(), "camera"]);
-        viewpoint::camera(plan, tree, self.height(), self.rooms.size, &mut dice)
+        let mut rng = SeededRng::new(self.rooms.seed, &[&scene, self.view(), "camera"]);
+        viewpoint::choose_camera(plan, tree, self.camera_height(), self.rooms.size, &mut rng)
     }
 
     /// Ground truth of the frame.
     #[must_use]
     pub fn truth(&self) -> RoomTruth {
         let (plan, camera) = (self.plan(), self.drawn().camera);
-        let mut near = vec![f32::MAX; plan.scene.things.len()];
-        for (face, owner) in plan.scene.mesh.faces.iter().zip(&plan.scene.owners) {
-            let nearest = face
+        let mut distances = vec![f32::MAX; plan.scene.things.len()];
+        for (face, owner) in plan.scene.mesh.faces.iter().zip(&plan.scene.face_owners) {
+            distances[*owner] = face
                 .points(SAMPLE_SPACING)
-                .filter(|point| camera.sees(*point))
-                .map(|point| point.distance(camera.at));
-            near[*owner] = nearest.fold(near[*owner], f32::min);
+                .filter(|point| camera.is_in_view(*point))
+                .map(|point| point.distance(camera.position))
+                .fold(distances[*owner], f32::min);
         }
-        let things = plan.scene.things.iter().zip(near);
         RoomTruth {
             room: self.kind().name(),
-            things: things
-                .map(|(thing, near)| ThingTruth {
+            things: plan
+                .scene
+                .things
+                .iter()
+                .zip(distances)
+                .map(|(thing, distance)| ThingTruth {
                     word: thing.kind.word,
                     class: thing.kind.class,
                     color: thing.color,
-                    near,
+                    distance,
                 })
                 .collect(),
         }
@@ -270,29 +274,20 @@ impl Room {
     }
 
     /// The drawn frame, from the cache if possible.
-    fn drawn(&self) -> Arc<DrawnRoom> {
+    fn drawn(&self) -> Arc<RenderedFrame> {
         let Ok(drawn) = self
             .cache
             .get(&self.index, || Ok::<_, Infallible>(Arc::new(self.draw())));
         drawn
     }
 
-    fn draw(&self) -> DrawnRoom {
+    fn draw(&self) -> RenderedFrame {
         let plan = self.plan();
         let tree = plan.scene.tree();
         let camera = self.camera(&plan, &tree);
         let view = render::render(&plan.scene, &tree, &camera, self.rooms.light);
-        let things = &plan.scene.things;
-        let classes = things.iter().map(|thing| class_number(thing.kind.class));
-        let names = things.iter().zip(1..).map(|(thing, number)| {
-            let name = SegmentName {
-                name: thing.kind.word.to_owned(),
-                canonical: thing.kind.class.to_owned(),
-                region: None,
-            };
-            (number, name)
-        });
-        DrawnRoom {
+        let kinds: Vec<ThingKind> = plan.scene.things.iter().map(|thing| thing.kind).collect();
+        RenderedFrame {
             id: self.id(),
             scene: self.scene(),
             room: self.kind().name(),
@@ -304,8 +299,14 @@ impl Room {
             },
             depth: view.depth,
             things: view.things,
-            classes: std::iter::once(0).chain(classes).collect(),
-            names: Arc::new(names.collect()),
+            classes: std::iter::once(0)
+                .chain(kinds.iter().map(|kind| class_number(kind.class)))
+                .collect(),
+            names: Arc::new(
+                (1..)
+                    .zip(kinds.iter().map(ThingKind::segment_name))
+                    .collect(),
+            ),
         }
     }
 

@@ -1,4 +1,4 @@
-//! The light that reaches a point: [`Lighting`].
+//! Light that reaches a point: [`Lighting`].
 //!
 //! Direct light comes from lamps and windows; each is sampled with a shadow ray. Indirect light comes from other surfaces: rays over the
 //! half-space (cosine-weighted) return the colour of the surface that they hit, lit by one light each, plus a constant ambient light. So
@@ -10,85 +10,85 @@ use super::bvh::{Bvh, Ray};
 use super::mesh::cos_sin;
 use super::noise::hash;
 use super::scene::{LightSource, Scene};
-use super::spot::SurfacePoint;
+use super::surface_point::SurfacePoint;
 
-/// The strata per axis of a sample pattern (chosen). Neighbouring pixels use different strata.
+/// Number of strata along each axis of a sample pattern (chosen). Neighbouring pixels use different strata.
 pub(super) const STRATA: usize = 4;
-/// The number of rays over the half-space per point (chosen).
+/// Number of indirect rays per point, over the half-space above the surface (chosen).
 const INDIRECT_RAYS: usize = 4;
-/// The maximum light of one ray, as a multiple of the ambient light (chosen).
-const BOUND: f32 = 5.0;
-/// The distance in metres between a surface and the start of a shadow ray (chosen).
+/// Maximum light of one indirect ray, as a multiple of the ambient light (chosen).
+const MAX_INDIRECT: f32 = 5.0;
+/// Distance in metres between a surface and the start of a shadow ray (chosen).
 const OFFSET: f32 = 2e-3;
 
-/// The light of a scene.
+/// Light sources, geometry and ambient light of a scene.
 #[derive(Debug)]
 pub(super) struct Lighting<'a> {
     pub(super) scene: &'a Scene,
     pub(super) tree: &'a Bvh,
-    /// The ambient light: what reaches every point after many bounces, by channel.
+    /// Light that reaches every point after many bounces, by channel.
     pub(super) ambient: Vec3,
 }
 
-/// The stratum of a sample, and the pixel whose coordinates decide its jitter.
+/// Stratum of a sample, and the pixel whose coordinates determine its jitter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LightSample {
     pub(super) stratum: usize,
-    pub(super) place: [i32; 2],
+    pub(super) pixel: [i32; 2],
 }
 
 impl LightSample {
-    /// Two numbers from 0 to 1 within the stratum, for one purpose.
-    fn pair(self, purpose: usize) -> [f32; 2] {
+    /// Returns two numbers from 0 to 1 within the stratum, for one purpose.
+    fn uniform_pair(self, purpose: usize) -> [f32; 2] {
         // Each purpose uses the strata in its own order (5, 11 and 13 have no common factor with 16).
         let count = STRATA * STRATA;
-        let turned = (self.stratum * [1, 5, 11, 13][purpose % 4] + purpose * 7) % count;
-        let [x, y] = self.place;
+        let stratum = (self.stratum * [1, 5, 11, 13][purpose % 4] + purpose * 7) % count;
+        let [x, y] = self.pixel;
         let jitter = |axis: i32| hash(x.wrapping_add(purpose as i32 * 131), y, axis);
         [
-            ((turned % STRATA) as f32 + jitter(21)) / STRATA as f32,
-            ((turned / STRATA) as f32 + jitter(22)) / STRATA as f32,
+            ((stratum % STRATA) as f32 + jitter(21)) / STRATA as f32,
+            ((stratum / STRATA) as f32 + jitter(22)) / STRATA as f32,
         ]
     }
 }
 
 impl Lighting<'_> {
-    /// The light that reaches a point: direct from lamps and windows, and indirect by way of other things.
-    pub(super) fn incoming(&self, spot: &SurfacePoint, sample: LightSample) -> [Vec3; 2] {
+    /// Direct and indirect light at a point: from lamps and windows, and by reflection from other things.
+    pub(super) fn incoming(&self, point: &SurfacePoint, sample: LightSample) -> [Vec3; 2] {
         let indirect: Vec3 = (0..INDIRECT_RAYS)
-            .map(|i| self.indirect(spot, sample, i))
+            .map(|i| self.indirect(point, sample, i))
             .sum();
         [
-            self.direct(spot.at, spot.normal, sample),
+            self.direct(point.position, point.normal, sample),
             indirect / INDIRECT_RAYS as f32,
         ]
     }
 
-    /// The direct light of lamps and windows at a point.
-    pub(super) fn direct(&self, at: Vec3, normal: Vec3, sample: LightSample) -> Vec3 {
+    /// Direct light of lamps and windows at a position.
+    pub(super) fn direct(&self, position: Vec3, normal: Vec3, sample: LightSample) -> Vec3 {
         self.scene
             .lights
             .iter()
             .enumerate()
-            .map(|(i, light)| self.from(light, at, normal, sample.pair(i)))
+            .map(|(i, light)| self.light_from(light, position, normal, sample.uniform_pair(i)))
             .sum()
     }
 
-    /// The light that one ray over the half-space returns.
-    fn indirect(&self, spot: &SurfacePoint, sample: LightSample, which: usize) -> Vec3 {
-        let [u, v] = sample.pair(12 + which);
+    /// Light that one indirect ray returns, given by its index.
+    fn indirect(&self, point: &SurfacePoint, sample: LightSample, ray_index: usize) -> Vec3 {
+        let [u, v] = sample.uniform_pair(12 + ray_index);
         let around = cos_sin(std::f32::consts::TAU * u);
         let (out, up) = (v.sqrt(), (1.0 - v).max(0.0).sqrt());
-        let aside = if spot.normal.x.abs() > 0.7 {
+        let aside = if point.normal.x.abs() > 0.7 {
             Vec3::Y
         } else {
             Vec3::X
         };
-        let across = spot.normal.cross(aside).normalize();
-        let over = spot.normal.cross(across);
-        let direction = across * (around.x * out) + over * (around.y * out) + spot.normal * up;
-        let ray = Ray::new(spot.at + spot.normal * OFFSET, direction);
-        let Some(hit) = SurfacePoint::first(self.scene, self.tree, &ray) else {
+        let across = point.normal.cross(aside).normalize();
+        let over = point.normal.cross(across);
+        let direction = across * (around.x * out) + over * (around.y * out) + point.normal * up;
+        let ray = Ray::new(point.position + point.normal * OFFSET, direction);
+        let Some(hit) = SurfacePoint::first_hit(self.scene, self.tree, &ray) else {
             return self.ambient;
         };
         if hit.glow != Vec3::ZERO {
@@ -96,17 +96,28 @@ impl Lighting<'_> {
             return self.ambient * 0.5;
         }
         let count = self.scene.lights.len().max(1);
-        let chosen = (sample.stratum + which) % count;
+        let chosen = (sample.stratum + ray_index) % count;
         let direct = self.scene.lights.get(chosen).map_or(Vec3::ZERO, |light| {
-            self.from(light, hit.at, hit.normal, sample.pair(24 + which)) * count as f32
+            self.light_from(
+                light,
+                hit.position,
+                hit.normal,
+                sample.uniform_pair(24 + ray_index),
+            ) * count as f32
         });
-        // The light is limited, because a ray that hits a point close to a lamp would cause a bright dot.
-        hit.color * (direct + self.ambient).min(self.ambient * BOUND)
+        // Without a limit, a ray that hits a point close to a lamp would cause a bright dot.
+        hit.color * (direct + self.ambient).min(self.ambient * MAX_INDIRECT)
     }
 
-    /// The light that one lamp or window sends to a point.
-    fn from(&self, light: &LightSource, at: Vec3, normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
-        let start = at + normal * OFFSET;
+    /// Light that one lamp or window sends to a position.
+    fn light_from(
+        &self,
+        light: &LightSource,
+        position: Vec3,
+        normal: Vec3,
+        [u, v]: [f32; 2],
+    ) -> Vec3 {
+        let start = position + normal * OFFSET;
         let (target, strength) = match *light {
             LightSource::Panel {
                 corner,
@@ -148,7 +159,7 @@ impl Lighting<'_> {
         }
         if self
             .tree
-            .blocked(&Ray::new(start, direction), distance - 2.0 * OFFSET)
+            .is_occluded(&Ray::new(start, direction), distance - 2.0 * OFFSET)
         {
             Vec3::ZERO
         } else {
@@ -157,7 +168,7 @@ impl Lighting<'_> {
     }
 }
 
-/// The luminance of linear light (ITU-R BT.709).
-pub(super) fn brightness(light: Vec3) -> f32 {
+/// Luminance of linear light (ITU-R BT.709).
+pub(super) fn luminance(light: Vec3) -> f32 {
     light.dot(vec3(0.2126, 0.7152, 0.0722))
 }

@@ -1,7 +1,7 @@
-//! Triangle meshes: [`Mesh`], with the solids that furniture is made of.
+//! Triangle meshes ([`Mesh`]) and the solids that furniture is made of.
 //!
-//! Lengths are metres and angles radians. x points to the right, y up and z to the front. A piece stands on y = 0, with its
-//! back at z = 0 and its middle at x = 0.
+//! Lengths are in metres and angles in radians. x points to the right, y up and z to the front. The bottom of a piece is at y = 0, its back
+//! at z = 0 and its middle at x = 0.
 
 use std::f32::consts::{PI, TAU};
 
@@ -9,14 +9,14 @@ use glam::{Vec2, Vec3, vec2, vec3};
 
 use super::surface::Surface;
 
-/// A corner of a triangle: its position, and the surface normal there.
+/// A corner of a triangle: position and surface normal.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {
-    pub(super) at: Vec3,
+    pub(super) position: Vec3,
     pub(super) normal: Vec3,
 }
 
-/// A triangle: three corners, and the index of its surface in the mesh.
+/// A triangle: three corners and the index of its surface in the mesh.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Face {
     pub(super) corners: [Corner; 3],
@@ -24,9 +24,9 @@ pub(super) struct Face {
 }
 
 impl Face {
-    /// Points on the triangle with its corners, at most `spacing` metres apart along each edge.
+    /// Points on the triangle, including its corners, at most `spacing` metres apart along each edge.
     pub(super) fn points(&self, spacing: f32) -> impl Iterator<Item = Vec3> {
-        let [a, b, c] = self.corners.map(|corner| corner.at);
+        let [a, b, c] = self.corners.map(|corner| corner.position);
         let longest = (b - a).length().max((c - a).length()).max((c - b).length());
         let count = (longest / spacing).ceil().max(1.0) as usize;
         (0..=count).flat_map(move |i| {
@@ -44,20 +44,20 @@ pub(super) struct Mesh {
     pub(super) surfaces: Vec<Surface>,
 }
 
-/// The number of sides of round shapes (chosen).
+/// Number of sides of round shapes (chosen).
 const SIDES: usize = 20;
-/// The number of rows of shapes that are round in two directions (chosen).
+/// Number of rows of shapes that are round in two directions (chosen).
 const ROWS: usize = 10;
 
-/// The cosine (x) and sine (y) of an angle in radians, the same on every machine.
+/// Cosine (x) and sine (y) of an angle in radians, the same on every machine.
 pub(super) fn cos_sin(angle: f32) -> Vec2 {
     let (sine, cosine) = libm::sincosf(angle);
     vec2(cosine, sine)
 }
 
 impl Mesh {
-    /// The index of a surface, which is added if it is new.
-    fn surface(&mut self, surface: &Surface) -> usize {
+    /// Returns the index of a surface, after adding it if it is new.
+    fn surface_index(&mut self, surface: &Surface) -> usize {
         if let Some(known) = self.surfaces.iter().position(|known| known == surface) {
             return known;
         }
@@ -65,54 +65,54 @@ impl Mesh {
         self.surfaces.len() - 1
     }
 
+    /// Adds a triangle unless it is degenerate.
     fn triangle(&mut self, corners: [Corner; 3], surface: usize) {
-        let [a, b, c] = corners.map(|corner| corner.at);
+        let [a, b, c] = corners.map(|corner| corner.position);
         if (b - a).cross(c - a).length_squared() > 1e-14 {
             self.faces.push(Face { corners, surface });
         }
     }
 
-    /// A flat quadrilateral. The order of its corners decides the normal: (b - a) × (d - a).
+    /// Adds a flat quadrilateral. The order of its corners determines the normal: (b − a) × (d − a).
     pub(super) fn quad(&mut self, [a, b, c, d]: [Vec3; 4], surface: &Surface) {
-        let surface = self.surface(surface);
+        let surface = self.surface_index(surface);
         let normal = (b - a).cross(d - a).normalize_or_zero();
-        let corner = |at| Corner { at, normal };
+        let corner = |position| Corner { position, normal };
         self.triangle([a, b, c].map(corner), surface);
         self.triangle([a, c, d].map(corner), surface);
     }
 
-    /// A smooth surface over a grid of points. All rows have the same length.
+    /// Adds a smooth surface over a grid of points. All rows have the same length.
     pub(super) fn grid(&mut self, rows: &[Vec<Vec3>], surface: &Surface) {
-        let surface = self.surface(surface);
+        let surface = self.surface_index(surface);
         let (height, width) = (rows.len(), rows.first().map_or(0, Vec::len));
-        let round = rows
+        let is_closed = rows
             .iter()
             .all(|row| row[0].distance_squared(row[width - 1]) < 1e-10);
         let normal = |y: usize, x: usize| {
-            let (left, right) = match (x, round) {
+            let (left, right) = match (x, is_closed) {
                 (0, true) => (width - 2, 1),
                 (x, true) if x == width - 1 => (x - 1, 1),
                 _ => (x.saturating_sub(1), (x + 1).min(width - 1)),
             };
-            let along = rows[y][right] - rows[y][left];
+            let mut along = rows[y][right] - rows[y][left];
             let (above, below) = (y.saturating_sub(1), (y + 1).min(height - 1));
             let mut across = rows[below][x] - rows[above][x];
-            let mut along_here = along;
             if along.length_squared() < 1e-12 {
                 // At the pole of a round shape the neighbouring row gives the direction.
                 let near = if y == 0 { 1 } else { y - 1 };
-                along_here = rows[near][right] - rows[near][left];
+                along = rows[near][right] - rows[near][left];
             }
             if across.length_squared() < 1e-12 {
                 across = rows[below][x] - rows[y][x];
             }
-            along_here.cross(across).normalize_or_zero()
+            along.cross(across).normalize_or_zero()
         };
         let corners: Vec<Vec<Corner>> = (0..height)
             .map(|y| {
                 (0..width)
                     .map(|x| Corner {
-                        at: rows[y][x],
+                        position: rows[y][x],
                         normal: normal(y, x),
                     })
                     .collect()
@@ -127,16 +127,10 @@ impl Mesh {
         }
     }
 
-    /// A box with sharp edges, from its lowest to its highest corner.
+    /// Adds a box with sharp edges, given by its lowest and its highest corner.
     pub(super) fn block(&mut self, low: Vec3, high: Vec3, surface: &Surface) {
-        let at = |x: usize, y: usize, z: usize| {
-            let pick = |which: usize, low: f32, high: f32| if which == 0 { low } else { high };
-            vec3(
-                pick(x, low.x, high.x),
-                pick(y, low.y, high.y),
-                pick(z, low.z, high.z),
-            )
-        };
+        let ends = [low, high];
+        let at = |x: usize, y: usize, z: usize| vec3(ends[x].x, ends[y].y, ends[z].z);
         for side in [
             [at(0, 0, 1), at(1, 0, 1), at(1, 1, 1), at(0, 1, 1)],
             [at(1, 0, 0), at(0, 0, 0), at(0, 1, 0), at(1, 1, 0)],
@@ -149,39 +143,43 @@ impl Mesh {
         }
     }
 
-    /// A box centered at x = 0: half of its width, and its lower and upper bounds in y and z.
-    pub(super) fn board(&mut self, half: f32, y: [f32; 2], z: [f32; 2], surface: &Surface) {
-        self.block(vec3(-half, y[0], z[0]), vec3(half, y[1], z[1]), surface);
+    /// Adds a box centered at x = 0, given by half of its width and its bounds in y and z.
+    pub(super) fn board(&mut self, half_width: f32, y: [f32; 2], z: [f32; 2], surface: &Surface) {
+        self.block(
+            vec3(-half_width, y[0], z[0]),
+            vec3(half_width, y[1], z[1]),
+            surface,
+        );
     }
 
-    /// A [board](Self::board) with rounded edges.
+    /// Adds a [board](Self::board) with rounded edges.
     pub(super) fn cushion(
         &mut self,
-        half: f32,
+        half_width: f32,
         y: [f32; 2],
         z: [f32; 2],
         radius: f32,
         surface: &Surface,
     ) {
-        let (low, high) = (vec3(-half, y[0], z[0]), vec3(half, y[1], z[1]));
-        self.soft(low, high, radius, surface);
+        let (low, high) = (vec3(-half_width, y[0], z[0]), vec3(half_width, y[1], z[1]));
+        self.rounded_box(low, high, radius, surface);
     }
 
-    /// A box by the center of its bottom face and its size.
+    /// Adds a box, given by the center of its bottom face and its size.
     pub(super) fn slab(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
         let half = vec3(size.x / 2.0, 0.0, size.z / 2.0);
         self.block(foot - half, foot + half + vec3(0.0, size.y, 0.0), surface);
     }
 
-    /// Two [slabs](Self::slab), at x and at −x.
-    pub(super) fn slabs(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
+    /// Adds two [slabs](Self::slab), at x and at −x.
+    pub(super) fn mirrored_slabs(&mut self, foot: Vec3, size: Vec3, surface: &Surface) {
         for x in [-foot.x, foot.x] {
             self.slab(vec3(x, foot.y, foot.z), size, surface);
         }
     }
 
-    /// A box with rounded edges: the Minkowski sum of a box and a ball.
-    pub(super) fn soft(&mut self, low: Vec3, high: Vec3, radius: f32, surface: &Surface) {
+    /// Adds a box with rounded edges: the Minkowski sum of a box and a ball.
+    pub(super) fn rounded_box(&mut self, low: Vec3, high: Vec3, radius: f32, surface: &Surface) {
         let radius = radius.min((high - low).min_element() / 2.0 * 0.999);
         let (middle, inner) = ((low + high) / 2.0, (high - low) / 2.0 - Vec3::splat(radius));
         let ball = |row: usize, side: usize| {
@@ -216,56 +214,60 @@ impl Mesh {
         }
         let (top, bottom) = (rows[0].clone(), rows[rows.len() - 1].clone());
         self.grid(&rows, surface);
-        self.lid(&top, Vec3::Y, surface);
-        self.lid(&bottom, Vec3::NEG_Y, surface);
+        self.cap(&top, Vec3::Y, surface);
+        self.cap(&bottom, Vec3::NEG_Y, surface);
     }
 
-    /// A flat cap over a closed ring of points.
-    fn lid(&mut self, ring: &[Vec3], normal: Vec3, surface: &Surface) {
-        let surface = self.surface(surface);
+    /// Adds a flat cap over a closed ring of points.
+    fn cap(&mut self, ring: &[Vec3], normal: Vec3, surface: &Surface) {
+        let surface = self.surface_index(surface);
         let middle = ring.iter().sum::<Vec3>() / ring.len() as f32;
         for pair in ring.windows(2) {
             self.triangle(
-                [middle, pair[0], pair[1]].map(|at| Corner { at, normal }),
+                [middle, pair[0], pair[1]].map(|position| Corner { position, normal }),
                 surface,
             );
         }
     }
 
-    /// A solid of revolution about y with sharp edges, stretched along z by the factor `depth`: (radius, height above `foot`) pairs,
-    /// from below.
-    pub(super) fn oval(
+    /// Adds a solid of revolution about y with sharp edges, stretched along z by the factor `depth`. `profile` lists (radius, height above
+    /// `foot`) pairs from the bottom to the top.
+    pub(super) fn lathe(
         &mut self,
         foot: Vec3,
         profile: &[(f32, f32)],
         depth: f32,
         surface: &Surface,
     ) {
-        // Each section between two radii has its own normals, so that the edges are sharp.
+        // Each section between two radii gets its own normals, so that the edges are sharp.
         for pair in profile.windows(2) {
-            let rings = [pair[0], pair[1]].map(|at| ring(foot, at, depth));
+            let rings =
+                [pair[0], pair[1]].map(|(radius, height)| ring(foot, radius, height, depth));
             self.grid(&rings, surface);
         }
     }
 
-    /// A smooth solid of revolution about y, stretched along z by the factor `depth`.
-    pub(super) fn vessel(
+    /// Adds a [solid of revolution](Self::lathe) without sharp edges.
+    pub(super) fn smooth_lathe(
         &mut self,
         foot: Vec3,
         profile: &[(f32, f32)],
         depth: f32,
         surface: &Surface,
     ) {
-        let rings = profile.iter().map(|at| ring(foot, *at, depth));
-        self.grid(&rings.collect::<Vec<_>>(), surface);
+        let rings: Vec<_> = profile
+            .iter()
+            .map(|(radius, height)| ring(foot, *radius, *height, depth))
+            .collect();
+        self.grid(&rings, surface);
     }
 
-    /// A cylinder between two points, with closed ends.
+    /// Adds a cylinder between two points, with closed ends.
     pub(super) fn rod(&mut self, from: Vec3, to: Vec3, radius: f32, surface: &Surface) {
         self.cone(from, to, [radius, radius], surface);
     }
 
-    /// A rod with a different radius at each end.
+    /// Adds a rod with a radius for each end.
     pub(super) fn cone(&mut self, from: Vec3, to: Vec3, radii: [f32; 2], surface: &Surface) {
         let axis = (to - from).normalize_or_zero();
         let aside = if axis.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
@@ -281,11 +283,11 @@ impl Mesh {
         };
         let (low, high) = (ring(from, radii[0]), ring(to, radii[1]));
         self.grid(&[low.clone(), high.clone()], surface);
-        self.lid(&low, -axis, surface);
-        self.lid(&high, axis, surface);
+        self.cap(&low, -axis, surface);
+        self.cap(&high, axis, surface);
     }
 
-    /// An ellipsoid by its center and its three radii.
+    /// Adds an ellipsoid, given by its center and its three radii.
     pub(super) fn ball(&mut self, middle: Vec3, radii: Vec3, surface: &Surface) {
         let rows: Vec<Vec<Vec3>> = (0..=ROWS)
             .map(|row: usize| -> Vec<Vec3> {
@@ -302,8 +304,8 @@ impl Mesh {
         self.grid(&rows, surface);
     }
 
-    /// A pillow: thick in its middle, thin at its seam. `size` is the width, height and thickness of the standing pillow; `lean`
-    /// tilts its top backwards by an angle.
+    /// Adds a pillow, thick in its middle and thin at its seam. `size` is the width, height and thickness of the upright pillow; `lean` is
+    /// the angle by which its top is tilted backwards.
     pub(super) fn pillow(&mut self, middle: Vec3, size: Vec3, lean: f32, surface: &Surface) {
         const CELLS: usize = 10;
         let tilt = cos_sin(lean);
@@ -330,7 +332,7 @@ impl Mesh {
         }
     }
 
-    /// Cloth that hangs in folds from `left`: `width` along x, `drop` downwards; `fold` is the width of one fold.
+    /// Adds cloth that hangs in folds: `width` along x from `left`, `drop` downwards; `fold` is the width of one fold.
     pub(super) fn drape(
         &mut self,
         left: Vec3,
@@ -353,54 +355,57 @@ impl Mesh {
         self.grid(&rows, surface);
     }
 
-    /// Adds another mesh, rotated about y by `angle` and moved to `at`.
-    pub(super) fn add(&mut self, other: &Self, at: Vec3, angle: f32) {
+    /// Adds another mesh, rotated about y by `angle` and then moved by `offset`.
+    pub(super) fn add(&mut self, other: &Self, offset: Vec3, angle: f32) {
         let rotation = cos_sin(angle);
-        let spin = |v: Vec3| {
+        let rotate = |v: Vec3| {
             vec3(
                 v.x * rotation.x + v.z * rotation.y,
                 v.y,
                 v.z * rotation.x - v.x * rotation.y,
             )
         };
-        let places: Vec<usize> = other.surfaces.iter().map(|s| self.surface(s)).collect();
+        let surfaces: Vec<usize> = other
+            .surfaces
+            .iter()
+            .map(|s| self.surface_index(s))
+            .collect();
         self.faces.extend(other.faces.iter().map(|face| Face {
             corners: face.corners.map(|corner| Corner {
-                at: at + spin(corner.at),
-                normal: spin(corner.normal),
+                position: offset + rotate(corner.position),
+                normal: rotate(corner.normal),
             }),
-            surface: places[face.surface],
+            surface: surfaces[face.surface],
         }));
     }
 
-    /// The mirror image at x = 0.
+    /// Returns the mirror image in the plane x = 0.
     pub(super) fn mirrored(mut self) -> Self {
         let flip = vec3(-1.0, 1.0, 1.0);
         for corner in self.faces.iter_mut().flat_map(|face| &mut face.corners) {
-            (corner.at, corner.normal) = (corner.at * flip, corner.normal * flip);
+            (corner.position, corner.normal) = (corner.position * flip, corner.normal * flip);
         }
         self
     }
 
     /// Multiplies all lengths by a factor.
     pub(super) fn scale(&mut self, factor: f32) {
-        self.faces
-            .iter_mut()
-            .flat_map(|face| &mut face.corners)
-            .for_each(|corner| corner.at *= factor);
+        for corner in self.faces.iter_mut().flat_map(|face| &mut face.corners) {
+            corner.position *= factor;
+        }
     }
 }
 
-/// The lowest and the highest corner of the bounding box of triangles.
+/// Lowest and highest corner of the bounding box of triangles.
 pub(super) fn bounds(faces: &[Face]) -> [Vec3; 2] {
     faces.iter().flat_map(|face| face.corners).fold(
         [Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)],
-        |[low, high], corner| [low.min(corner.at), high.max(corner.at)],
+        |[low, high], corner| [low.min(corner.position), high.max(corner.position)],
     )
 }
 
-/// A closed ring of points about y, by its radius and its height above `foot`; `depth` stretches it along z.
-fn ring(foot: Vec3, (radius, height): (f32, f32), depth: f32) -> Vec<Vec3> {
+/// Closed ring of points about y, given by its radius and its height above `foot`; `depth` stretches it along z.
+fn ring(foot: Vec3, radius: f32, height: f32, depth: f32) -> Vec<Vec3> {
     (0..=SIDES)
         .map(|side: usize| {
             let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);

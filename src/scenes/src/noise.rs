@@ -1,8 +1,8 @@
-//! Pseudo-random numbers of places: [`hash`] and [`noise`].
+//! Pseudo-random functions of a position: [`hash`] and [`value_noise`].
 
 use glam::Vec3;
 
-/// A pseudo-random number from 0 to 1, decided by three whole numbers.
+/// Maps three integers to a pseudo-random number from 0 to 1.
 pub(super) fn hash(x: i32, y: i32, z: i32) -> f32 {
     let mut bits = (x as u32).wrapping_mul(0x8da6_b343)
         ^ (y as u32).wrapping_mul(0xd816_3841)
@@ -13,10 +13,10 @@ pub(super) fn hash(x: i32, y: i32, z: i32) -> f32 {
     (bits >> 8) as f32 / (1_u32 << 24) as f32
 }
 
-/// Smooth noise from 0 to 1 (value noise on a lattice of whole numbers).
-pub(super) fn noise(place: Vec3) -> f32 {
-    let cell = place.floor();
-    let share = place - cell;
+/// Value noise from 0 to 1: random values at integer lattice points, interpolated smoothly.
+pub(super) fn value_noise(position: Vec3) -> f32 {
+    let cell = position.floor();
+    let share = position - cell;
     let share = share * share * (Vec3::splat(3.0) - 2.0 * share);
     let [x, y, z] = [cell.x as i32, cell.y as i32, cell.z as i32];
     let at = |i: i32, j: i32, k: i32| hash(x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k));

@@ -1,20 +1,20 @@
-//! Paints in colours that people agree on: [`Paint`].
+//! Paints in colours whose names people agree on: [`Paint`].
 
 use glam::{Vec3, vec3};
 
-use super::dice::Dice;
+use super::seeded_rng::SeededRng;
 
-/// A colour and its name.
+/// Colour and its name.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Paint {
     /// One of the eleven basic colour terms; empty if people would disagree.
     pub(super) name: &'static str,
-    /// The colour in linear light, red, green and blue.
+    /// Linear light of red, green and blue.
     pub(super) color: Vec3,
 }
 
-/// The sRGB codes of the paints of each name. The colours are strong, so that shade does not change their name.
-const NAMED: [(&str, &[[u8; 3]]); 11] = [
+/// sRGB codes of the paints of each name. The colours are strong, so that shade does not change their name.
+const PAINTS: [(&str, &[[u8; 3]]); 11] = [
     ("black", &[[24, 24, 26], [30, 28, 28]]),
     ("grey", &[[108, 108, 112], [116, 118, 118], [122, 120, 116]]),
     ("white", &[[250, 250, 248], [248, 249, 250]]),
@@ -28,8 +28,8 @@ const NAMED: [(&str, &[[u8; 3]]); 11] = [
     ("brown", &[[120, 80, 52], [110, 72, 46], [128, 88, 58]]),
 ];
 
-/// The linear light of one sRGB code (IEC 61966-2-1).
-pub(super) fn linear(code: u8) -> f32 {
+/// Linear light of one sRGB code (IEC 61966-2-1).
+fn linear(code: u8) -> f32 {
     let value = f32::from(code) / 255.0;
     if value <= 0.04045 {
         value / 12.92
@@ -38,46 +38,46 @@ pub(super) fn linear(code: u8) -> f32 {
     }
 }
 
-/// The three sRGB codes of a number in the form `0xrrggbb`.
-pub(super) fn codes(number: u32) -> [u8; 3] {
+/// sRGB codes of a number in the form `0xrrggbb`.
+pub(super) fn codes_from_hex(number: u32) -> [u8; 3] {
     [16, 8, 0].map(|shift| (number >> shift) as u8)
 }
 
-/// The linear light of three sRGB codes.
-pub(super) fn rgb([red, green, blue]: [u8; 3]) -> Vec3 {
+/// Linear light of three sRGB codes.
+pub(super) fn linear_rgb([red, green, blue]: [u8; 3]) -> Vec3 {
     vec3(linear(red), linear(green), linear(blue))
 }
 
 impl Paint {
-    /// A random paint with one of these names.
-    pub(super) fn random(names: &[&str], dice: &mut Dice) -> Self {
-        let name = dice.pick(names);
-        let (name, codes) = NAMED
+    /// Returns a random paint with one of these names.
+    pub(super) fn random(names: &[&str], rng: &mut SeededRng) -> Self {
+        let name = rng.pick(names);
+        let (name, codes) = PAINTS
             .iter()
             .find(|(known, _)| *known == name)
-            .map_or(NAMED[0], |found| *found);
+            .map_or(PAINTS[0], |found| *found);
         Self {
             name,
-            color: rgb(dice.pick(codes)),
+            color: linear_rgb(rng.pick(codes)),
         }
     }
 
-    /// A colour without a name that people agree on.
+    /// Creates a paint whose colour has no name that people agree on.
     pub(super) fn nameless(codes: [u8; 3]) -> Self {
         Self {
             name: "",
-            color: rgb(codes),
+            color: linear_rgb(codes),
         }
     }
 }
 
-/// The names of paints for furniture and textiles. One that is listed twice is twice as likely.
-pub(super) const USUAL: [&str; 16] = [
+/// Colour names for furniture and textiles. A name that is listed twice is twice as likely.
+pub(super) const COMMON_COLORS: [&str; 16] = [
     "black", "grey", "grey", "white", "white", "red", "red", "orange", "yellow", "green", "green",
     "blue", "blue", "purple", "pink", "brown",
 ];
 
-/// The eleven names of paints.
-pub(super) const ALL: [&str; 11] = [
+/// The eleven basic colour terms.
+pub(super) const ALL_COLORS: [&str; 11] = [
     "black", "grey", "white", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown",
 ];

@@ -2,12 +2,12 @@
 
 use glam::{Vec3, vec3};
 
-use super::dice::Dice;
-use super::furniture::{FurnitureSet, at};
+use super::furniture::FurnitureSet;
 use super::mesh::{Mesh, bounds};
 use super::pattern::Pattern;
 use super::scene::{Piece, Pose, Scene, kind};
-use super::shell::{Flooring, Shell, THICK, WALLS, Wall, flooring};
+use super::seeded_rng::SeededRng;
+use super::shell::{Doorway, Flooring, Shell, WALL_THICKNESS, WALLS, Wall, floor_surface};
 use super::surface::Surface;
 
 /// Rectangle of the floor in metres: minimum x and z, then maximum x and z.
@@ -43,10 +43,10 @@ pub(super) struct FloorPlan {
     pub(super) scene: Scene,
     /// Width (x), height (y) and depth (z) in metres.
     pub(super) size: Vec3,
-    pub(super) dice: Dice,
+    pub(super) rng: SeededRng,
     /// Indices of the things that the camera should look at.
     pub(super) camera_targets: Vec<usize>,
-    /// Bounding box of each thing: its lowest and its highest corner.
+    /// Bounding box of each thing: lowest and highest corner.
     pub(super) boxes: Vec<[Vec3; 2]>,
     pub(super) shell: Shell,
     /// Parts of the floor that are occupied or reserved.
@@ -59,9 +59,9 @@ pub(super) struct FloorPlan {
 const TRIES: usize = 60;
 
 impl FloorPlan {
-    /// Creates an empty room with floor and ceiling. [`FloorPlan::walls`] adds the walls once all doorways are known.
-    pub(super) fn new(size: Vec3, ground: Flooring, tiled: bool, mut dice: Dice) -> Self {
-        let shell = Shell::new(tiled, &mut dice);
+    /// Creates an empty room with floor and ceiling. [`FloorPlan::add_walls`] adds the walls once all doorways are known.
+    pub(super) fn new(size: Vec3, flooring: Flooring, tiled: bool, mut rng: SeededRng) -> Self {
+        let shell = Shell::new(tiled, &mut rng);
         let mut plan = Self {
             scene: Scene::default(),
             size,
@@ -70,44 +70,45 @@ impl FloorPlan {
             shell,
             areas: Vec::new(),
             patches: Vec::new(),
-            dice,
+            rng,
         };
-        plan.floor_and_ceiling(ground);
+        plan.add_floor_and_ceiling(flooring);
         plan
     }
 
-    pub(super) fn floor_and_ceiling(&mut self, ground: Flooring) {
+    fn add_floor_and_ceiling(&mut self, flooring: Flooring) {
         let size = self.size;
-        let surface = flooring(ground, &mut self.dice);
+        let surface = floor_surface(flooring, &mut self.rng);
         let mut mesh = Mesh::default();
         mesh.block(vec3(0.0, -0.05, 0.0), vec3(size.x, 0.0, size.z), &surface);
         let floor = Piece::new(kind("floor", "floor"), mesh, "");
-        self.add(floor, at(Vec3::ZERO, 0.0));
-        let white = Surface::plain([216, 214, 208]).with(Pattern::Plaster);
+        self.add(floor, Pose::new(Vec3::ZERO, 0.0));
+        let white = Surface::plain([216, 214, 208]).with_pattern(Pattern::Plaster);
         let mut mesh = Mesh::default();
         let top = vec3(size.x, size.y + 0.05, size.z);
         mesh.block(vec3(0.0, size.y, 0.0), top, &white);
         let ceiling = Piece::new(kind("ceiling", "ceiling"), mesh, "");
-        self.add(ceiling, at(Vec3::ZERO, 0.0));
+        self.add(ceiling, Pose::new(Vec3::ZERO, 0.0));
     }
 
     /// Adds the four walls, cut out at the doorways.
-    pub(super) fn walls(&mut self) {
+    pub(super) fn add_walls(&mut self) {
         for (i, wall) in WALLS.into_iter().enumerate() {
-            let width = self.width(wall);
-            let mut openings: Vec<([f32; 2], f32)> = self
+            let width = self.wall_length(wall);
+            let mut doorways: Vec<Doorway> = self
                 .shell
                 .doorways
                 .iter()
-                .filter(|(doorway_wall, ..)| *doorway_wall == wall)
-                .map(|(_, along, top)| (along.map(|x| x - width / 2.0), *top))
+                .filter(|doorway| doorway.wall == wall)
+                .copied()
                 .collect();
-            openings.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
-            let [left, right] = [-width / 2.0 - THICK, width / 2.0 + THICK];
+            doorways.sort_by(|a, b| a.along[0].total_cmp(&b.along[0]));
+            let [left, right] = [-width / 2.0 - WALL_THICKNESS, width / 2.0 + WALL_THICKNESS];
             let (mut mesh, mut built_to) = (Mesh::default(), left);
-            for ([start, end], top) in openings {
+            for doorway in doorways {
+                let [start, end] = doorway.along.map(|x| x - width / 2.0);
                 self.add_panel(&mut mesh, i, [built_to, start], 0.0);
-                self.add_panel(&mut mesh, i, [start, end], top);
+                self.add_panel(&mut mesh, i, [start, end], doorway.top);
                 built_to = end;
             }
             self.add_panel(&mut mesh, i, [built_to, right], 0.0);
@@ -116,11 +117,15 @@ impl FloorPlan {
         }
     }
 
-    /// Adds the part of a wall between `left` and `right` to its mesh, from the height `bottom` up to the ceiling. Metres.
+    /// Adds the part of a wall between `left` and `right` to its mesh, from the height `bottom` up to the ceiling, in metres.
     fn add_panel(&self, mesh: &mut Mesh, wall: usize, [left, right]: [f32; 2], bottom: f32) {
         let shell = &self.shell;
         let corner = vec3(right, self.size.y, 0.0);
-        mesh.block(vec3(left, bottom, -THICK), corner, &shell.walls[wall]);
+        mesh.block(
+            vec3(left, bottom, -WALL_THICKNESS),
+            corner,
+            &shell.walls[wall],
+        );
         let mut layer = |surface: &Surface, top: f32, depth: f32| {
             if top > bottom {
                 mesh.block(vec3(left, bottom, 0.0), vec3(right, top, depth), surface);
@@ -136,7 +141,7 @@ impl FloorPlan {
     }
 
     /// Length of a wall in metres.
-    pub(super) fn width(&self, wall: Wall) -> f32 {
+    pub(super) fn wall_length(&self, wall: Wall) -> f32 {
         match wall {
             Wall::North | Wall::South => self.size.x,
             Wall::East | Wall::West => self.size.z,
@@ -145,13 +150,13 @@ impl FloorPlan {
 
     /// Pose of a piece with its back at a wall, `along` metres from the left end of the wall and `up` metres above the floor.
     pub(super) fn wall_pose(&self, wall: Wall, along: f32, up: f32) -> Pose {
-        let place = match wall {
+        let position = match wall {
             Wall::North => vec3(along, up, 0.0),
             Wall::East => vec3(self.size.x, up, along),
             Wall::South => vec3(self.size.x - along, up, self.size.z),
             Wall::West => vec3(0.0, up, self.size.z - along),
         };
-        at(place, wall.angle())
+        Pose::new(position, wall.angle())
     }
 
     /// Adds a piece without checking for free space. Returns its index.
@@ -163,27 +168,27 @@ impl FloorPlan {
         self.scene.things.len() - 1
     }
 
-    /// Adds a piece on or next to another one, whose pose is `base`; `place` is in the coordinates of `base`. Returns its index.
+    /// Adds a piece on or next to another one, whose pose is `base`; `position` is in the coordinates of `base`. Returns its index.
     pub(super) fn add_relative(
         &mut self,
         base: &Pose,
         piece: Piece,
-        place: Vec3,
+        position: Vec3,
         angle: f32,
     ) -> usize {
-        self.add(piece, at(base.to_room(place), base.angle + angle))
+        self.add(piece, Pose::new(base.to_room(position), base.angle + angle))
     }
 
     /// Adds a set without checking for free space. Returns the index of its first piece.
     pub(super) fn add_set(&mut self, set: FurnitureSet, pose: &Pose) -> usize {
         let first = self.scene.things.len();
         for (piece, relative) in set.pieces {
-            self.add_relative(pose, piece, relative.at, relative.angle);
+            self.add_relative(pose, piece, relative.position, relative.angle);
         }
         first
     }
 
-    /// Floor area of a box of this size. Its back is `from` metres in front of the pose; the angle must be a multiple of 90°.
+    /// Floor area of a box of this size, whose back is `from` metres in front of the pose. The angle must be a multiple of 90°.
     fn footprint(pose: &Pose, size: Vec3, from: f32) -> FloorArea {
         let corners = [
             vec3(-size.x / 2.0, 0.0, from),
@@ -215,7 +220,7 @@ impl FloorPlan {
         })
     }
 
-    /// Places a set with its middle `along` metres from the left end of a wall. Returns its pose; `None` if something is in the way.
+    /// Places a set at a wall, with its middle `along` metres from the left end. Returns its pose; `None` if something is in the way.
     pub(super) fn try_place_at_wall(
         &mut self,
         set: FurnitureSet,
@@ -223,7 +228,7 @@ impl FloorPlan {
         along: f32,
     ) -> Option<Pose> {
         let pose = self.wall_pose(wall, along, 0.0);
-        let pose = at(pose.to_room(vec3(0.0, 0.0, 0.016)), pose.angle);
+        let pose = Pose::new(pose.to_room(vec3(0.0, 0.0, 0.016)), pose.angle);
         let area = Self::footprint(&pose, set.size, 0.0);
         let half = set.size.x / 2.0;
         let patch = WallPatch::around(wall, along, half, [0.0, set.size.y + 0.02]);
@@ -236,39 +241,39 @@ impl FloorPlan {
         Some(pose)
     }
 
-    /// Places a set at a random place of one of these walls. Returns its pose; `None` without free space.
-    pub(super) fn stand(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
+    /// Places a set at a random position along one of these walls. Returns its pose; `None` without free space.
+    pub(super) fn place_at_wall(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
-            let wall = self.dice.pick(choices);
+            let wall = self.rng.pick(choices);
             let half = set.size.x / 2.0 + 0.03;
-            let along = self.dice.between(half, self.width(wall) - half);
+            let along = self.rng.between(half, self.wall_length(wall) - half);
             self.try_place_at_wall(set.clone(), wall, along)
         })
     }
 
     /// Places a set in a random corner, with its back to one of these walls. Returns its pose; `None` without free space.
-    pub(super) fn corner(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
+    pub(super) fn place_in_corner(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
-            let wall = self.dice.pick(choices);
+            let wall = self.rng.pick(choices);
             let half = set.size.x / 2.0 + 0.04;
-            let along = if self.dice.chance(0.5) {
+            let along = if self.rng.chance(0.5) {
                 half
             } else {
-                self.width(wall) - half
+                self.wall_length(wall) - half
             };
             self.try_place_at_wall(set.clone(), wall, along)
         })
     }
 
-    /// Places a set away from walls, centred on a place. Returns its pose; `None` if something is in the way.
+    /// Places a set away from walls, centred on a position. Returns its pose; `None` if something is in the way.
     pub(super) fn place_away_from_walls(
         &mut self,
         set: FurnitureSet,
-        place: Vec3,
+        position: Vec3,
         angle: f32,
     ) -> Option<Pose> {
-        let back = at(place, angle).to_room(vec3(0.0, 0.0, -set.size.z / 2.0));
-        let pose = at(back, angle);
+        let back = Pose::new(position, angle).to_room(vec3(0.0, 0.0, -set.size.z / 2.0));
+        let pose = Pose::new(back, angle);
         let area = Self::footprint(&pose, set.size, 0.0);
         if !self.is_free(&area) {
             return None;
@@ -278,12 +283,12 @@ impl FloorPlan {
         Some(pose)
     }
 
-    /// Reserves a part of a wall: nothing is hung or placed there.
+    /// Reserves a part of a wall, so that nothing is hung or placed there.
     pub(super) fn reserve_wall(&mut self, patch: WallPatch) {
         self.patches.push(patch);
     }
 
-    /// Reserves a part of the floor, from `from` metres in front of a pose. Later sets are kept out of it.
+    /// Reserves a part of the floor, starting `from` metres in front of a pose, so that later sets are kept out of it.
     pub(super) fn reserve_floor(&mut self, pose: &Pose, size: Vec3, from: f32) {
         let area = Self::footprint(pose, size, from);
         self.areas.push(area);
@@ -294,8 +299,8 @@ impl FloorPlan {
         let [low, high] = bounds(&piece.mesh.faces);
         let half = high.x.max(-low.x) + 0.06;
         (0..TRIES).find_map(|_| {
-            let wall = self.dice.pick(choices);
-            let along = self.dice.between(half, self.width(wall) - half);
+            let wall = self.rng.pick(choices);
+            let along = self.rng.between(half, self.wall_length(wall) - half);
             let patch =
                 WallPatch::around(wall, along, half, [up + low.y - 0.05, up + high.y + 0.05]);
             self.is_free_on_wall(&patch).then(|| {
@@ -315,10 +320,10 @@ impl FloorPlan {
             .find(|wall| (wall.angle() - pose.angle).abs() < 1e-3);
         if let Some(wall) = wall {
             let along = match wall {
-                Wall::North => pose.at.x,
-                Wall::South => self.size.x - pose.at.x,
-                Wall::East => pose.at.z,
-                Wall::West => self.size.z - pose.at.z,
+                Wall::North => pose.position.x,
+                Wall::South => self.size.x - pose.position.x,
+                Wall::East => pose.position.z,
+                Wall::West => self.size.z - pose.position.z,
             };
             self.patches.push(WallPatch {
                 wall,
@@ -329,12 +334,12 @@ impl FloorPlan {
         self.add_relative(pose, piece, vec3(0.0, up, 0.0), 0.0)
     }
 
-    /// True if a place of the floor is at least `margin` metres from walls and furniture, so that a camera fits.
-    pub(super) fn has_room_for_camera(&self, place: Vec3, margin: f32) -> bool {
-        let point = FloorArea([place.x, place.z, place.x, place.z]);
+    /// True if a position is at least `margin` metres from walls and furniture, so that a camera fits.
+    pub(super) fn has_room_for_camera(&self, position: Vec3, margin: f32) -> bool {
+        let point = FloorArea([position.x, position.z, position.x, position.z]);
         let inside = |value: f32, end: f32| (margin..=end - margin).contains(&value);
-        inside(place.x, self.size.x)
-            && inside(place.z, self.size.z)
+        inside(position.x, self.size.x)
+            && inside(position.z, self.size.z)
             && !self.areas.iter().any(|area| area.overlaps(&point, margin))
     }
 }

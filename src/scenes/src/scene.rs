@@ -1,30 +1,43 @@
-//! A room with everything in it: [`Scene`], made of [`Thing`]s.
+//! A furnished room: [`Scene`], made of [`Thing`]s.
 
 use glam::{Vec3, vec3};
 
 use super::bvh::Bvh;
 use super::mesh::{Mesh, cos_sin};
 use super::surface::{Surface, SurfaceFinish};
+use darkqa_ground::types::SegmentName;
 
-/// The word and the class of a thing.
+/// Word and class of a thing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ThingKind {
-    /// The name of the thing, as `coffee table`.
+    /// Name of the thing, such as `coffee table`.
     pub(super) word: &'static str,
-    /// The class of the thing in mpcat40.
+    /// Class of the thing in mpcat40.
     pub(super) class: &'static str,
 }
 
+impl ThingKind {
+    /// Name of a segment that shows such a thing.
+    pub(super) fn segment_name(&self) -> SegmentName {
+        SegmentName {
+            name: self.word.to_owned(),
+            canonical: self.class.to_owned(),
+            region: None,
+        }
+    }
+}
+
+/// Creates a [`ThingKind`].
 pub(super) const fn kind(word: &'static str, class: &'static str) -> ThingKind {
     ThingKind { word, class }
 }
 
-/// A thing before it has a place in the room.
+/// A thing that is not yet placed in the room.
 #[derive(Debug, Clone)]
 pub(super) struct Piece {
     pub(super) kind: ThingKind,
     pub(super) mesh: Mesh,
-    /// The name of its main colour; empty if there is none.
+    /// Name of the main colour; empty if people would not agree on one.
     pub(super) color: &'static str,
     pub(super) light: Option<LightSource>,
 }
@@ -39,27 +52,31 @@ impl Piece {
         }
     }
 
-    /// The piece with another word for it.
-    pub(super) fn named(mut self, word: &'static str) -> Self {
+    /// Returns the piece with another word.
+    pub(super) fn with_word(mut self, word: &'static str) -> Self {
         self.kind.word = word;
         self
     }
 }
 
-/// The position of a piece in metres, and its rotation about y in radians.
+/// Position of a piece in metres, and its rotation about y in radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pose {
-    pub(super) at: Vec3,
+    pub(super) position: Vec3,
     pub(super) angle: f32,
 }
 
 impl Pose {
-    /// A point of the room in the coordinates of the piece.
-    pub(super) fn to_piece(self, place: Vec3) -> Vec3 {
-        self.direction_to_piece(place - self.at)
+    pub(super) fn new(position: Vec3, angle: f32) -> Self {
+        Self { position, angle }
     }
 
-    /// A direction of the room in the coordinates of the piece.
+    /// Transforms a point from room coordinates to those of the piece.
+    pub(super) fn to_piece(self, point: Vec3) -> Vec3 {
+        self.direction_to_piece(point - self.position)
+    }
+
+    /// Rotates a direction from room coordinates to those of the piece.
     pub(super) fn direction_to_piece(&self, v: Vec3) -> Vec3 {
         let rotation = cos_sin(self.angle);
         vec3(
@@ -69,10 +86,10 @@ impl Pose {
         )
     }
 
-    /// A point of the piece in the coordinates of the room.
+    /// Transforms a point from the coordinates of the piece to room coordinates.
     pub(super) fn to_room(self, v: Vec3) -> Vec3 {
         let rotation = cos_sin(self.angle);
-        self.at
+        self.position
             + vec3(
                 v.x * rotation.x + v.z * rotation.y,
                 v.y,
@@ -81,7 +98,7 @@ impl Pose {
     }
 }
 
-/// A piece at its place in the room.
+/// A piece that is placed in the room.
 #[derive(Debug, Clone)]
 pub(super) struct Thing {
     pub(super) kind: ThingKind,
@@ -89,17 +106,17 @@ pub(super) struct Thing {
     pub(super) pose: Pose,
 }
 
-/// A light of the room.
+/// A light source of the room.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum LightSource {
-    /// A flat light, as the daylight in a window: a corner, two edges, the direction it shines in, and radiance by channel.
+    /// A flat light, such as the daylight in a window: a corner, two edges, the direction it shines in, and radiance by channel.
     Panel {
         corner: Vec3,
         edges: [Vec3; 2],
         normal: Vec3,
         radiance: Vec3,
     },
-    /// A sphere of light, as a bulb: center and radius in metres, and radiance by channel.
+    /// A glowing sphere, such as a bulb: center and radius in metres, and radiance by channel.
     Bulb {
         middle: Vec3,
         radius: f32,
@@ -108,8 +125,8 @@ pub(super) enum LightSource {
 }
 
 impl LightSource {
-    /// The light of a piece in the coordinates of the room.
-    fn placed(self, pose: &Pose) -> Self {
+    /// Transforms the light of a piece to room coordinates.
+    fn to_room(self, pose: &Pose) -> Self {
         match self {
             Self::Panel {
                 corner,
@@ -117,7 +134,7 @@ impl LightSource {
                 normal,
                 radiance,
             } => {
-                let turned = |v: Vec3| pose.to_room(v) - pose.at;
+                let turned = |v: Vec3| pose.to_room(v) - pose.position;
                 Self::Panel {
                     corner: pose.to_room(corner),
                     edges: edges.map(turned),
@@ -138,28 +155,29 @@ impl LightSource {
     }
 }
 
-/// A room with everything in it.
+/// A furnished room.
 #[derive(Debug, Default)]
 pub(super) struct Scene {
-    /// The things in the order of their segment numbers, which start at 1.
+    /// All things, in order of their segment numbers, which start at 1.
     pub(super) things: Vec<Thing>,
     pub(super) lights: Vec<LightSource>,
-    /// The triangles of all things.
+    /// Triangles of all things.
     pub(super) mesh: Mesh,
-    /// The index of the thing that each face belongs to.
-    pub(super) owners: Vec<usize>,
-    /// The index of the thing that each light belongs to.
-    lamps: Vec<usize>,
+    /// Index of the thing that each face belongs to.
+    pub(super) face_owners: Vec<usize>,
+    /// Index of the thing that each light belongs to.
+    light_owners: Vec<usize>,
 }
 
 impl Scene {
-    /// Adds a piece with a pose.
+    /// Adds a piece at a pose.
     pub(super) fn add(&mut self, piece: &Piece, pose: Pose) {
-        self.mesh.add(&piece.mesh, pose.at, pose.angle);
-        self.owners.resize(self.mesh.faces.len(), self.things.len());
+        self.mesh.add(&piece.mesh, pose.position, pose.angle);
+        self.face_owners
+            .resize(self.mesh.faces.len(), self.things.len());
         if let Some(light) = piece.light {
-            self.lights.push(light.placed(&pose));
-            self.lamps.push(self.things.len());
+            self.lights.push(light.to_room(&pose));
+            self.light_owners.push(self.things.len());
         }
         self.things.push(Thing {
             kind: piece.kind,
@@ -168,18 +186,18 @@ impl Scene {
         });
     }
 
-    /// Radiance of each light source: of a window that of the daylight, and of a lamp that of its shade. The flux of a bulb, 4π²r² times
-    /// its radiance, leaves through the shade, which is modelled as a Lambertian surface: π times its area times its radiance.
+    /// Radiance of each thing: of the daylight for a window, of the shade for a lamp, `None` for other things. The flux of a bulb, 4π²r²
+    /// times its radiance, leaves through the shade, which is modelled as a Lambertian surface: π times its area times its radiance.
     pub(super) fn radiances(&self) -> Vec<Option<Vec3>> {
         let mut areas = vec![0.0_f32; self.things.len()];
-        for (place, (face, owner)) in self.mesh.faces.iter().zip(&self.owners).enumerate() {
-            if matches!(self.surface(place).finish, SurfaceFinish::Glow(_)) {
-                let [a, b, c] = face.corners.map(|corner| corner.at);
+        for (index, (face, owner)) in self.mesh.faces.iter().zip(&self.face_owners).enumerate() {
+            if matches!(self.surface(index).finish, SurfaceFinish::Glow(_)) {
+                let [a, b, c] = face.corners.map(|corner| corner.position);
                 areas[*owner] += (b - a).cross(c - a).length() / 2.0;
             }
         }
         let mut radiances = vec![None; self.things.len()];
-        for (light, owner) in self.lights.iter().zip(&self.lamps) {
+        for (light, owner) in self.lights.iter().zip(&self.light_owners) {
             radiances[*owner] = match *light {
                 LightSource::Panel { radiance, .. } => Some(radiance),
                 LightSource::Bulb {
@@ -194,19 +212,19 @@ impl Scene {
         radiances
     }
 
-    /// The surface of a face.
+    /// Surface of a face, given by its index.
     pub(super) fn surface(&self, face: usize) -> &Surface {
         &self.mesh.surfaces[self.mesh.faces[face].surface]
     }
 
-    /// The tree over all faces, for tracing rays.
+    /// Builds the tree over all faces, for tracing rays.
     pub(super) fn tree(&self) -> Bvh {
         Bvh::new(self.mesh.faces.iter().map(|face| {
-            let clear = matches!(
+            let passes_light = matches!(
                 self.mesh.surfaces[face.surface].finish,
                 SurfaceFinish::Glow(_)
             );
-            (face.corners.map(|corner| corner.at), clear)
+            (face.corners.map(|corner| corner.position), passes_light)
         }))
     }
 }

@@ -9,17 +9,17 @@ use super::room_light::RoomLight;
 use darkqa_ground::error::Result;
 use darkqa_ground::types::Decides;
 
-/// The settings of the rooms, as `frames=48,seed=7,size=1280x720`.
+/// Settings of the rooms, such as `frames=48,seed=7,size=1280x720`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct Rooms {
     /// The number of frames, two of each room
-    #[arg(long, value_name = "N", value_parser = frames, default_value = "48", add = Decides::Trials)]
+    #[arg(long, value_name = "N", value_parser = parse_frames, default_value = "48", add = Decides::Trials)]
     pub frames: usize,
     /// The seed of the rooms
     #[arg(long, value_name = "N", default_value_t = 7, add = Decides::Pixels)]
     pub seed: u64,
     /// Width and height in pixels
-    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = size, default_value = "640x480", add = Decides::Pixels)]
+    #[arg(long, value_name = "WIDTHxHEIGHT", value_parser = parse_size, default_value = "640x480", add = Decides::Pixels)]
     pub size: [usize; 2],
     /// Encoding of the pixels; with linear light, OpenEXR files are written beside the PNG files
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
@@ -37,10 +37,10 @@ impl Default for Rooms {
     }
 }
 
-/// The maximum width and height of a frame in pixels (chosen).
-const LONGEST: usize = 8192;
-/// The maximum number of frames (chosen).
-const MOST: usize = 1_000_000;
+/// Maximum width and height of a frame, in pixels (chosen).
+const MAX_SIDE: usize = 8192;
+/// Maximum number of frames (chosen).
+const MAX_FRAMES: usize = 1_000_000;
 
 impl fmt::Display for Rooms {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -66,16 +66,16 @@ impl FromStr for Rooms {
             let (key, value) = part.split_once('=').unwrap_or((part, ""));
             let wrong = |expected: String| format!("{key}={value}: {expected}");
             match (key.trim(), value.trim()) {
-                ("frames", value) => rooms.frames = frames(value).map_err(wrong)?,
+                ("frames", value) => rooms.frames = parse_frames(value).map_err(wrong)?,
                 ("seed", value) => {
-                    let seed = value.parse();
-                    rooms.seed = seed.map_err(|_| wrong("a whole number expected".to_owned()))?;
+                    rooms.seed = value
+                        .parse()
+                        .map_err(|_| wrong("a whole number expected".to_owned()))?;
                 }
-                ("size", value) => rooms.size = size(value).map_err(wrong)?,
+                ("size", value) => rooms.size = parse_size(value).map_err(wrong)?,
                 ("light", value) => {
-                    let light = RoomLight::from_str(value, false);
-                    rooms.light =
-                        light.map_err(|_| wrong("display or linear expected".to_owned()))?;
+                    rooms.light = RoomLight::from_str(value, false)
+                        .map_err(|_| wrong("display or linear expected".to_owned()))?;
                 }
                 _ => {
                     return Err(wrong(
@@ -88,24 +88,26 @@ impl FromStr for Rooms {
     }
 }
 
-/// The number of frames in a text.
-fn frames(text: &str) -> Result<usize, String> {
-    let frames = text.parse().ok();
-    frames
-        .filter(|frames| (1..=MOST).contains(frames))
-        .ok_or_else(|| format!("a number from 1 to {MOST} expected"))
+/// Parses a number of frames.
+fn parse_frames(text: &str) -> Result<usize, String> {
+    text.parse()
+        .ok()
+        .filter(|frames| (1..=MAX_FRAMES).contains(frames))
+        .ok_or_else(|| format!("a number from 1 to {MAX_FRAMES} expected"))
 }
 
-/// The width and height in a text, in pixels.
-fn size(text: &str) -> Result<[usize; 2], String> {
-    let pixels = |text: &str| {
-        let pixels = text.parse().ok();
-        pixels.filter(|pixels| (32..=LONGEST).contains(pixels))
-    };
-    let sides = text.split_once('x');
-    sides
-        .and_then(|(width, height)| Some([pixels(width)?, pixels(height)?]))
-        .ok_or_else(|| format!("WIDTHxHEIGHT of 32 to {LONGEST} pixels expected"))
+/// Parses a width and height in pixels, such as `640x480`.
+fn parse_size(text: &str) -> Result<[usize; 2], String> {
+    text.split_once('x')
+        .and_then(|(width, height)| Some([parse_side(width)?, parse_side(height)?]))
+        .ok_or_else(|| format!("WIDTHxHEIGHT of 32 to {MAX_SIDE} pixels expected"))
+}
+
+/// Parses a width or a height in pixels; `None` if it is out of range.
+fn parse_side(text: &str) -> Option<usize> {
+    text.parse()
+        .ok()
+        .filter(|side| (32..=MAX_SIDE).contains(side))
 }
 
 #[cfg(test)]

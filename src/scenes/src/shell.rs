@@ -1,13 +1,13 @@
-//! The shell of a room: floor, ceiling and walls with their doorways ([`Shell`]).
+//! Surfaces of floor and walls, and doorways: [`Shell`].
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use super::dice::Dice;
-use super::paint::{codes, rgb};
+use super::paint::{codes_from_hex, linear_rgb};
 use super::pattern::Pattern;
+use super::seeded_rng::SeededRng;
 use super::surface::Surface;
 
-/// A wall of the room. North is at z = 0.
+/// A wall of the room; the north wall is at z = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wall {
     North,
@@ -19,7 +19,7 @@ pub(super) enum Wall {
 pub(super) const WALLS: [Wall; 4] = [Wall::North, Wall::East, Wall::South, Wall::West];
 
 impl Wall {
-    /// The rotation in radians of a piece with its back to the wall.
+    /// Rotation in radians of a piece with its back to the wall.
     pub(super) fn angle(self) -> f32 {
         match self {
             Self::North => 0.0,
@@ -37,9 +37,17 @@ impl Wall {
             Self::West => Self::East,
         }
     }
+
+    /// The two adjacent walls.
+    pub(super) fn neighbours(self) -> [Self; 2] {
+        match self {
+            Self::North | Self::South => [Self::East, Self::West],
+            Self::East | Self::West => [Self::North, Self::South],
+        }
+    }
 }
 
-/// The kind of floor.
+/// Kind of floor covering.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Flooring {
     Wood,
@@ -47,106 +55,120 @@ pub(super) enum Flooring {
     Carpet,
 }
 
-/// The thickness of walls in metres.
-pub(super) const THICK: f32 = 0.1;
+/// Thickness of walls in metres.
+pub(super) const WALL_THICKNESS: f32 = 0.1;
 
-/// The surfaces of the walls, and the doorways in them.
+/// A doorway in a wall.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Doorway {
+    pub(super) wall: Wall,
+    /// Left and right edge in metres along the wall.
+    pub(super) along: [f32; 2],
+    /// Height in metres.
+    pub(super) top: f32,
+}
+
+/// Surfaces of the walls, and the doorways in them.
 #[derive(Debug)]
 pub(super) struct Shell {
     pub(super) walls: [Surface; 4],
     /// Covering of the lower part of all walls, with its height in metres; `None` for a uniform wall.
     pub(super) lower: Option<(Surface, f32)>,
     pub(super) skirting: Surface,
-    /// The doorways: their wall, their two sides along it, and their height.
-    pub(super) doorways: Vec<(Wall, [f32; 2], f32)>,
+    pub(super) doorways: Vec<Doorway>,
 }
 
-/// The sRGB codes of paints for walls.
-const TINTS: [u32; 14] = [
+/// sRGB codes of paints for walls.
+const WALL_PAINTS: [u32; 14] = [
     0xcec6b8, 0xc2b8a8, 0xb8bcb6, 0xbaa892, 0x96a298, 0x9eaab8, 0xccba9c, 0x88949e, 0xb88e76,
     0xd2ccc0, 0x8a9078, 0xb0a0a4, 0x787e86, 0xc4b080,
 ];
 
-/// The sRGB codes of floors: boards, tiles and carpets.
+/// sRGB codes of floors: boards, tiles and carpets.
 const BOARDS: [u32; 6] = [0x9e7046, 0x765032, 0xb08a60, 0x84705c, 0x5c3e2a, 0x92623e];
 const TILES: [u32; 6] = [0xb0aaa0, 0x808082, 0xa89680, 0x606266, 0x967058, 0xbab0a0];
 const CARPETS: [u32; 6] = [0x9c9080, 0x6e707a, 0x8a7a6c, 0x565c68, 0x7e5c54, 0x687060];
 
 impl Shell {
-    /// Random surfaces; `tiled` walls have tiles up to 1.3 to 2.1 metres.
-    pub(super) fn new(tiled: bool, dice: &mut Dice) -> Self {
-        let tint = rgb(codes(dice.pick(&TINTS)));
-        let base = Surface::plain([0; 3]).with(Pattern::Plaster);
+    /// Chooses random surfaces. If `tiled`, the lower 1.3 to 2.1 m of the walls are tiled.
+    pub(super) fn new(tiled: bool, rng: &mut SeededRng) -> Self {
+        let tint = linear_rgb(codes_from_hex(rng.pick(&WALL_PAINTS)));
+        let base = Surface::plain([0; 3]).with_pattern(Pattern::Plaster);
         let plaster = Surface {
             color: tint,
             ..base.clone()
         };
-        let other = tint * dice.between(0.66, 0.84);
-        let paper = match dice.below(9) {
-            0 => Pattern::Stripes(dice.between(0.04, 0.12), other),
-            1 | 2 => Pattern::Print(dice.between(0.1, 0.26), other),
-            3 => Pattern::Checks(dice.between(0.05, 0.12)),
+        let other = tint * rng.between(0.66, 0.84);
+        let paper = match rng.below(9) {
+            0 => Pattern::Stripes(rng.between(0.04, 0.12), other),
+            1 | 2 => Pattern::Flowers(rng.between(0.1, 0.26), other),
+            3 => Pattern::Checks(rng.between(0.05, 0.12)),
             4 => Pattern::Masonry,
             _ => Pattern::Plaster,
         };
-        let mut walls = [(); 4].map(|()| plaster.with(paper));
+        let mut walls = [(); 4].map(|()| plaster.with_pattern(paper));
         // One wall may differ from the others.
-        let accent = dice.pick(&[[140, 92, 74], [150, 138, 120], [104, 84, 66], [76, 88, 96]]);
-        let stone = match dice.below(8) {
-            0 => Some(Pattern::Tiles([0.24, 0.08], rgb([176, 170, 160]))),
+        let accent = rng.pick(&[[140, 92, 74], [150, 138, 120], [104, 84, 66], [76, 88, 96]]);
+        let stone = match rng.below(8) {
+            0 => Some(Pattern::Tiles([0.24, 0.08], linear_rgb([176, 170, 160]))),
             1 => Some(Pattern::Masonry),
             2 => Some(Pattern::Boards(1, 0.14)),
             3 => Some(Pattern::Plaster),
             _ => None,
         };
         if let Some(stone) = stone {
-            walls[dice.below(4)] = Surface::plain(accent).with(stone);
+            walls[rng.below(4)] = Surface::plain(accent).with_pattern(stone);
         }
-        let glaze = dice.pick(&[
+        let glaze = rng.pick(&[
             [182, 194, 196],
             [150, 172, 168],
             [192, 184, 168],
             [140, 152, 168],
         ]);
-        let side = dice.pick(&[[0.2, 0.2], [0.15, 0.15], [0.3, 0.1], [0.25, 0.4]]);
-        let wood = dice.pick(&[[110, 78, 54], [168, 160, 144], [88, 98, 96]]);
+        let side = rng.pick(&[[0.2, 0.2], [0.15, 0.15], [0.3, 0.1], [0.25, 0.4]]);
+        let wood = rng.pick(&[[110, 78, 54], [168, 160, 144], [88, 98, 96]]);
         let lower = if tiled {
-            let tiles = Pattern::Tiles(side, rgb([208, 204, 196]));
-            Some((Surface::plain(glaze).with(tiles), dice.between(1.3, 2.1)))
+            let tiles = Pattern::Tiles(side, linear_rgb([208, 204, 196]));
+            Some((
+                Surface::plain(glaze).with_pattern(tiles),
+                rng.between(1.3, 2.1),
+            ))
         } else {
-            let panels = Surface::plain(wood).with(Pattern::Boards(1, 0.1));
-            dice.chance(0.15).then_some((panels, 0.9))
+            let panels = Surface::plain(wood).with_pattern(Pattern::Boards(1, 0.1));
+            rng.chance(0.15).then_some((panels, 0.9))
         };
         Self {
             walls,
             lower,
-            skirting: Surface::plain(dice.pick(&[[188, 184, 174], [96, 66, 44], [150, 146, 138]])),
+            skirting: Surface::plain(rng.pick(&[[188, 184, 174], [96, 66, 44], [150, 146, 138]])),
             doorways: Vec::new(),
         }
     }
 }
 
-/// The surface of a floor.
-pub(super) fn flooring(ground: Flooring, dice: &mut Dice) -> Surface {
-    match ground {
+/// Chooses a random surface for a floor.
+pub(super) fn floor_surface(flooring: Flooring, rng: &mut SeededRng) -> Surface {
+    match flooring {
         Flooring::Wood => {
-            let width = dice.between(0.07, 0.16);
-            let axis = dice.pick(&[0, 2]);
-            Surface::plain(codes(dice.pick(&BOARDS))).with(Pattern::Boards(axis, width))
+            let width = rng.between(0.07, 0.16);
+            let axis = rng.pick(&[0, 2]);
+            Surface::plain(codes_from_hex(rng.pick(&BOARDS)))
+                .with_pattern(Pattern::Boards(axis, width))
         }
         Flooring::Tiles => {
-            let side = dice.between(0.15, 0.4);
-            let joint = rgb(dice.pick(&[[110, 106, 100], [198, 194, 186]]));
-            Surface::plain(codes(dice.pick(&TILES))).with(Pattern::Tiles([side, side], joint))
+            let side = rng.between(0.15, 0.4);
+            let joint = linear_rgb(rng.pick(&[[110, 106, 100], [198, 194, 186]]));
+            Surface::plain(codes_from_hex(rng.pick(&TILES)))
+                .with_pattern(Pattern::Tiles([side, side], joint))
         }
         Flooring::Carpet => {
-            let surface = Surface::plain(codes(dice.pick(&CARPETS)));
-            match dice.below(3) {
+            let surface = Surface::plain(codes_from_hex(rng.pick(&CARPETS)));
+            match rng.below(3) {
                 0 => {
-                    let other = surface.color * dice.between(0.6, 0.8);
-                    surface.with(Pattern::Print(dice.between(0.1, 0.3), other))
+                    let other = surface.color * rng.between(0.6, 0.8);
+                    surface.with_pattern(Pattern::Flowers(rng.between(0.1, 0.3), other))
                 }
-                _ => surface.with(Pattern::Pile),
+                _ => surface.with_pattern(Pattern::Pile),
             }
         }
     }

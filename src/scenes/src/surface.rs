@@ -2,29 +2,29 @@
 
 use glam::Vec3;
 
-use super::dice::Dice;
-use super::paint::{Paint, rgb};
+use super::paint::{Paint, linear_rgb};
 use super::pattern::Pattern;
+use super::seeded_rng::SeededRng;
 
 /// The material of a face.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Surface {
-    /// The share of linear light that the surface reflects, by channel, before the pattern changes it.
+    /// Share of linear light that the surface reflects, by channel, before the pattern is applied.
     pub(super) color: Vec3,
     pub(super) pattern: Pattern,
     pub(super) finish: SurfaceFinish,
 }
 
-/// The way in which a surface reflects light.
+/// How a surface reflects light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum SurfaceFinish {
-    /// The same light in all directions.
+    /// Reflects the same light in all directions.
     Matte,
     /// Matte with a highlight.
     Glossy,
-    /// A mirror image of the room.
+    /// Mirrors the room.
     Mirror,
-    /// A source of light, this many times as bright as its colour; it casts no shadow.
+    /// Emits light, this many times as bright as its colour. Casts no shadow.
     Glow(f32),
 }
 
@@ -52,52 +52,52 @@ impl Surface {
         Self::new(paint.color, Pattern::Cloth, SurfaceFinish::Matte)
     }
 
-    /// Cloth of one colour, often woven or printed in two tones of it.
-    pub(super) fn fabric(paint: Paint, dice: &mut Dice) -> Self {
+    /// Cloth of one colour, often woven or printed in two tones.
+    pub(super) fn fabric(paint: Paint, rng: &mut SeededRng) -> Self {
         let cloth = Self::cloth(paint);
         // Two tones of a light colour may have two names.
         if ["white", "yellow", "orange", "pink"].contains(&paint.name) {
             return cloth;
         }
         let darker = paint.color * 0.66;
-        match dice.below(6) {
-            0 => cloth.with(Pattern::Checks(dice.between(0.05, 0.16))),
-            1 | 2 => cloth.with(Pattern::Print(dice.between(0.08, 0.26), darker)),
-            3 => cloth.with(Pattern::Stripes(dice.between(0.02, 0.08), darker)),
+        match rng.below(6) {
+            0 => cloth.with_pattern(Pattern::Checks(rng.between(0.05, 0.16))),
+            1 | 2 => cloth.with_pattern(Pattern::Flowers(rng.between(0.08, 0.26), darker)),
+            3 => cloth.with_pattern(Pattern::Stripes(rng.between(0.02, 0.08), darker)),
             _ => cloth,
         }
     }
 
-    /// A matte colour by its sRGB codes.
+    /// Matte colour, given by its sRGB codes.
     pub(super) fn plain(codes: [u8; 3]) -> Self {
-        Self::new(rgb(codes), Pattern::Plain, SurfaceFinish::Matte)
+        Self::new(linear_rgb(codes), Pattern::Plain, SurfaceFinish::Matte)
     }
 
-    /// Glossy grey metal, as steel.
+    /// Glossy grey metal.
     pub(super) fn steel() -> Self {
-        let steel = rgb([164, 166, 170]);
+        let steel = linear_rgb([164, 166, 170]);
         Self::new(steel, Pattern::Plain, SurfaceFinish::Glossy)
     }
 
-    /// Wood with its grain along an axis, in the colour of a paint.
+    /// Wood in the colour of a paint, with its grain along an axis (0 x, 1 y, 2 z).
     pub(super) fn wood(paint: Paint, axis: usize) -> Self {
         Self::new(paint.color, Pattern::Grain(axis), SurfaceFinish::Matte)
     }
 
-    /// The colour at a point with a surface normal, both in the coordinates of the thing. `pixel` is the width of a pixel there,
-    /// in metres.
-    pub(super) fn color_at(&self, place: Vec3, normal: Vec3, pixel: f32) -> Vec3 {
-        self.pattern.color(self.color, place, normal, pixel)
+    /// Colour at a point with a surface normal, both in the coordinates of the thing. `pixel_width` is the width of a pixel there, in
+    /// metres.
+    pub(super) fn color_at(&self, point: Vec3, normal: Vec3, pixel_width: f32) -> Vec3 {
+        self.pattern.color(self.color, point, normal, pixel_width)
     }
 
-    pub(super) fn with(&self, pattern: Pattern) -> Self {
+    pub(super) fn with_pattern(&self, pattern: Pattern) -> Self {
         Self {
             pattern,
             ..self.clone()
         }
     }
 
-    pub(super) fn finished(&self, finish: SurfaceFinish) -> Self {
+    pub(super) fn with_finish(&self, finish: SurfaceFinish) -> Self {
         Self {
             finish,
             ..self.clone()

@@ -12,7 +12,7 @@ pub enum ClusterUnit {
     Scene,
     /// Frames: questions about one frame share its pixels.
     Frame,
-    /// Questions: each is about a different frame, or all are about the same frame.
+    /// Questions, if each is about a different frame, or if all are about the same frame.
     Question,
 }
 
@@ -29,9 +29,9 @@ impl fmt::Display for ClusterUnit {
 /// Relations between frames that put them into one cluster.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FrameTies {
-    /// The scene of each frame for which it is known; empty if the data name none.
+    /// Scene of each frame, if it is known; empty if the data name no scenes.
     pub scenes: BTreeMap<FrameId, String>,
-    /// The images of each frame that stands for several.
+    /// Images of each frame that consists of several.
     pub images: BTreeMap<FrameId, Vec<FrameId>>,
 }
 
@@ -39,9 +39,9 @@ pub struct FrameTies {
 ///
 /// Questions of a frame and frames of a scene are not independent. Intervals that treat them as independent are too
 /// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). The unit is the scene if there are at least
-/// [`MIN_SCENES`], and some have more than one frame. A frame without a scene then counts as a scene of its own. Otherwise it is the frame, or the
-/// question if there is only one frame. Questions that show several images are of one frame if they share an image with each other, or
-/// with a question about that image alone.
+/// [`MIN_SCENES`], and some have more than one frame. A frame without a scene then counts as a scene of its own. Otherwise the unit is the
+/// frame, or the question if there is only one frame. Questions with several images belong to one frame if they share an image with each
+/// other, or with a question about that image alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Clusters {
     unit: ClusterUnit,
@@ -52,11 +52,12 @@ pub struct Clusters {
     count: usize,
 }
 
-/// Minimum number of scenes. With fewer, their spread is estimated too poorly, and frames are the clusters.
+/// Minimum number of scenes for clustering by scene. With fewer, the spread between scenes is poorly estimated, and frames are the
+/// clusters.
 pub const MIN_SCENES: usize = 8;
 
 impl Clusters {
-    /// Clusters of questions and their frames.
+    /// Assigns clusters to questions, given with their frames.
     pub fn new<'a>(
         pairs: impl IntoIterator<Item = (&'a QuestionId, &'a FrameId)>,
         ties: &FrameTies,
@@ -67,26 +68,26 @@ impl Clusters {
             .collect();
         let frames: BTreeSet<&FrameId> = pairs.iter().map(|(frame, _)| *frame).collect();
         let scene_of = |frame: &FrameId| ties.scenes.get(frame).filter(|scene| !scene.is_empty());
-        // The scene, or the frame that has none.
-        let place = |frame: &'a FrameId| match scene_of(frame) {
+        // The scene of a frame, or the frame itself if it has no scene.
+        let scene_or_frame = |frame: &'a FrameId| match scene_of(frame) {
             Some(scene) => (Some(scene), None),
             None => (None, Some(frame)),
         };
-        let places: BTreeSet<(Option<&String>, Option<&FrameId>)> =
-            frames.iter().map(|frame| place(frame)).collect();
-        if places.len() >= MIN_SCENES && places.len() < frames.len() {
-            let numbers: BTreeMap<_, u32> = places.into_iter().zip(0..).collect();
-            let by_frame = frames
-                .iter()
-                .map(|frame| ((*frame).clone(), numbers[&place(frame)]));
+        let scenes: BTreeSet<(Option<&String>, Option<&FrameId>)> =
+            frames.iter().map(|frame| scene_or_frame(frame)).collect();
+        if scenes.len() >= MIN_SCENES && scenes.len() < frames.len() {
+            let numbers: BTreeMap<_, u32> = scenes.into_iter().zip(0..).collect();
             return Self {
                 unit: ClusterUnit::Scene,
-                by_frame: by_frame.collect(),
+                by_frame: frames
+                    .iter()
+                    .map(|frame| ((*frame).clone(), numbers[&scene_or_frame(frame)]))
+                    .collect(),
                 count: numbers.len(),
                 by_question: HashMap::new(),
             };
         }
-        let (by_frame, count) = numbered(&frames, &ties.images);
+        let (by_frame, count) = number_frames(&frames, &ties.images);
         if count == 1 {
             return Self {
                 unit: ClusterUnit::Question,
@@ -111,7 +112,7 @@ impl Clusters {
         }
     }
 
-    /// The unit that forms a cluster.
+    /// Unit that forms a cluster.
     #[must_use]
     pub fn unit(&self) -> ClusterUnit {
         self.unit
@@ -133,36 +134,36 @@ impl Clusters {
     }
 }
 
-/// A number for each frame, and how many numbers there are. Frames that share an image, directly or through others, have one number.
-fn numbered(
+/// Numbers the frames, and returns the count of numbers. Frames that share an image, directly or through others, get the same number.
+fn number_frames(
     frames: &BTreeSet<&FrameId>,
     images: &BTreeMap<FrameId, Vec<FrameId>>,
 ) -> (HashMap<FrameId, u32>, usize) {
-    /// The frame that stands for the frame at a place.
-    fn root(parents: &mut [usize], place: usize) -> usize {
-        let mut place = place;
-        while parents[place] != place {
-            parents[place] = parents[parents[place]];
-            place = parents[place];
+    /// Returns the root of a frame in the union-find forest, and shortens the path to it.
+    fn root(parents: &mut [usize], mut frame: usize) -> usize {
+        while parents[frame] != frame {
+            parents[frame] = parents[parents[frame]];
+            frame = parents[frame];
         }
-        place
+        frame
     }
     let mut parents: Vec<usize> = (0..frames.len()).collect();
-    let mut holders = HashMap::<&FrameId, usize>::new();
-    for (place, frame) in frames.iter().enumerate() {
-        let shown = images.get(*frame);
-        let shown = shown.map_or(std::slice::from_ref(*frame), Vec::as_slice);
+    let mut first_frames = HashMap::<&FrameId, usize>::new();
+    for (index, frame) in frames.iter().enumerate() {
+        let shown = images
+            .get(*frame)
+            .map_or(std::slice::from_ref(*frame), Vec::as_slice);
         for image in shown {
-            let holder = *holders.entry(image).or_insert(place);
-            let [one, other] = [holder, place].map(|place| root(&mut parents, place));
+            let first = *first_frames.entry(image).or_insert(index);
+            let [one, other] = [first, index].map(|frame| root(&mut parents, frame));
             parents[one.max(other)] = one.min(other);
         }
     }
     let mut numbers = HashMap::<usize, u32>::new();
     let mut by_frame = HashMap::with_capacity(frames.len());
-    for (place, frame) in frames.iter().enumerate() {
+    for (index, frame) in frames.iter().enumerate() {
         let next = numbers.len() as u32;
-        let number = *numbers.entry(root(&mut parents, place)).or_insert(next);
+        let number = *numbers.entry(root(&mut parents, index)).or_insert(next);
         by_frame.insert((*frame).clone(), number);
     }
     (by_frame, numbers.len())

@@ -27,9 +27,9 @@ use darkqa_ground::types::{
 /// All results that are computed from the trials of a run.
 #[derive(Debug)]
 pub struct Findings<'a> {
-    /// The trials by subject and item.
+    /// Trials by subject and item.
     pub grid: Grid<'a>,
-    /// The unit that is treated as independent.
+    /// Unit that is treated as independent.
     pub unit: ClusterUnit,
     /// Accuracies by subject, family and reading.
     pub summary: AccuracySummary,
@@ -37,23 +37,23 @@ pub struct Findings<'a> {
     pub health: Vec<Health>,
     /// Differences of all models together, ordered by kind, variant, enhancer, family and level.
     pub pooled: Vec<PooledFinding>,
-    /// The same over all darker levels of a set together, and over all lighter ones; sentences test them before single levels.
+    /// Differences averaged over the darker levels of a set, and over the lighter ones. Sentences test them before single levels.
     pub averaged: Vec<PooledFinding>,
-    /// Models that the pooled findings leave out, because they answered less than others.
+    /// Models that the pooled findings leave out because they answered fewer items than others.
     pub left_out: Vec<ModelsLeftOut>,
-    /// Whether each finding about noise holds under every noise profile; empty with one reading.
+    /// Test results of each claim about noise under every noise profile; empty with a single profile.
     pub by_reading: Vec<FindingByReading>,
-    /// The models by their mean accuracy in the dark, if there are two or more.
+    /// Ranking of the models by mean accuracy in the dark; `None` with fewer than two models.
     pub best: Option<BestInTheDark>,
-    /// The same in the lenient parsing.
+    /// The same ranking in the lenient parsing.
     pub lenient_best: Option<BestInTheDark>,
     /// Paired differences between subjects.
     pub comparisons: Vec<Comparison>,
     /// Thresholds and areas, for all families together and for each family.
     pub curves: Vec<Curve>,
-    /// Confidence and accuracy of the subjects whose probabilities of choices are known.
+    /// Confidence and accuracy of each subject with known probabilities of the choices.
     pub calibrations: Vec<Calibration>,
-    /// Answers given against true answers.
+    /// Confusion tables: true answers by given answers.
     pub confusions: Vec<Confusion>,
     /// Rates of false positives and false negatives.
     pub hallucinations: Vec<Hallucination>,
@@ -61,29 +61,29 @@ pub struct Findings<'a> {
     pub first_failures: Vec<FirstFailure>,
     /// Agreement of models in each condition.
     pub agreements: Vec<Agreement>,
-    /// Agreement of each model with itself in two lights that show the same.
+    /// Agreement of each model with itself between two kinds of images of the same scenes.
     pub light_agreements: Vec<Agreement>,
-    /// The light in which the photographs of the set were taken.
+    /// Light in which the photographs of the data set were taken.
     pub set: PhotographedSet,
-    /// How dark the photographs in the dark are beside their frames, by name.
+    /// Exposure drop of the dark photographs relative to their frames, by name.
     pub pairs: Vec<PairDarkness>,
-    /// Relation between the similarity of images to their clean frames and the answers; `None` if it was not measured.
+    /// Relation between the fidelity of images and right answers; `None` if fidelity was not measured.
     pub fidelity: Option<FidelityFindings>,
     /// Items that all models share; `None` if all were asked the same questions.
     pub common: Option<CommonItems>,
     /// Shares of groups with only right answers; `None` if questions have no groups.
     pub strict: Option<StrictScore>,
-    /// Number of tests that sentences rest on, corrected together.
+    /// Number of tests behind sentences, which are corrected together.
     pub tests: usize,
-    /// Results of the observer and its controls. The controls are in no other result.
+    /// Results of the observer and its controls. All other results exclude the controls.
     pub observer: ObserverSummary,
-    /// The results without the observer, if one of its controls is not at chance; these are shown then.
+    /// Results without the observer, to be reported if one of its controls is not at chance.
     pub without_observer: Option<Box<Self>>,
 }
 
 impl<'a> Findings<'a> {
     /// Computes the results of the trials. `ties` relates frames to each other; `questions` are all questions of the run, for the chance
-    /// line; `measured` holds the images that were compared with their clean frames.
+    /// line; `measured` lists the images that were compared with their clean frames.
     #[must_use]
     pub fn new(
         trials: &'a Trials<ChoiceDetail>,
@@ -92,12 +92,12 @@ impl<'a> Findings<'a> {
         measured: &[ImageFidelity],
     ) -> Self {
         let listing = ModelListing::default();
-        Self::listed(trials, ties, questions, measured, &listing)
+        Self::with_listing(trials, ties, questions, measured, &listing)
     }
 
-    /// The same results with the models as listed.
+    /// Like [`Self::new`], with the models in the order of `listing`.
     #[must_use]
-    pub fn listed(
+    pub fn with_listing(
         trials: &'a Trials<ChoiceDetail>,
         ties: &FrameTies,
         questions: impl IntoIterator<Item = OfferedChoices>,
@@ -126,25 +126,25 @@ impl<'a> Findings<'a> {
         }
     }
 
-    /// The same results of a set whose photographs were taken in this light.
+    /// Sets the light in which the photographs of the data set were taken.
     #[must_use]
-    pub fn for_set(mut self, set: PhotographedSet) -> Self {
+    pub fn with_set(mut self, set: PhotographedSet) -> Self {
         self.set = set;
         let shown = self.without_observer.take();
-        self.without_observer = shown.map(|shown| Box::new(shown.for_set(set)));
+        self.without_observer = shown.map(|shown| Box::new(shown.with_set(set)));
         self
     }
 
-    /// The same results with the strict score of the groups that these questions name.
+    /// Adds the strict score of the groups that these questions name.
     #[must_use]
-    pub fn for_groups(mut self, questions: &[RunQuestion]) -> Self {
+    pub fn with_groups(mut self, questions: &[RunQuestion]) -> Self {
         self.strict = StrictScore::new(&self.grid, questions);
         let shown = self.without_observer.take();
-        self.without_observer = shown.map(|shown| Box::new(shown.for_groups(questions)));
+        self.without_observer = shown.map(|shown| Box::new(shown.with_groups(questions)));
         self
     }
 
-    /// The findings to report: without the observer, if one of its controls is not at chance or none was asked.
+    /// Findings to report: those without the observer if one of its controls is not at chance, or if no control was asked.
     #[must_use]
     pub fn shown(&self) -> &Self {
         self.without_observer.as_deref().unwrap_or(self)
@@ -171,7 +171,7 @@ impl<'a> Findings<'a> {
         findings
     }
 
-    /// The results that sentences rest on; without curves, first failures and agreements, which are left empty.
+    /// Computes only the results behind sentences; curves, first failures and agreements are left empty.
     fn for_sentences(
         grid: Grid<'a>,
         clusters: &Clusters,
@@ -214,7 +214,7 @@ impl<'a> Findings<'a> {
         findings
     }
 
-    /// The results that the sentences about trials rest on, for simulations: without curves, first failures and agreements.
+    /// Computes only the results behind sentences about trials, for simulations.
     #[must_use]
     pub fn sentences_only(trials: &'a Trials<ChoiceDetail>, ties: &FrameTies) -> Self {
         let clusters = Clusters::new(trials.questions(), ties);
@@ -223,8 +223,7 @@ impl<'a> Findings<'a> {
         Self::for_sentences(grid, &clusters, &[], observer, &[])
     }
 
-    /// Adds the comparisons of one light with another between different names of one model, which was asked in the same way under
-    /// each of them.
+    /// Adds comparisons between different images of the same level for one model that was asked under several names.
     #[must_use]
     pub fn with_lights_between(mut self, names: &[String]) -> Self {
         self.comparisons.extend(lights_between(&self.grid, names));
@@ -233,8 +232,8 @@ impl<'a> Findings<'a> {
         self
     }
 
-    /// The models that findings about a variant are about: those with images, without people and without those that answered less than
-    /// others there, sorted.
+    /// Models that findings about a variant are about, sorted: models with images, without people and without models that answered fewer
+    /// items than others in this variant.
     #[must_use]
     pub fn models_of(&self, variant: &Variant) -> Vec<&str> {
         let mut models = pool(&self.grid);
@@ -250,7 +249,7 @@ impl<'a> Findings<'a> {
         models
     }
 
-    /// The blind models that are significantly more accurate than a subject: the subject's own model, or any if that one was not asked
+    /// Blind models that are significantly more accurate than a subject: the subject's own model, or any model if that one was not asked
     /// without images. The test is paired, with Holm's correction over the conditions of the two models.
     #[must_use]
     pub fn below_blind(&self, subject: &ModelInCondition, family: Option<&Family>) -> Vec<&str> {

@@ -44,7 +44,7 @@ impl TrialResult {
         matches!(self, Self::Read { .. })
     }
 
-    /// The choice read in a mode: `None` without a reply, `Some(None)` for an unreadable reply.
+    /// Parsed choice in a mode: `None` without a reply, `Some(None)` for an unreadable reply.
     #[must_use]
     pub fn reading(self, mode: ReadingMode) -> Option<Option<u8>> {
         match (self, mode) {
@@ -65,7 +65,7 @@ pub struct GridItem<'a> {
 }
 
 impl GridItem<'_> {
-    /// True if a reading is the true choice; always false if the true choice is unknown.
+    /// True if a parsed choice is the true one; always false if the true choice is unknown.
     #[must_use]
     pub fn is_right(&self, chosen: Option<u8>) -> bool {
         chosen.is_some_and(|chosen| self.asked.truth == Some(usize::from(chosen)))
@@ -73,7 +73,7 @@ impl GridItem<'_> {
 
     /// True if the item belongs to a family; always true for `None`.
     #[must_use]
-    pub fn is_of(&self, family: Option<&Family>) -> bool {
+    pub fn is_in_family(&self, family: Option<&Family>) -> bool {
         family.is_none_or(|family| *self.asked.family == *family)
     }
 }
@@ -95,12 +95,12 @@ pub struct Grid<'a> {
     indices: BTreeMap<ModelInCondition, usize>,
     trials: &'a Trials<ChoiceDetail>,
     /// Index in `trials` of the trial of each result; [`NO_INDEX`] if the item was not asked.
-    places: Vec<u32>,
+    trial_indices: Vec<u32>,
 }
 
 impl<'a> Grid<'a> {
-    /// Table of all trials whose true choice is known. A later trial replaces an earlier one of the same subject and item. Trials whose
-    /// frame has no cluster are ignored.
+    /// Creates the table of all trials whose true choice is known. A later trial replaces an earlier one of the same subject and item.
+    /// Trials whose frame has no cluster are ignored.
     #[must_use]
     pub fn new(trials: &'a Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
         Self::for_models(trials, clusters, &ModelListing::default(), |_| true)
@@ -120,7 +120,7 @@ impl<'a> Grid<'a> {
         })
     }
 
-    /// Table of trials whose true choice is unknown, for inspection only.
+    /// Creates the table of trials whose true choice is unknown, for inspection only.
     #[must_use]
     pub fn without_truths(
         trials: &'a Trials<ChoiceDetail>,
@@ -179,15 +179,15 @@ impl<'a> Grid<'a> {
         }
         let size = subjects.len() * items.len();
         let mut results = vec![TrialResult::Absent; size];
-        let mut places = vec![NO_INDEX; size];
-        for (place, trial) in (0..).zip(trials.iter()) {
+        let mut trial_indices = vec![NO_INDEX; size];
+        for (index, trial) in (0..).zip(trials.iter()) {
             let item = index_by_item[trial.item_number()];
             let subject = index_by_asked[trial.asked_number()].filter(|_| item != NO_INDEX);
             // An item can be in the table because of one model, and still not be shown for another model.
             if let Some(subject) = subject.filter(|_| is_shown(trial.item(), trial.model())) {
                 let cell = subject * items.len() + item as usize;
                 results[cell] = trial_result(trial);
-                places[cell] = place;
+                trial_indices[cell] = index;
             }
         }
         Self {
@@ -198,7 +198,7 @@ impl<'a> Grid<'a> {
             clusters: clusters.count(),
             results,
             trials,
-            places,
+            trial_indices,
         }
     }
 
@@ -211,8 +211,8 @@ impl<'a> Grid<'a> {
     /// The trial of an item and a subject, both by index; `None` if the item was not asked.
     #[must_use]
     pub fn trial(&self, subject: usize, item: usize) -> Option<TrialRef<'a>> {
-        let place = self.places[subject * self.items.len() + item];
-        self.trials.get(place as usize)
+        let index = self.trial_indices[subject * self.items.len() + item];
+        self.trials.get(index as usize)
     }
 
     /// True if the strict and the lenient parsing of any reply of a subject differ.
@@ -265,7 +265,7 @@ impl<'a> Grid<'a> {
     /// Index of a subject or, if the grid does not contain it, of the first subject that differs only in its group of runs and whose
     /// group overlaps. `None` if the grid contains neither.
     #[must_use]
-    pub fn stand_in(&self, subject: &ModelInCondition) -> Option<usize> {
+    pub fn find_up_to_group(&self, subject: &ModelInCondition) -> Option<usize> {
         self.find(subject).or_else(|| {
             self.subjects
                 .iter()
@@ -282,7 +282,7 @@ impl<'a> Grid<'a> {
         self.items
             .iter()
             .zip(self.row(subject).iter().copied())
-            .filter(move |(item, _)| item.is_of(family))
+            .filter(move |(item, _)| item.is_in_family(family))
     }
 
     /// Number of replies and of right replies of a subject in each cluster.
@@ -304,9 +304,9 @@ impl<'a> Grid<'a> {
         counts
     }
 
-    /// A grid of the items for which `kept` is true; `kept` has one value per item. Cluster indices do not change.
+    /// Returns the grid of the items for which `kept` is true; `kept` has one value per item. Cluster indices do not change.
     #[must_use]
-    pub fn restricted(&self, kept: &[bool]) -> Self {
+    pub fn select_items(&self, kept: &[bool]) -> Self {
         let kept_items: Vec<usize> = kept
             .iter()
             .enumerate()
@@ -325,7 +325,7 @@ impl<'a> Grid<'a> {
             clusters: self.clusters,
             results: cells.iter().map(|cell| self.results[*cell]).collect(),
             trials: self.trials,
-            places: cells.iter().map(|cell| self.places[*cell]).collect(),
+            trial_indices: cells.iter().map(|cell| self.trial_indices[*cell]).collect(),
         }
     }
 
@@ -345,7 +345,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// The subjects and items to include in a grid: those of at least one shown trial.
+/// The subjects and items to include in a grid: those with at least one shown trial.
 struct GridScope {
     /// True for each included pair of model and condition, by its index in [`Trials::asked`].
     asked: Vec<bool>,
@@ -391,7 +391,7 @@ fn trial_result(trial: TrialRef<'_>) -> TrialResult {
     }
 }
 
-/// Index of the choice in a reading, at most 255; `None` if no choice could be read.
+/// Index of the parsed choice, at most 255; `None` if no choice could be parsed.
 fn chosen_index(reading: AnswerReading) -> Option<u8> {
     let index = reading.chosen?;
     Some(index.min(usize::from(u8::MAX)) as u8)

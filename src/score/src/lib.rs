@@ -7,12 +7,12 @@
 //!
 //! Intervals are computed from the clusters ([`cluster`]). Each method was chosen because its 95 % intervals cover the true value in
 //! simulation (`statistics.rs` and `coverage/` in `tests/program/scores`; `src/docs/numbers.md` lists the cases with a coverage below
-//! 93 %). The plain percentile bootstrap does not do so with fewer than about 50 clusters, or near 0 and 1.
+//! 93 %). The plain percentile bootstrap does not with fewer than about 50 clusters, or near 0 and 1.
 //!
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
 //! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`comparisons::paired`]), and an exact test;
 //! - κ: its linear form in the clusters' counts, with the clusters' variance ([`comparisons::Agreement`]);
-//! - confidence: the cluster bootstrap, its bias subtracted for the calibration error ([`calibration`]);
+//! - confidence: the cluster bootstrap, with its bias subtracted for the calibration error ([`calibration`]);
 //! - thresholds: the cluster bootstrap ([`bootstrap`]).
 
 #![allow(
@@ -28,13 +28,13 @@ pub mod cluster;
 pub mod comparisons;
 pub mod findings;
 pub mod grid;
-mod head;
 pub mod observed;
 pub mod open;
 pub mod photographs;
 pub mod power;
 pub mod subject;
 pub mod suggested_scenes;
+mod test_tree;
 pub mod tested_sentences;
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,4 @@
-//! [`ObserverSummary`]: the observer's accuracy in each condition, and whether its controls are at chance.
+//! Accuracy of the observer in each condition, and of its controls: [`ObserverSummary`].
 
 use std::collections::BTreeMap;
 
@@ -14,70 +14,70 @@ use darkqa_ground::types::{
 /// Results of the observer, or of one of its controls, in one condition.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObserverCell {
-    /// The observer or the control, and the condition.
+    /// Observer or control, and condition.
     pub subject: ModelInCondition,
     /// Expected score: 1 for a right answer from evidence, 1 / k for a guess among k choices.
     pub score: Estimate,
-    /// Score of guessing every answer.
+    /// Expected score if every answer is guessed.
     pub chance: f64,
-    /// Share of the answers that follow from visible evidence.
+    /// Share of answers that follow from visible evidence.
     pub evidence: f64,
-    /// Share of the things of all frames that are seen.
+    /// Share of the objects of all frames that are seen.
     pub seen: f64,
-    /// Share of the things of all frames whose whole outline is detected.
+    /// Share of the objects of all frames whose whole outline is detected.
     pub detected: f64,
-    /// Mean over the frames of the share of the image's variance that the untouched frame explains.
+    /// Share of an image's variance that the untouched frame explains, averaged over the frames.
     pub explained: f64,
 }
 
 impl ObserverCell {
-    /// Whether this is a control of the observer.
+    /// True if this is a control of the observer.
     #[must_use]
     pub fn is_control(&self) -> bool {
         is_control(&self.subject.model)
     }
 
-    /// Whether this is the control that each run with the observer asks.
+    /// True if this is the control that every run with the observer asks.
     #[must_use]
     pub fn is_standing(&self) -> bool {
         Control::from_model_name(&self.subject.model)
             .is_some_and(|control| Control::STANDING.contains(&control))
     }
 
-    /// Whether this is a control whose interval excludes chance, so that the observer's lines prove nothing.
+    /// True if this is a control whose interval excludes chance, which invalidates the observer's results.
     #[must_use]
-    pub fn refutes(&self) -> bool {
-        // The two means are sums in different orders.
+    pub fn is_off_chance(&self) -> bool {
+        // The two means are summed in different orders.
         let tolerance = 1e-9;
-        let excludes =
+        let excludes_chance =
             self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
         Control::from_model_name(&self.subject.model).is_some_and(Control::leaves_nothing)
-            && excludes
+            && excludes_chance
     }
 }
 
 /// Results of the observer and its controls.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ObserverSummary {
-    /// By model and condition; empty if the observer was not asked with images.
+    /// Results by model and condition; empty if the observer was not asked with images.
     pub cells: Vec<ObserverCell>,
-    /// Each control over all conditions together.
+    /// Results of each control over all conditions together.
     pub controls: Vec<ObserverCell>,
 }
 
 impl ObserverSummary {
-    /// The results of these trials.
+    /// Computes the results of these trials.
     #[must_use]
     pub fn new(trials: &Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
-        // The later of two trials for the same item counts.
+        // Of two trials for the same item, the later one counts.
         let mut items = BTreeMap::<ModelInCondition, BTreeMap<ItemKey<'_>, TrialRef<'_>>>::new();
         for trial in trials.iter() {
             if trial.observed().is_some() {
                 let key = trial.item().key();
-                let subject = items
+                items
                     .entry(ModelInCondition::from_trial(trial))
-                    .or_default();
-                subject.insert(key, trial);
+                    .or_default()
+                    .insert(key, trial);
             }
         }
         let mut by_control = BTreeMap::<&str, Vec<TrialRef<'_>>>::new();
@@ -85,21 +85,25 @@ impl ObserverSummary {
         for (subject, trials) in &items {
             let trials: Vec<TrialRef<'_>> = trials.values().copied().collect();
             if is_control(&subject.model) {
-                let all = by_control.entry(&subject.model).or_default();
-                all.extend(&trials);
+                by_control
+                    .entry(&subject.model)
+                    .or_default()
+                    .extend(&trials);
             }
             cells.extend(cell(subject.clone(), &trials, clusters));
         }
-        let controls = by_control.into_iter().filter_map(|(model, trials)| {
-            cell(ModelInCondition::new(model, None), &trials, clusters)
-        });
         Self {
-            controls: controls.collect(),
+            controls: by_control
+                .into_iter()
+                .filter_map(|(model, trials)| {
+                    cell(ModelInCondition::new(model, None), &trials, clusters)
+                })
+                .collect(),
             cells,
         }
     }
 
-    /// Whether the observer was asked with images.
+    /// True if the observer was asked with images.
     #[must_use]
     pub fn is_asked(&self) -> bool {
         self.cells
@@ -107,23 +111,23 @@ impl ObserverSummary {
             .any(|cell| is_observer(&cell.subject.model))
     }
 
-    /// The controls that are not at chance, over all conditions or in one. The intervals of the conditions are not corrected for
-    /// their number: rather a sound observer is hidden than a broken one shown.
-    pub fn refutations(&self) -> impl Iterator<Item = &ObserverCell> {
+    /// Controls that are not at chance, over all conditions or in one. The intervals are not corrected for the number of conditions: it is
+    /// better to hide a sound observer than to show a broken one.
+    pub fn failed_controls(&self) -> impl Iterator<Item = &ObserverCell> {
         self.controls
             .iter()
             .chain(&self.cells)
-            .filter(|cell| cell.refutes())
+            .filter(|cell| cell.is_off_chance())
     }
 
-    /// Whether the observer's lines are not shown: a control is not at chance, or none was asked.
+    /// True if the observer's results must not be shown: a control is not at chance, or no control was asked.
     #[must_use]
     pub fn is_hidden(&self) -> bool {
         let is_controlled = self.cells.iter().any(ObserverCell::is_control);
-        self.is_asked() && (!is_controlled || self.refutations().next().is_some())
+        self.is_asked() && (!is_controlled || self.failed_controls().next().is_some())
     }
 
-    /// The standing control over all conditions, of each run that has its own.
+    /// Results of the standing control over all conditions; one for each run that has its own.
     #[must_use]
     pub fn standing_controls(&self) -> Vec<&ObserverCell> {
         Control::STANDING
@@ -138,10 +142,10 @@ impl ObserverSummary {
             .unwrap_or_default()
     }
 
-    /// The standing control in the condition of a cell.
+    /// Result of the standing control in the condition of a cell.
     #[must_use]
     pub fn control_of(&self, cell: &ObserverCell) -> Option<&ObserverCell> {
-        // Where several runs are compared, each may have its own.
+        // If several runs are compared, each may have its own control.
         let run = cell
             .subject
             .model
@@ -164,7 +168,7 @@ impl ObserverSummary {
 /// Identity of an item: question, order of choices and repeat.
 type ItemKey<'a> = (&'a QuestionId, &'a [String], u32);
 
-/// The results of some trials; `None` without trials of frames that have a cluster.
+/// Computes the result of some trials; `None` without trials of frames that have a cluster.
 fn cell(
     subject: ModelInCondition,
     trials: &[TrialRef<'_>],
@@ -195,10 +199,11 @@ fn cell(
     sums.retain(|(_, count)| *count > 0.0);
     let sum = |of: fn(&Observed) -> usize| frames.values().map(|frame| of(frame)).sum::<usize>();
     let things = sum(|frame| frame.things).max(1) as f64;
-    let explained = frames
+    let explained: f64 = frames
         .values()
-        .map(|frame| f64::from(frame.explained_ppm) / 1e6);
-    // A guess counts 1 / k and has no noise of its own: the noise of n answers is at least that of those from evidence.
+        .map(|frame| f64::from(frame.explained_ppm) / 1e6)
+        .sum();
+    // A guess scores exactly 1 / k and adds no noise, so only the answers from evidence count for the noise of the score.
     let max_weight = n as f64 / f64::max(evidence as f64, 1.0);
     Some(ObserverCell {
         subject,
@@ -207,7 +212,7 @@ fn cell(
         evidence: evidence as f64 / n as f64,
         seen: sum(|frame| frame.seen) as f64 / things,
         detected: sum(|frame| frame.detected) as f64 / things,
-        explained: explained.sum::<f64>() / frames.len() as f64,
+        explained: explained / frames.len() as f64,
     })
 }
 
@@ -241,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_control_that_is_not_at_chance_in_one_condition_or_over_all_hides_the_observer() {
+    fn control_off_chance_hides_the_observer() {
         let (chance, above) = ([0.32, 0.28, 0.36], [0.34, 0.31, 0.37]);
         let hidden = |control, in_one, over_all| summary(control, in_one, over_all).is_hidden();
         for control in ["observer:other-room", "observer:tiles (night)"] {

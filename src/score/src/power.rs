@@ -1,11 +1,11 @@
 //! [`PlannedSample`]: the difference that a planned run can detect, computed before any request.
 //!
 //! Paired answers right or wrong are a matched-pairs design. With n pairs, a share ψ of which differ between the two sides, a difference δ
-//! is detected with power 1 − β at level α if n δ² = D (t₁₋α⁄₂ √ψ + t₁₋β √(ψ − δ²))² (Connett, Smith and McHugh 1987, Stat. Med. 6:53). D is
-//! the design effect of clusters of unequal sizes m, 1 + (Σm² / Σm − 1) ρ (Eldridge, Ashby and Kerry 2006, Int. J. Epidemiol. 35:1292,
-//! with its cv of the sizes written out). The quantiles are those of Student's t, with the degrees of freedom that the test finds on average
-//! ([`degrees_of_freedom`](darkqa_statistics::quantiles)): half the number C of clusters, whose sums have a kurtosis of about 3; C − 1 if pairs are
-//! independent.
+//! is detected with power 1 − β at level α if n δ² = D (t₁₋α⁄₂ √ψ + t₁₋β √(ψ − δ²))² (Connett, Smith and McHugh 1987, Stat. Med. 6:53). D
+//! is the design effect of clusters of unequal sizes m, 1 + (Σm² / Σm − 1) ρ (Eldridge, Ashby and Kerry 2006, Int. J. Epidemiol. 35:1292,
+//! with its cv of the sizes written out). The quantiles are those of Student's t, with the degrees of freedom that the test finds on
+//! average ([`degrees_of_freedom`](darkqa_statistics::quantiles)): half the number C of clusters, whose sums have a kurtosis of about 3; C
+//! − 1 if pairs are independent.
 //!
 //! ψ and ρ are not known before a run, so both are assumed: [`CHANGED`] and [`CORRELATION`].
 
@@ -22,28 +22,28 @@ pub const CHANGED: f64 = 0.2;
 /// Correlation of the changes of answers within a cluster; assumed.
 pub const CORRELATION: f64 = 0.05;
 
-/// The difference for which the number of clusters is given: 5 points.
+/// Difference for which the required number of clusters is reported: 5 points.
 pub const TARGET: f64 = 0.05;
 
-/// Most clusters that are tried.
+/// Maximum number of clusters that is tried.
 const MAX_CLUSTERS: f64 = 1e6;
 
-/// The questions of a planned run by cluster, and the models over which findings are pooled.
+/// Size of a planned run: questions by cluster, and models that findings are pooled over.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedSample {
     /// Number of questions of each cluster.
     pub questions: Vec<usize>,
     pub models: usize,
-    /// Level of the test.
+    /// Significance level of the test.
     pub level: f64,
 }
 
 /// Smallest effect that a planned run can detect.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detectable {
-    /// The smallest difference that is detected in 80 % of runs; `None` if none is.
+    /// Smallest difference that is detected in 80 % of runs; `None` if no difference is.
     pub difference: Option<f64>,
-    /// Number of clusters of the same size that detect a difference of [`TARGET`].
+    /// Number of clusters of the same size needed to detect a difference of [`TARGET`].
     pub clusters_for_target: usize,
 }
 
@@ -56,11 +56,11 @@ impl PlannedSample {
         let mut low = 0.0;
         let mut high = 1.0;
         let is_possible =
-            least_p(self.questions.len()) < self.level && design.finds(high, clusters);
+            least_p(self.questions.len()) < self.level && design.detects(high, clusters);
         // Bisection: the power grows with the difference.
         for _ in 0..40 {
             let middle = f64::midpoint(low, high);
-            if design.finds(middle, clusters) {
+            if design.detects(middle, clusters) {
                 high = middle;
             } else {
                 low = middle;
@@ -73,14 +73,14 @@ impl PlannedSample {
     }
 }
 
-/// The pairs of a sample, by cluster.
+/// Design of a sample: pairs per cluster and design effect.
 #[derive(Debug)]
 struct Design {
     /// Mean number of pairs of a cluster.
     pairs: f64,
     /// Design effect of the clusters.
     effect: f64,
-    /// Level of the test.
+    /// Significance level of the test.
     level: f64,
 }
 
@@ -98,12 +98,12 @@ impl Design {
         }
     }
 
-    /// Number of clusters like these that detect a difference.
+    /// Number of clusters like these that are needed to detect a difference.
     fn clusters_for(&self, difference: f64) -> usize {
         let (mut low, mut high) = (2.0, MAX_CLUSTERS);
         while high - low > 1.0 {
             let middle = f64::midpoint(low, high).floor();
-            if self.finds(difference, middle) {
+            if self.detects(difference, middle) {
                 high = middle;
             } else {
                 low = middle;
@@ -112,10 +112,10 @@ impl Design {
         high as usize
     }
 
-    /// Whether a difference is detected with [`POWER`] in this many clusters like these.
-    fn finds(&self, difference: f64, clusters: f64) -> bool {
+    /// True if a difference is detected with [`POWER`] in this number of clusters like these.
+    fn detects(&self, difference: f64, clusters: f64) -> bool {
         let n = self.pairs * clusters;
-        // An effect turns some answers that would change the other way, and some that would not change.
+        // An effect reverses some answers that would change in the other direction, and changes some that would not change.
         let changed = (CHANGED + difference / 2.0).max(difference);
         let degrees = if self.effect > 1.0 {
             clusters / 2.0

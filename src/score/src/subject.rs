@@ -39,7 +39,7 @@ pub fn is_reference(model: &str) -> bool {
 
 /// Models under test, sorted. If only references ran, all of them.
 #[must_use]
-pub fn judged<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
+pub fn models_under_test<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
     let all: BTreeSet<&str> = models.into_iter().collect();
     let under_test: BTreeSet<&str> = all
         .iter()
@@ -53,11 +53,11 @@ pub fn judged<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str
     }
 }
 
-/// Models to pool, sorted: the [`judged`] ones. If only references ran, one of them, preferably the observer, because a mean of the
+/// Models to pool, sorted: the [`models_under_test`]. If only references ran, one of them, preferably the observer, because a mean of the
 /// observer and `random` would be meaningless.
 #[must_use]
 pub fn pooled_models<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
-    let models = judged(models);
+    let models = models_under_test(models);
     if !models.iter().all(|model| is_reference(model)) {
         return models;
     }
@@ -142,7 +142,7 @@ impl ModelInCondition {
             && RunGroup::meet(variant.group.as_ref(), other_variant.group.as_ref())
     }
 
-    /// The same model in the same condition, for images from any group of runs.
+    /// Returns the same model and condition without its group of runs.
     #[must_use]
     pub fn in_any_light(&self) -> Self {
         let mut subject = self.clone();
@@ -153,7 +153,7 @@ impl ModelInCondition {
     /// A model with images at a level of a variant, raw or enhanced. Variants share the clean frame: at L0, only the group of runs
     /// is kept of the variant, so that [`matches_up_to_group`](Self::matches_up_to_group) finds the clean frames of those runs.
     #[must_use]
-    pub fn seeing(
+    pub fn with_images(
         model: &str,
         level: AxisLevel,
         variant: &Variant,
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn references_are_judged_alone_and_never_pooled() {
+    fn references_count_only_without_other_models() {
         for (models, expected, pooled) in [
             (
                 &["gpt-4o", "observer", "m", "random"][..],
@@ -203,7 +203,7 @@ mod tests {
             (&[], &[], &[]),
         ] {
             let names = |found: BTreeSet<&'static str>| found.into_iter().collect::<Vec<_>>();
-            assert_eq!(names(judged(models.iter().copied())), expected);
+            assert_eq!(names(models_under_test(models.iter().copied())), expected);
             assert_eq!(names(pooled_models(models.iter().copied())), pooled);
         }
     }

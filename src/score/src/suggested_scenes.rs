@@ -1,4 +1,4 @@
-//! Scenes that the names of frames suggest: [`SuggestedScenes`].
+//! Scenes suggested by the names of frames: [`SuggestedScenes`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::LazyLock;
@@ -8,14 +8,14 @@ use regex::Regex;
 use super::cluster::MIN_SCENES;
 use darkqa_ground::types::FrameId;
 
-/// Scenes by the names of frames, if data name no scenes. A guess for a warning, never used as clusters.
+/// Scenes guessed from the names of frames, if the data name no scenes. Only for a warning, never used as clusters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SuggestedScenes {
     /// Number of scenes.
     pub scenes: usize,
     /// Number of frames.
     pub frames: usize,
-    /// The first names of scenes.
+    /// First names of scenes, for the message.
     examples: Vec<String>,
     by: NamedBy,
 }
@@ -40,8 +40,8 @@ static NUMBERED_PLACE: LazyLock<Option<Regex>> = LazyLock::new(|| {
 const MAX_NAMED: usize = 2;
 
 impl SuggestedScenes {
-    /// The scenes that the names of these frames suggest: their folders, or the beginning of their file names. `None` if each scene
-    /// would have one frame, or one scene all of them.
+    /// Guesses scenes from the folders or the beginnings of the file names of these frames. `None` if each scene would have one frame, or
+    /// if one scene would have all frames.
     #[must_use]
     pub fn new<'f>(frames: impl IntoIterator<Item = &'f FrameId>) -> Option<Self> {
         let frames: BTreeSet<&str> = frames.into_iter().map(|frame| &*frame.0).collect();
@@ -56,7 +56,7 @@ impl SuggestedScenes {
                 examples: scenes.keys().take(MAX_NAMED).cloned().collect(),
                 by,
             };
-            // Half of the frames share their scene: chance endings of random names do not.
+            // At least half of the frames must share their scene; random names with equal beginnings do not reach this.
             let shared: usize = scenes.values().filter(|count| **count > 1).sum();
             let is_likely = scenes.len() > 1 && 2 * shared >= frames.len() && shared > 0;
             is_likely.then_some(found)
@@ -89,31 +89,31 @@ impl SuggestedScenes {
     }
 }
 
-/// The folder of a frame, if its name has one.
+/// Folder of a frame, if its name has one.
 fn folder(frame: &str) -> Option<String> {
     let (folder, _) = frame.rsplit_once(['/', '\\'])?;
     Some(folder.to_owned())
 }
 
-/// The file name of a frame without folder and ending.
+/// File name of a frame without folder and extension.
 fn stem(frame: &str) -> &str {
     let name = frame.rsplit(['/', '\\']).next().unwrap_or(frame);
     name.rsplit_once('.').map_or(name, |(stem, _)| stem)
 }
 
-/// The numbered place at the beginning of a file name.
+/// Numbered place at the beginning of a file name.
 fn numbered_place(frame: &str) -> Option<String> {
     let found = NUMBERED_PLACE.as_ref()?.captures(stem(frame))?;
     Some(found[1].to_owned())
 }
 
-/// The part of a file name before its last number, as `kitchen` of `kitchen_003.png`.
+/// Part of a file name before its last number, such as `kitchen` in `kitchen_003.png`.
 fn before_number(frame: &str) -> Option<String> {
     let stem = stem(frame);
     let name = stem.trim_end_matches(|c: char| c.is_ascii_digit());
     let scene = name.trim_end_matches(['_', '-', ' ', '.']);
-    let is_apart = scene.len() < name.len() && name.len() < stem.len();
-    (is_apart && !scene.is_empty()).then(|| scene.to_owned())
+    let is_separated = scene.len() < name.len() && name.len() < stem.len();
+    (is_separated && !scene.is_empty()).then(|| scene.to_owned())
 }
 
 #[cfg(test)]

@@ -3,19 +3,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::answers::confusion::{AgainstClean, Confusion, FalseAnswer};
-use super::calibration::LEAST_CONFIDENT_REPLIES;
+use super::calibration::MIN_CONFIDENT_REPLIES;
 use super::choice::ReadingMode;
 use super::cluster::MIN_SCENES;
 use super::comparisons::{BestInTheDark, Comparison, ComparisonKind, PooledFinding, PooledKind};
 use super::findings::Findings;
 use super::grid::Grid;
-use super::head::{TestTree, adjusted};
 use super::significance::ALPHA;
-use super::subject::{ModelInCondition, judged};
+use super::subject::{ModelInCondition, models_under_test};
+use super::test_tree::{TestTree, adjust_p_values};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Variant};
 
-/// A test, with the index of its finding where several exist.
+/// A test, with the index of its finding if several exist.
 #[derive(Debug, Clone, Copy)]
 enum Test {
     /// One level, pooled over models.
@@ -43,7 +43,7 @@ const MAIN: f64 = 1.0;
 /// Weight of the noise tests, if the run has noise as well as the exposure drop.
 const NOISE: f64 = 0.5;
 
-/// Weight of all other questions together. They concern the way in which accuracy is lost, not the amount.
+/// Weight of all other questions together. They concern how accuracy is lost, not how much.
 const FURTHER: f64 = 0.5;
 
 /// Weight of a secondary variant relative to a main one (1). Sentences name it only if its result differs from that of the main one.
@@ -51,7 +51,7 @@ const OTHER_VARIANT: f64 = 0.25;
 
 type Tests = TestTree<Test>;
 
-/// Contents of a run that decide how the significance level is divided between its tests.
+/// Contents of a run that determine how the significance level is divided between its tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RunContents {
     pub models: usize,
@@ -85,7 +85,7 @@ impl Findings<'_> {
     pub(super) fn correct_sentences(&mut self) {
         let tree = report_tests(self);
         for mode in ReadingMode::ALL {
-            for (test, p) in adjusted(&tree, |test| test.p(self, mode)) {
+            for (test, p) in adjust_p_values(&tree, |test| test.p(self, mode)) {
                 test.set_p_report(self, mode, p);
             }
         }
@@ -96,14 +96,20 @@ impl Findings<'_> {
 /// Tree of all tests of a report. It depends on the questions asked, never on the answers.
 fn report_tests(findings: &Findings<'_>) -> Tests {
     let sets = pooled_sets(findings);
-    let of_kind = |kind: PooledKind| {
-        let sets = sets.iter().filter(|set| set.kind == kind);
-        TestTree::group(sets.map(|set| set.tests(findings)))
+    let tests_of_kind = |kind: PooledKind| {
+        TestTree::group(
+            sets.iter()
+                .filter(|set| set.kind == kind)
+                .map(|set| set.tests(findings)),
+        )
     };
     let names: BTreeSet<&EnhancerName> = sets.iter().filter_map(|set| set.enhancer).collect();
     let enhancers = names.into_iter().map(|name| {
-        let own = sets.iter().filter(|set| set.enhancer == Some(name));
-        TestTree::group(own.map(|set| set.tests(findings)))
+        TestTree::group(
+            sets.iter()
+                .filter(|set| set.enhancer == Some(name))
+                .map(|set| set.tests(findings)),
+        )
     });
     let best = findings
         .best
@@ -115,22 +121,23 @@ fn report_tests(findings: &Findings<'_>) -> Tests {
         .as_ref()
         .filter(|fidelity| fidelity.within[0].is_some());
     let further = [
-        of_kind(PooledKind::Blind),
+        tests_of_kind(PooledKind::Blind),
         below_blind(findings),
-        of_kind(PooledKind::Hallucination(FalseAnswer::No)),
-        of_kind(PooledKind::Hallucination(FalseAnswer::Yes)),
+        tests_of_kind(PooledKind::Hallucination(FalseAnswer::No)),
+        tests_of_kind(PooledKind::Hallucination(FalseAnswer::Yes)),
         collapses(findings),
         confidence(findings),
         TestTree::group(fidelity.map(|_| TestTree::leaf(Test::Fidelity))),
     ];
-    let main = [of_kind(PooledKind::Darkness)]
+    let main = [tests_of_kind(PooledKind::Darkness)]
         .into_iter()
         .chain(enhancers)
         .chain([TestTree::group(best.into_iter().flatten())])
         .chain(photographs(findings));
-    let noise = of_kind(PooledKind::Noise).weighing(NOISE);
-    let branches = main.map(|branch| branch.weighing(MAIN));
-    TestTree::group(branches.chain([noise, TestTree::group(further).weighing(FURTHER)]))
+    TestTree::group(main.map(|branch| branch.with_weight(MAIN)).chain([
+        tests_of_kind(PooledKind::Noise).with_weight(NOISE),
+        TestTree::group(further).with_weight(FURTHER),
+    ]))
 }
 
 /// True for a main variant: it has the last degradation kind of its root, or no kind. Sentences about all other variants are limited to
@@ -214,7 +221,7 @@ impl PooledSet<'_> {
             let mut levels = level_tests(&self.levels);
             levels.reverse();
             let chain: Vec<Test> = means.chain(levels).collect();
-            return TestTree::chain(chain.into_iter()).weighing(weight);
+            return TestTree::chain(chain.into_iter()).with_weight(weight);
         }
         let is_severe = |(_, finding): &(usize, &PooledFinding)| finding.is_severe();
         let (severe, mild): (Vec<_>, Vec<_>) = self.levels.iter().copied().partition(is_severe);
@@ -240,7 +247,7 @@ impl PooledSet<'_> {
             branch(mean(true), severe_tests),
             branch(mean(false), level_tests(&mild)),
         ])
-        .weighing(weight)
+        .with_weight(weight)
     }
 }
 
@@ -275,7 +282,7 @@ fn below_blind(findings: &Findings<'_>) -> Tests {
 
 /// Tests on dark photographs: the cost of darkness, the difference from synthetic images, and the effect of enhancers.
 fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
-    let models = judged(findings.grid.subjects.iter().map(|subject| &*subject.model));
+    let models = models_under_test(findings.grid.subjects.iter().map(|subject| &*subject.model));
     let kinds = [
         ComparisonKind::Level,
         ComparisonKind::RealSynthetic,
@@ -291,12 +298,14 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
                     && models.contains(&*comparison.first.model)
                     && comparison.strict.significance.is_possible()
             };
-            let stated = findings
-                .comparisons
-                .iter()
-                .enumerate()
-                .filter(|(_, comparison)| is_stated(comparison));
-            TestTree::group(stated.map(|(index, _)| TestTree::leaf(Test::Comparison(index))))
+            TestTree::group(
+                findings
+                    .comparisons
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, comparison)| is_stated(comparison))
+                    .map(|(index, _)| TestTree::leaf(Test::Comparison(index))),
+            )
         })
         .into()
 }
@@ -331,14 +340,16 @@ fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
 /// Tests of answer collapse, one per model and family.
 fn collapses(findings: &Findings<'_>) -> Tests {
     let darkest = darkest(findings);
-    let tested = findings
-        .confusions
-        .iter()
-        .enumerate()
-        .filter(|(_, confusion)| {
-            darkest.contains(&&confusion.subject) && against_clean(confusion).is_some()
-        });
-    TestTree::group(tested.map(|(index, _)| TestTree::leaf(Test::Collapse(index))))
+    TestTree::group(
+        findings
+            .confusions
+            .iter()
+            .enumerate()
+            .filter(|(_, confusion)| {
+                darkest.contains(&&confusion.subject) && against_clean(confusion).is_some()
+            })
+            .map(|(index, _)| TestTree::leaf(Test::Collapse(index))),
+    )
 }
 
 /// Comparison of a subject's most common answer with L0, if one was computed.
@@ -352,12 +363,13 @@ fn confidence(findings: &Findings<'_>) -> Tests {
         return TestTree::group([]);
     }
     let darkest = darkest(findings);
-    let tested = findings.calibrations.iter().enumerate().filter(|(_, row)| {
-        row.replies >= LEAST_CONFIDENT_REPLIES && darkest.contains(&&row.subject)
-    });
+    let tested =
+        findings.calibrations.iter().enumerate().filter(|(_, row)| {
+            row.replies >= MIN_CONFIDENT_REPLIES && darkest.contains(&&row.subject)
+        });
     TestTree::group(tested.map(|(index, row)| {
         let grown = row.growth.map(|_| TestTree::leaf(Test::Growth(index)));
-        TestTree::before(Test::Overconfident(index), grown.into_iter().collect())
+        TestTree::with_branches(Test::Overconfident(index), grown.into_iter().collect())
     }))
 }
 

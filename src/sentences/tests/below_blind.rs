@@ -27,7 +27,7 @@ fn against_words(
     };
     Comparison {
         kind: ComparisonKind::Blind,
-        first: ModelInCondition::seeing(model, level, &variant, None),
+        first: ModelInCondition::with_images(model, level, &variant, None),
         second: ModelInCondition::new(other, None),
         family: Some(family.clone()),
         strict: tested(difference, significance),

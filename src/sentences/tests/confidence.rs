@@ -31,7 +31,7 @@ fn tested(value: f64) -> TestedConfidence {
 fn calibration(confidence: f64, accuracy: f64) -> Calibration {
     let zero = around(0.0);
     Calibration {
-        subject: ModelInCondition::seeing("a", AxisLevel::L0, &Variant::NONE, None),
+        subject: ModelInCondition::with_images("a", AxisLevel::L0, &Variant::NONE, None),
         replies: 1200,
         reasoned: 0,
         unstated: 0,

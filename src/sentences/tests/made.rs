@@ -355,7 +355,7 @@ fn people_are_in_no_mean_even_if_they_answered_everything() {
     listing.add_people("human".to_owned());
     let say = |records: &[Record]| {
         let trials = records.iter().cloned().collect();
-        let findings = Findings::listed(&trials, &FrameTies::default(), [], &[], &listing);
+        let findings = Findings::with_listing(&trials, &FrameTies::default(), [], &[], &listing);
         assert!(findings.common.is_none());
         sentences(&findings)
     };

@@ -115,7 +115,7 @@ const DONE_IN: [(&str, &[&str]); 10] = [
 /// The word by which questions call a thing; its class if they do not name it.
 fn called(thing: &ThingTruth) -> String {
     static RULES: LazyLock<Rules> = LazyLock::new(|| Rules::built_in().unwrap());
-    let word = RULES.book().called(thing.class, thing.word);
+    let word = RULES.book().question_word(thing.class, thing.word);
     word.unwrap_or(thing.class).to_owned()
 }
 
@@ -161,7 +161,7 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
                     seen.truth.things.get(place)
                 })
                 .filter(|thing| offered.contains(&called(thing)));
-            let winner = offered.min_by(|a, b| a.near.total_cmp(&b.near));
+            let winner = offered.min_by(|a, b| a.distance.total_cmp(&b.distance));
             called(winner?)
         }
         Family::Other(_) => return None,
@@ -268,7 +268,7 @@ fn spoil(truth: &mut RoomTruth) {
     truth.room = "garage";
     for thing in &mut truth.things {
         thing.color = if thing.color == "red" { "blue" } else { "red" };
-        thing.near = -thing.near;
+        thing.distance = -thing.distance;
     }
     truth.things.reverse();
 }

@@ -1,7 +1,7 @@
-//! Answers from visible evidence alone: [`Observation::answer`].
+//! Answers from the seen objects: [`Observation::answer`].
 
-use super::wording::{QuestionTopic, ThingWord};
-use super::{Observation, Shade};
+use super::question_topic::{QuestionTopic, ThingWord};
+use super::{ColorPosterior, Observation};
 use crate::colors::{Color, Palette};
 use crate::room::classify;
 use crate::rule_context::YES_NO;
@@ -10,8 +10,8 @@ use crate::statistics::Segment;
 use darkqa_ground::types::Question;
 
 impl Observation {
-    /// The answer to a question, as an index of its choices. `None` if nothing that is seen bears on it, or if the question is
-    /// not one of the rulebook (see [`understood`](super::understood)).
+    /// Answers a question with the index of a choice. `None` if no seen object decides it, or if the question is not one of the rulebook
+    /// (see [`is_in_rulebook`](super::is_in_rulebook)).
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules, palette: &Palette) -> Option<usize> {
         let answer = match QuestionTopic::from_question(question, rules.book())? {
@@ -28,47 +28,53 @@ impl Observation {
             .position(|text| *text == answer)
     }
 
-    /// The room type by the seen segments. If the rulebook gives none, the type with the highest score, if it is alone with it.
+    /// Room type by the seen segments; if the rulebook gives none, the type with the highest score, unless several types share it.
     fn room(&self, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let signs = classify(&self.statistics, book);
         signs.room.ok().or_else(|| {
             let highest = signs.scores.values().max()?;
-            let mut first = signs.scores.iter().filter(|(_, score)| *score == highest);
-            let (room, _) = first.next()?;
-            let is_alone = first.next().is_none();
-            (is_alone && book.room.order.contains(room)).then(|| room.clone())
+            let best: Vec<&String> = signs
+                .scores
+                .iter()
+                .filter(|(_, score)| *score == highest)
+                .map(|(room, _)| room)
+                .collect();
+            match best[..] {
+                [room] if book.room.order.contains(room) => Some(room.clone()),
+                _ => None,
+            }
         })
     }
 
-    /// Yes if the things that the activity needs are seen. Else by the type of room, if there is one.
+    /// Yes if all objects that the activity needs are seen; else the answer follows from the room type, if it is known.
     fn affordance(&self, activity: usize, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let activity = book.activity.get(activity)?;
         let enabled = activity.enablers.iter().any(|tokens| {
             tokens
                 .iter()
-                .all(|token| self.statistics.shows(token, book))
+                .all(|token| self.statistics.has_token(token, book))
         });
         let yes = enabled || activity.rooms.contains(&self.room(rules)?);
         Some(yes_no(yes))
     }
 
-    /// Yes if the thing is seen. No if at least half of the area of all things is seen, and the thing is not among it: without
-    /// this, a black image would be answered with no.
+    /// Yes if the object is seen. No if it is not, although at least half of the area of all objects is seen: otherwise, the answers for a
+    /// black image would be no.
     fn presence(&self, thing: &ThingWord, rules: &Rules) -> Option<String> {
         let is_seen = self
             .statistics
             .segments
             .iter()
-            .any(|segment| thing.calls(segment, rules.book()));
+            .any(|segment| thing.matches(segment, rules.book()));
         (is_seen || self.sees_half(rules)).then(|| yes_no(is_seen))
     }
 
-    /// Whether at least half of the area of the frame's things is seen; of all segments, if there is no thing.
+    /// True if at least half of the area of the frame's objects is seen, or of all segments if the frame has no objects.
     fn sees_half(&self, rules: &Rules) -> bool {
         let book = rules.book();
-        let is_thing = |segment: &&Segment| !book.is(&segment.class, ClassFlag::Structural);
+        let is_thing = |segment: &&Segment| !book.has_flag(&segment.class, ClassFlag::Structural);
         let has_things = self.frame.segments.iter().any(|segment| is_thing(&segment));
         let area = |segments: &[Segment]| -> u64 {
             segments
@@ -81,7 +87,7 @@ impl Observation {
         all > 0 && 2 * seen >= all
     }
 
-    /// The colour of the largest segment that is called so, if that one is seen, among the colours offered.
+    /// Colour of the largest segment with this word, among the colours offered; `None` if the segment is not seen.
     fn color(
         &self,
         thing: &ThingWord,
@@ -93,19 +99,19 @@ impl Observation {
             .frame
             .segments
             .iter()
-            .filter(|segment| thing.calls(segment, rules.book()))
+            .filter(|segment| thing.matches(segment, rules.book()))
             .max_by_key(|segment| (segment.area, std::cmp::Reverse(segment.id)))?;
-        let shade: &Shade = self.shades.get(&largest.id)?.as_ref()?;
+        let color: &ColorPosterior = self.colors.get(&largest.id)?.as_ref()?;
         let texts = question.choices.texts();
         let offered: Vec<Color> = Color::ALL
             .into_iter()
             .filter(|color| texts.iter().any(|text| text == color.name()))
             .collect();
-        let color = shade.name(palette, &offered)?;
+        let color = color.name(palette, &offered)?;
         Some(color.name().to_owned())
     }
 
-    /// The nearest of the offered things that are seen, if at least two of the classes offered are: nearness is a comparison.
+    /// Nearest of the offered objects that are seen; `None` unless objects of at least two offered classes are seen.
     fn closest(&self, question: &Question, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let texts = question.choices.texts();
@@ -114,11 +120,11 @@ impl Observation {
             .segments
             .iter()
             .filter(|segment| {
-                let word = segment.called(book);
-                book.is(&segment.class, ClassFlag::Asked)
+                let word = segment.question_word(book);
+                book.has_flag(&segment.class, ClassFlag::Asked)
                     && texts.iter().any(|text| Some(&**text) == word)
             })
-            .filter_map(|segment| Some((segment.measured(book)?, segment)))
+            .filter_map(|segment| Some((segment.reliable_depth(book)?, segment)))
             .collect();
         let (_, nearest) = measured
             .iter()
@@ -126,7 +132,7 @@ impl Observation {
         let has_two = measured
             .iter()
             .any(|(_, segment)| segment.class != nearest.class);
-        has_two.then(|| nearest.called(book).map(str::to_owned))?
+        has_two.then(|| nearest.question_word(book).map(str::to_owned))?
     }
 }
 

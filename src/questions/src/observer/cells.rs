@@ -1,28 +1,28 @@
-//! The places at which contrast is measured: [`Cells`] of a frame, and the [`Element`]s of its outlines at three scales.
+//! Geometry of the contrast measurements: [`Cells`] of a frame, and [`Element`]s of its outlines at three scales.
 //!
-//! The frame is cut into square cells. The pixels of one mask in one cell are a patch. A cell of two or four times the side is
-//! four or sixteen small ones, so that sums over it are sums of theirs. A cell of the coarsest scale is a tile.
+//! The frame is cut into square cells. The pixels of one mask in one cell form a patch. A cell of the second or third scale consists of
+//! four or sixteen of the smallest cells, so that its sums are sums of theirs. A cell of the coarsest scale is a tile.
 
 use std::collections::BTreeMap;
 
 /// Number of the smallest cells along the shorter side of the frame (chosen).
 const CELLS: usize = 60;
 
-/// Sides of the cells of each scale, relative to the smallest. An observer that knows the signal averages over area: with one
-/// scale an enhancer that removes noise would seem to add evidence.
+/// Sides of the cells of each scale, relative to the smallest. An observer that knows the signal averages over area: with a single scale,
+/// an enhancer that removes noise would appear to add evidence.
 pub(super) const SCALES: [usize; 3] = [1, 2, TILE];
 
 /// Side of a tile, relative to the smallest cells.
 pub(super) const TILE: usize = 4;
 
-/// Pixels side by side in one row that belong to one patch.
+/// Consecutive pixels of a row that belong to one patch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Run {
     pub(super) patch: u32,
     pub(super) length: u32,
 }
 
-/// The pixels of one mask in one cell.
+/// Pixels of one mask in one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Patch {
     /// Index of the cell at the scale of the patch.
@@ -33,14 +33,14 @@ pub(super) struct Patch {
     pub(super) count: u32,
 }
 
-/// A piece of outline: a mask, and all else, in one cell.
+/// An element of an outline: a mask and all other pixels in one cell.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Element {
     /// Index of the patch of the mask.
     pub(super) patch: usize,
     /// Index of the cell.
     pub(super) cell: usize,
-    /// Index of the tile that the cell lies in.
+    /// Index of the tile that contains the cell.
     pub(super) tile: usize,
     /// The mask, from 1.
     pub(super) mask: u32,
@@ -50,33 +50,33 @@ pub(super) struct Element {
     pub(super) outside: f64,
 }
 
-/// The patches and elements at one scale.
+/// Patches and elements at one scale.
 #[derive(Debug)]
 pub(super) struct Scale {
-    /// For each patch of the smallest cells, the index of the patch of this scale that it belongs to.
+    /// Index of the patch of this scale that contains each patch of the smallest cells.
     pub(super) part_of: Vec<u32>,
     pub(super) patches: Vec<Patch>,
     /// Number of cells.
     pub(super) cells: usize,
-    /// Elements in the order of their cells and masks.
+    /// Elements, sorted by cell and mask.
     pub(super) elements: Vec<Element>,
 }
 
-/// The cells of a frame.
+/// Cells of a frame.
 #[derive(Debug)]
 pub(super) struct Cells {
     /// Side of the smallest cells, in pixels.
     pub(super) side: usize,
-    /// All pixels, row by row.
+    /// Runs of all pixels, row by row.
     pub(super) runs: Vec<Run>,
     /// Number of masks.
     pub(super) masks: usize,
-    /// The scales, the finest first.
+    /// Scales, the finest first.
     pub(super) scales: [Scale; 3],
 }
 
 impl Cells {
-    /// The cells of a map of masks of a given width and height.
+    /// Cuts a map of masks with this width and height into cells.
     pub(super) fn from_masks(masks: &[u32], [width, height]: [usize; 2]) -> Self {
         let side = (width.min(height) / CELLS).next_multiple_of(2).max(4);
         let (runs, patches) = cut(masks, width, side);
@@ -89,7 +89,7 @@ impl Cells {
         }
     }
 
-    /// The mask of each pixel.
+    /// Mask of each pixel.
     pub(super) fn mask_of_pixels(&self) -> Vec<u32> {
         let patches = &self.scales[0].patches;
         self.runs
@@ -101,7 +101,7 @@ impl Cells {
     }
 }
 
-/// The runs and the patches of the smallest cells, in the order of cells and masks.
+/// Returns the runs of all pixels, and the patches of the smallest cells, sorted by cell and mask.
 fn cut(masks: &[u32], width: usize, side: usize) -> (Vec<Run>, Vec<Patch>) {
     let columns = width.div_ceil(side);
     let (mut runs, mut patches) = (Vec::new(), Vec::<Patch>::new());
@@ -134,10 +134,10 @@ fn cut(masks: &[u32], width: usize, side: usize) -> (Vec<Run>, Vec<Patch>) {
 }
 
 impl Scale {
-    /// The patches in cells of `scale` times the smallest side, from those of the smallest.
+    /// Merges the patches of the smallest cells into cells of `scale` times their side.
     fn from_patches(smallest: &[Patch], columns: usize, side: usize, scale: usize) -> Self {
-        let wide = columns.div_ceil(scale);
-        let cell_of = |cell: usize| cell / columns / scale * wide + cell % columns / scale;
+        let scale_columns = columns.div_ceil(scale);
+        let cell_of = |cell: usize| cell / columns / scale * scale_columns + cell % columns / scale;
         let mut counts = BTreeMap::<(usize, u32), u32>::new();
         for patch in smallest {
             *counts.entry((cell_of(patch.cell), patch.mask)).or_default() += patch.count;
@@ -155,7 +155,7 @@ impl Scale {
         Self {
             elements: elements(&patches, cells, side * scale, |cell| {
                 let finer = TILE / scale;
-                cell / wide / finer * columns.div_ceil(TILE) + cell % wide / finer
+                cell / scale_columns / finer * columns.div_ceil(TILE) + cell % scale_columns / finer
             }),
             part_of,
             patches,
@@ -164,14 +164,14 @@ impl Scale {
     }
 }
 
-/// The elements among patches: the mask, and all else, each have at least 1/16 of the cell, and three pixels.
+/// Returns the elements: patches for which the mask and the other pixels each cover at least 1/16 of the cell and three pixels.
 fn elements(
     patches: &[Patch],
     cells: usize,
     side: usize,
     tile_of: impl Fn(usize) -> usize,
 ) -> Vec<Element> {
-    let least = (side * side / 16).max(3) as u32;
+    let min_pixels = (side * side / 16).max(3) as u32;
     let mut totals = vec![0; cells];
     for patch in patches {
         totals[patch.cell] += patch.count;
@@ -181,7 +181,7 @@ fn elements(
         .enumerate()
         .filter_map(|(index, patch)| {
             let outside = totals[patch.cell] - patch.count;
-            (patch.mask > 0 && patch.count.min(outside) >= least).then(|| Element {
+            (patch.mask > 0 && patch.count.min(outside) >= min_pixels).then(|| Element {
                 patch: index,
                 cell: patch.cell,
                 tile: tile_of(patch.cell),
@@ -198,7 +198,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_keep_every_pixel_and_coarse_ones_are_sums() {
+    fn cells_count_every_pixel_at_every_scale() {
         let [width, height] = [37, 29];
         let mask = |i: usize| (i % width / 9 + i / width / 11) as u32 % 3;
         let masks: Vec<u32> = (0..width * height).map(mask).collect();

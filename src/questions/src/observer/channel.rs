@@ -2,11 +2,11 @@
 //!
 //! The tone curve is the increasing function of the untouched code that is nearest to the received codes (isotonic regression by pool
 //! adjacent violators: Ayer et al., Ann. Math. Stat. 26:641, 1955). The residual counts as noise. A global tone curve or gain therefore
-//! changes nothing, and content that an enhancer invents is noise, because it is no function of the untouched code.
+//! changes nothing, and content that an enhancer invents is noise, because it is not a function of the untouched code.
 
 use super::tiles::{CODES, SameCode, TileSums, Tiles};
 
-/// The variance of a code is pooled over this many codes on either side, so that rare codes have one too (chosen).
+/// Number of codes on either side over which the variance of a code is pooled, so that rare codes also have a variance (chosen).
 const POOLED: usize = 8;
 
 /// Variance of rounding to whole codes, in codes squared.
@@ -28,7 +28,7 @@ pub(super) struct TileFit {
     pub(super) gain: [f64; 3],
     /// Variance of the noise in each channel, relative to that of the codes.
     pub(super) noise: [f64; 3],
-    /// Whether something other than light and noise disturbs the tile, such as a box that covers a part of it.
+    /// True if something other than light and noise disturbs the tile, such as a box that covers a part of it.
     pub(super) is_disturbed: bool,
 }
 
@@ -42,21 +42,21 @@ impl Default for TileFit {
     }
 }
 
-/// The channels of an image, and the share of its variance that they explain.
+/// Fitted channels of an image, and the share of its variance that they explain.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub(super) channels: [ChannelFit; 3],
     /// Light and noise of each tile.
     pub(super) tiles: Vec<TileFit>,
-    /// Whether light and noise differ from tile to tile.
+    /// True if light and noise are fitted for each tile.
     pub(super) is_local: bool,
-    /// R² = 1 − Σ(R − P)² / Σ(R − mean)² over all pixels and channels of one curve for the whole image, from 0 to 1; 0 for a
+    /// R² = 1 − Σ(R − P)² / Σ(R − mean)² over all pixels and channels, with one curve for the whole image; from 0 to 1, and 0 for a
     /// constant image.
     pub(super) explained: f64,
 }
 
 impl Fit {
-    /// Fits one curve for each channel to all pixels alike.
+    /// Fits one curve for each channel to all pixels.
     pub(super) fn whole(tiles: &Tiles, sums: &TileSums) -> Self {
         let (mut residual, mut total) = (0.0, 0.0);
         let channels = [0, 1, 2].map(|channel| {
@@ -66,7 +66,7 @@ impl Fit {
             }
             let fit = codes.fit();
             residual += codes.residuals(&fit.curve).iter().sum::<f64>();
-            total += codes.spread();
+            total += codes.total_squares();
             fit
         });
         Self {
@@ -82,7 +82,7 @@ impl Fit {
     }
 }
 
-/// Sums over the pixels of each untouched code, in one channel. Each pixel has a weight, and the gain of the light at its place.
+/// Sums over the pixels of each untouched code, in one channel. Each pixel has a weight and a gain of the light.
 #[derive(Debug, Clone)]
 pub(super) struct CodeTotals {
     /// Σ weight.
@@ -117,7 +117,7 @@ impl CodeTotals {
         }
     }
 
-    /// The curve nearest to the received codes, and the noise about it.
+    /// Fits the curve, and the noise around it.
     fn fit(&self) -> ChannelFit {
         let curve = self.curve();
         ChannelFit {
@@ -126,7 +126,7 @@ impl CodeTotals {
         }
     }
 
-    /// The increasing curve nearest to the received codes. Codes without a pixel lie on straight lines between the others.
+    /// Fits the increasing curve nearest to the received codes; codes without pixels are interpolated linearly.
     pub(super) fn curve(&self) -> [f64; CODES] {
         let occurs = |code: &usize| self.power[*code] > 0.0;
         // Value, weight and last code of each block of codes with the same value.
@@ -172,7 +172,7 @@ impl CodeTotals {
         curve
     }
 
-    /// The mean squared residual of each code and its neighbours.
+    /// Mean squared residual of each code, pooled with its neighbours.
     pub(super) fn noise(&self, curve: &[f64; CODES]) -> [f64; CODES] {
         let residuals = self.residuals(curve);
         std::array::from_fn(|code| {
@@ -183,7 +183,7 @@ impl CodeTotals {
         })
     }
 
-    /// The sum of squared residuals of each code.
+    /// Sum of squared residuals of each code.
     fn residuals(&self, curve: &[f64; CODES]) -> [f64; CODES] {
         std::array::from_fn(|code| {
             let fitted = curve[code];
@@ -193,8 +193,8 @@ impl CodeTotals {
         })
     }
 
-    /// The sum of squared differences of the received codes from their mean, if all gains are 1.
-    fn spread(&self) -> f64 {
+    /// Sum of squared differences of the received codes from their mean, if all gains are 1.
+    fn total_squares(&self) -> f64 {
         let [weight, received, squares] =
             [&self.weight, &self.received, &self.squares].map(|sums| sums.iter().sum::<f64>());
         if weight > 0.0 {
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn the_curve_increases_and_passes_through_what_does() {
+    fn curve_is_the_isotonic_fit() {
         let found = fit(&[10, 10, 20, 30, 40], &[4, 6, 8, 7, 90]);
         let curve = &found.channels[0].curve;
         for (code, value) in [

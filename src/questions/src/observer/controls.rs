@@ -1,40 +1,38 @@
-//! The images of the observer's controls, in which there is nothing to see of a frame, so that the observer must guess:
-//! [`spoiled`].
+//! Control images, which contain no evidence about a frame, so that the observer must guess: [`control_image`].
 //!
-//! An observer that answers more than chance on one of them answers from the labels and not from the pixels.
+//! An observer that scores above chance on them answers from the labels and not from the pixels.
 
 use super::ObservedFrame;
 use darkqa_ground::types::{Control, Digest, Rgb};
 
-/// Side of the squares that are shuffled, in pixels; smaller in images with fewer than three in a row or column.
+/// Side of the shuffled squares, in pixels; smaller if an image has fewer than three squares in a row or column.
 const TILE: usize = 80;
 
-/// Width of the three box means that stand for a Gaussian of σ = 20 pixels: σ² = 3 (41² − 1) / 12.
+/// Width of the three box filters that approximate a Gaussian of σ = 20 pixels: σ² = 3 (41² − 1) / 12.
 const BOX: usize = 41;
 
-/// An image as a control shows it. Random numbers are drawn from `key` and the name of the control.
+/// Returns the image of a control. The random numbers are determined by `key` and the name of the control.
 #[must_use]
-pub fn spoiled(control: Control, image: &Rgb, frame: &ObservedFrame, key: &Digest) -> Rgb {
-    let mut draws = Draws::new(key, control);
+pub fn control_image(control: Control, image: &Rgb, frame: &ObservedFrame, key: &Digest) -> Rgb {
+    let mut rng = SplitMix64::new(key, control);
     let [width, height] = [image.width(), image.height()];
-    let at = |from: &dyn Fn(usize, usize) -> [usize; 2]| moved(image, from);
     match control {
         Control::OtherRoom => image.clone(),
         Control::Mosaic12 => mosaic(image, 12),
         Control::Mosaic40 => mosaic(image, 40),
-        Control::Mirrored => at(&|x, y| [width - 1 - x, y]),
-        Control::UpsideDown => at(&|x, y| [x, height - 1 - y]),
-        Control::Tiles => tiles(image, &mut draws),
+        Control::Mirrored => remap(image, &|x, y| [width - 1 - x, y]),
+        Control::UpsideDown => remap(image, &|x, y| [x, height - 1 - y]),
+        Control::Tiles => shuffle_tiles(image, &mut rng),
         Control::Black => Rgb::black(height, width),
         Control::Flat => mosaic(image, width.max(height)),
         Control::WhiteNoise => {
             let mut noise = image.clone();
             for code in noise.samples_mut() {
-                *code = (draws.next() >> 56) as u8;
+                *code = (rng.next() >> 56) as u8;
             }
             noise
         }
-        Control::PinkNoise => pink_noise(image, &mut draws),
+        Control::PinkNoise => pink_noise(image, &mut rng),
         Control::Negative => {
             let mut negative = image.clone();
             for code in negative.samples_mut() {
@@ -42,18 +40,18 @@ pub fn spoiled(control: Control, image: &Rgb, frame: &ObservedFrame, key: &Diges
             }
             negative
         }
-        Control::Blur => blurred(image),
-        Control::Shift32 => at(&|x, y| shifted([x, y], [width, height], 32)),
-        Control::Shift4 => at(&|x, y| shifted([x, y], [width, height], 4)),
-        Control::RandomMasks => random_masks(frame, &mut draws),
-        Control::Outlines => drawn_outlines(frame),
+        Control::Blur => blur(image),
+        Control::Shift32 => remap(image, &|x, y| shifted([x, y], [width, height], 32)),
+        Control::Shift4 => remap(image, &|x, y| shifted([x, y], [width, height], 4)),
+        Control::RandomMasks => random_masks(frame, &mut rng),
+        Control::Outlines => draw_outlines(frame),
     }
 }
 
-/// Random numbers: `SplitMix64` (Steele, Lea and Flood, OOPSLA 2014).
-struct Draws(u64);
+/// Random number generator `SplitMix64` (Steele, Lea and Flood, OOPSLA 2014).
+struct SplitMix64(u64);
 
-impl Draws {
+impl SplitMix64 {
     fn new(key: &Digest, control: Control) -> Self {
         let seed = Digest::from_parts([&key.as_bytes()[..], control.name().as_bytes()]);
         let (words, _) = seed.as_bytes().as_chunks::<8>();
@@ -68,34 +66,34 @@ impl Draws {
         value ^ (value >> 31)
     }
 
-    /// A number from 0 up to `count`, exclusive. Its bias is below 2⁻⁴⁰ for the counts used here.
+    /// Returns an integer below `count`. The bias is less than 2⁻⁴⁰ for the counts used here.
     fn below(&mut self, count: usize) -> usize {
         (self.next() % count.max(1) as u64) as usize
     }
 
-    /// A number from 0 to 1.
+    /// Returns a number from 0 (inclusive) to 1 (exclusive).
     fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
 
-/// An image whose pixel at (x, y) is the one of `image` that `from` names.
-fn moved(image: &Rgb, from: &dyn Fn(usize, usize) -> [usize; 2]) -> Rgb {
+/// Moves pixels: the pixel at (x, y) is taken from `source(x, y)`.
+fn remap(image: &Rgb, source: &dyn Fn(usize, usize) -> [usize; 2]) -> Rgb {
     let width = image.width();
-    let mut moved = image.clone();
-    for (i, pixel) in moved.samples_mut().chunks_exact_mut(3).enumerate() {
-        let [x, y] = from(i % width, i / width);
+    let mut remapped = image.clone();
+    for (i, pixel) in remapped.samples_mut().chunks_exact_mut(3).enumerate() {
+        let [x, y] = source(i % width, i / width);
         pixel.copy_from_slice(&image.samples()[(y * width + x) * 3..][..3]);
     }
-    moved
+    remapped
 }
 
-/// The place `by` pixels to the left and above, around the edges.
-fn shifted(place: [usize; 2], size: [usize; 2], by: usize) -> [usize; 2] {
-    [0, 1].map(|axis| (place[axis] + size[axis] - by % size[axis]) % size[axis])
+/// Position `by` pixels to the left and above, wrapping around the edges.
+fn shifted(position: [usize; 2], size: [usize; 2], by: usize) -> [usize; 2] {
+    [0, 1].map(|axis| (position[axis] + size[axis] - by % size[axis]) % size[axis])
 }
 
-/// Each square of `side` pixels filled with its mean.
+/// Fills each square of `side` pixels with its mean.
 fn mosaic(image: &Rgb, side: usize) -> Rgb {
     let (width, columns) = (image.width(), image.width().div_ceil(side));
     let square = |i: usize| i / width / side * columns + i % width / side;
@@ -116,17 +114,17 @@ fn mosaic(image: &Rgb, side: usize) -> Rgb {
     mosaic
 }
 
-/// The tiles in a cyclic order at random (Sattolo 1986), so that none stays in its place. At the right and lower edges a tile is
-/// cut, or its last pixels are repeated.
-fn tiles(image: &Rgb, draws: &mut Draws) -> Rgb {
+/// Shuffles the tiles by a random cyclic permutation (Sattolo 1986), so that none stays in place. At the right and lower edges, a tile is
+/// cut or its last pixels are repeated.
+fn shuffle_tiles(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
     let [width, height] = [image.width(), image.height()];
     let side = TILE.min(width.min(height) / 3).max(1);
     let columns = width.div_ceil(side);
     let mut order: Vec<usize> = (0..columns * height.div_ceil(side)).collect();
     for last in (1..order.len()).rev() {
-        order.swap(last, draws.below(last));
+        order.swap(last, rng.below(last));
     }
-    moved(image, &|x, y| {
+    remap(image, &|x, y| {
         let tile = order[y / side * columns + x / side];
         let from = [
             tile % columns * side + x % side,
@@ -136,9 +134,9 @@ fn tiles(image: &Rgb, draws: &mut Draws) -> Rgb {
     })
 }
 
-/// A sum of noise fields, each twice as coarse as the one before, all with the same variance; scaled to mean 128 and a standard
-/// deviation of 50 codes.
-fn pink_noise(image: &Rgb, draws: &mut Draws) -> Rgb {
+/// Pink noise: a sum of noise fields, each twice as coarse as the one before, all with the same variance. It is scaled to a mean of 128 and
+/// a standard deviation of 50 codes.
+fn pink_noise(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
     let [width, height] = [image.width(), image.height()];
     let mut noise = image.clone();
     for channel in 0..3 {
@@ -147,7 +145,7 @@ fn pink_noise(image: &Rgb, draws: &mut Draws) -> Rgb {
         while side < width.max(height) {
             let columns = width / side + 2;
             let count = columns * (height / side + 2);
-            let knots: Vec<f64> = (0..count).map(|_| draws.unit() - 0.5).collect();
+            let knots: Vec<f64> = (0..count).map(|_| rng.unit() - 0.5).collect();
             for (i, value) in field.iter_mut().enumerate() {
                 let (x, y) = (i % width, i / width);
                 let [right, below] = [x % side, y % side].map(|rest| rest as f64 / side as f64);
@@ -172,8 +170,8 @@ fn pink_noise(image: &Rgb, draws: &mut Draws) -> Rgb {
     noise
 }
 
-/// Three box means along each axis.
-fn blurred(image: &Rgb) -> Rgb {
+/// Blurs an image with three box filters along each axis.
+fn blur(image: &Rgb) -> Rgb {
     let [width, height] = [image.width(), image.height()];
     let mut planes: Vec<f64> = image
         .samples()
@@ -197,7 +195,7 @@ fn blurred(image: &Rgb) -> Rgb {
     blurred
 }
 
-/// Replaces `count` values, `step` apart, by their means over [`BOX`] values; beyond the ends, the last ones are repeated.
+/// Replaces `count` values, `step` apart, by their means over [`BOX`] values; the end values are repeated beyond the ends.
 fn box_mean(values: &mut [f64], start: usize, step: usize, count: usize) {
     let line: Vec<f64> = (0..count).map(|i| values[start + i * step]).collect();
     let half = BOX as isize / 2;
@@ -210,10 +208,10 @@ fn box_mean(values: &mut [f64], start: usize, step: usize, count: usize) {
     }
 }
 
-/// The masks of a frame, each in a colour at random.
-fn random_masks(frame: &ObservedFrame, draws: &mut Draws) -> Rgb {
+/// Fills each mask of a frame with a random colour.
+fn random_masks(frame: &ObservedFrame, rng: &mut SplitMix64) -> Rgb {
     let colours: Vec<[u8; 3]> = (0..=frame.cells.masks)
-        .map(|_| [0; 3].map(|_: u8| (draws.next() >> 56) as u8))
+        .map(|_| [0; 3].map(|_: u8| (rng.next() >> 56) as u8))
         .collect();
     let masks = frame.cells.mask_of_pixels();
     let mut image = frame.untouched.clone();
@@ -223,8 +221,8 @@ fn random_masks(frame: &ObservedFrame, draws: &mut Draws) -> Rgb {
     image
 }
 
-/// Black where the pixel to the right or below belongs to another mask, grey elsewhere.
-fn drawn_outlines(frame: &ObservedFrame) -> Rgb {
+/// Draws a pixel black if the one to its right or below belongs to another mask, else grey.
+fn draw_outlines(frame: &ObservedFrame) -> Rgb {
     let masks = frame.cells.mask_of_pixels();
     let width = frame.untouched.width();
     let mut image = frame.untouched.clone();

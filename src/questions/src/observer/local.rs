@@ -259,7 +259,7 @@ fn light_field(tiles: &Tiles, moments: &[[Moments; 3]], weights: &[f64]) -> Vec<
     let rows = tiles.len().div_ceil(tiles.columns.max(1));
     let terms: Vec<[f64; TERMS]> = (0..tiles.len())
         .map(|tile| {
-            let [column, row] = tiles.place(tile);
+            let [column, row] = tiles.column_and_row(tile);
             // Centre of the tile, from −1 to 1.
             let x = (2.0 * column + 1.0) / tiles.columns as f64 - 1.0;
             let y = (2.0 * row + 1.0) / rows as f64 - 1.0;

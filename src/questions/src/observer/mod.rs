@@ -1,73 +1,72 @@
-//! A model observer: which answers can still be read from given pixels by one who knows the frame, [`ObservedFrame`] and
-//! [`Observation`].
+//! Model observer: finds the answers that can still be read from an image if the frame is known, [`ObservedFrame`] and [`Observation`].
 //!
-//! It is a signal-known-exactly, location-known observer (Barrett and Myers, *Foundations of Image Science*, 2004, chapter 13;
+//! The observer is signal-known-exactly and location-known (Barrett and Myers, *Foundations of Image Science*, 2004, chapter 13;
 //! Barrett, Yao, Rolland and Myers, "Model observers for assessment of image quality", PNAS 90:9758, 1993; Rose, J. Opt. Soc.
-//! Am. 38:196, 1948; Burgess, J. Opt. Soc. Am. A 16:633, 1999). It is given the masks, classes and depth of a frame and its
-//! untouched pixels. It is not given the degradation, the enhancer or the answer. For each thing it tests the hypothesis that
-//! the received pixels show this thing:
+//! Am. 38:196, 1948; Burgess, J. Opt. Soc. Am. A 16:633, 1999). It knows the masks, classes, depth and untouched pixels of a
+//! frame, but not the degradation, the enhancer or the answer. For each object it tests the hypothesis that the received pixels
+//! show this object:
 //!
-//! 1. The channel (`channel`): an increasing curve for each colour channel from untouched to received codes, and the noise that
-//!    is left. So a global tone curve or gain changes nothing, and what an enhancer invents counts as noise.
-//! 2. Light and noise by the place (`local`): if most of the image agrees with one curve, the gain of the light and the noise are
-//!    those of each tile. So uneven light changes little, and what covers a part of the image changes nothing elsewhere.
-//! 3. The outline (`cells`, `outlines`): in each piece of outline, at three scales, the contrast is compared with the predicted
-//!    one. A thing is seen if at least half of the pieces at one scale are confirmed.
-//! 4. The answer (`answers`): by the rules, from the seen things alone. If nothing that is seen bears on a question, there is
-//!    no answer, and the caller guesses.
+//! 1. Channel (`channel`): fits an increasing curve from untouched to received codes for each colour channel; the residual is noise. A
+//!    global tone curve or gain therefore changes nothing, and content that an enhancer invents counts as noise.
+//! 2. Local light and noise (`local`): if most of the image agrees with one curve, the gain of the light and the noise are estimated for
+//!    each tile. Uneven light therefore changes little, and an occluder changes nothing elsewhere.
+//! 3. Outline (`cells`, `outlines`): compares the contrast of each element of the outline with the predicted one, at three scales. An
+//!    object is seen if at least half of the elements at one scale are confirmed.
+//! 4. Answer (`answers`): follows from the seen objects by the rules. Without a seen object that decides a question, there is no answer,
+//!    and the caller guesses.
 //!
-//! Conclusion: this share of the answers can still be found by a viewer who knows frame, place and appearance, and only has to confirm each
-//! object piece by piece. It does not follow:
+//! The result is the share of answers that a viewer who knows frame, position and appearance could still find by confirming each object
+//! piece by piece. It does not imply:
 //!
-//! - that a model could do this: to know the signal exactly is far more than a viewer knows;
-//! - a bound: the covariance is diagonal with two measured factors, half of an outline is a rule, and one who uses the inside
-//!   of things, or knows rooms, may do better;
-//! - that an enhancer destroyed evidence where the line is lower: sharpening and halos are no function of the untouched code and
-//!   of smooth light, and count as noise.
+//! - that a model could do this: an exactly known signal is far more than a viewer knows;
+//! - an upper bound: the covariance is diagonal with two measured factors, half of an outline is a chosen threshold, and a viewer who uses
+//!   the interior of objects or knows rooms may do better;
+//! - that an enhancer destroyed evidence if its result is lower: sharpening and halos are not a function of the untouched code and smooth
+//!   light, so they count as noise.
 //!
-//! Changed geometry is another image: a shift by four pixels at 640×480 is enough. `controls` spoils images in ways that leave
-//! nothing to see; the answers must then be guesses.
+//! Changed geometry counts as another image: a shift by four pixels at 640×480 is enough. `controls` makes images without any evidence; the
+//! answers must then be guesses.
 
 mod answers;
 mod cells;
 mod channel;
+mod color_posterior;
 pub mod controls;
 mod local;
 mod outlines;
+pub(crate) mod question_topic;
 pub mod resample;
-mod shade;
 #[cfg(test)]
 mod tests;
 mod tiles;
-pub(crate) mod wording;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::colors::Palette;
 use super::rules::Rules;
-use super::statistics::scene::SceneMaps;
+use super::statistics::scene_maps::SceneMaps;
 use super::statistics::{FrameStatistics, measure};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Digest, Frame, Labels, Rgb};
 
 use cells::{Cells, TILE};
+use color_posterior::{ColorPosterior, LightEstimate};
 use outlines::{MIN_CONFIRMED, Outline, outlines, patch_sums};
+pub use question_topic::is_in_rulebook;
 use resample::area_mean;
-use shade::{Light, Shade};
 use tiles::Tiles;
-pub use wording::understood;
 
 /// Version of the observer's method; it enters the digest of the model.
 pub const VERSION: u32 = 3;
 
-/// The observer's knowledge of a frame: its untouched pixels, and the place of every segment.
+/// The observer's knowledge of a frame: untouched pixels and the mask of every segment.
 #[derive(Debug)]
 pub struct ObservedFrame {
     untouched: Rgb,
     cells: Cells,
     tiles: Tiles,
-    /// Number of each mask in the map of segments.
+    /// Number of each mask in the segment map.
     numbers: Vec<u32>,
     statistics: Arc<FrameStatistics>,
 }
@@ -91,21 +90,21 @@ impl ObservedFrame {
         })
     }
 
-    /// Observes a degraded or enhanced image of the frame. An image of another size is resampled to that of the masks.
+    /// Observes a degraded or enhanced image of the frame. An image of another size is resampled to the size of the masks.
     #[must_use]
-    pub fn look(&self, image: &Rgb) -> Observation {
-        self.look_with(image, MIN_CONFIRMED)
+    pub fn observe(&self, image: &Rgb) -> Observation {
+        self.observe_with(image, MIN_CONFIRMED)
     }
 
-    /// The same with another share of the elements that must be confirmed for a thing to be seen.
+    /// Observes an image with another minimum share of confirmed elements for a seen object.
     #[must_use]
-    pub fn look_with(&self, image: &Rgb, min_confirmed: f64) -> Observation {
+    pub fn observe_with(&self, image: &Rgb, min_confirmed: f64) -> Observation {
         let image = area_mean(image, [self.untouched.width(), self.untouched.height()]);
         let untouched = self.untouched.samples();
         let fit = local::fit(&self.tiles, &self.tiles.sums(untouched, image.samples()));
         let sums = patch_sums(&self.cells, untouched, &fit, &image);
         let outlines = outlines(&self.cells, &sums, &fit.tiles);
-        // The rules know the segments that are not tiny.
+        // Tiny segments are not part of the statistics.
         let segments = &self.statistics.segments;
         let masks: BTreeMap<u32, usize> = self.numbers.iter().copied().zip(1..).collect();
         let outlines: BTreeMap<u32, Outline> = segments
@@ -115,24 +114,23 @@ impl ObservedFrame {
                 Some((segment.id, *outline))
             })
             .collect();
-        let seen = outlines
+        let light = LightEstimate::new(&self.cells, &self.tiles, &sums, &fit);
+        let colors: BTreeMap<u32, Option<ColorPosterior>> = outlines
             .iter()
-            .filter(|(_, outline)| outline.confirmed >= min_confirmed);
-        let light = Light::new(&self.cells, &self.tiles, &sums, &fit);
-        let shades: BTreeMap<u32, Option<Shade>> = seen
-            .map(|(id, _)| (*id, light.shade(masks[id] as u32)))
+            .filter(|(_, outline)| outline.confirmed >= min_confirmed)
+            .map(|(id, _)| (*id, light.color(masks[id] as u32)))
             .collect();
         Observation {
             explained: fit.explained,
-            statistics: self.seen_only(&shades),
+            statistics: self.seen_only(&colors),
             frame: Arc::clone(&self.statistics),
             outlines,
-            shades,
+            colors,
         }
     }
 
-    /// The statistics of the frame, with the seen segments only.
-    fn seen_only(&self, seen: &BTreeMap<u32, Option<Shade>>) -> FrameStatistics {
+    /// Statistics of the frame, with the seen segments only.
+    fn seen_only(&self, seen: &BTreeMap<u32, Option<ColorPosterior>>) -> FrameStatistics {
         let mut statistics = (*self.statistics).clone();
         statistics
             .segments
@@ -161,45 +159,45 @@ pub struct Observation {
     frame: Arc<FrameStatistics>,
     /// Outline of each segment, by its number.
     outlines: BTreeMap<u32, Outline>,
-    /// Colour of each seen segment, by its number.
-    shades: BTreeMap<u32, Option<Shade>>,
+    /// Colour of each seen segment, by its number; `None` if too little of the segment is visible.
+    colors: BTreeMap<u32, Option<ColorPosterior>>,
 }
 
 impl Observation {
-    /// The share of the image's variance that the untouched frame explains (R²), from 0 to 1.
+    /// Share of the image's variance that the untouched frame explains (R²), from 0 to 1.
     #[must_use]
-    pub fn explained(&self) -> f64 {
+    pub fn explained_variance(&self) -> f64 {
         self.explained
     }
 
-    /// The number of things of the frame: segments that are not tiny.
+    /// Number of objects in the frame: segments that are not tiny.
     #[must_use]
-    pub fn things(&self) -> usize {
+    pub fn thing_count(&self) -> usize {
         self.frame.segments.len()
     }
 
-    /// The number of things that are seen.
+    /// Number of objects that are seen.
     #[must_use]
-    pub fn seen(&self) -> usize {
+    pub fn seen_count(&self) -> usize {
         self.statistics.segments.len()
     }
 
-    /// The number of things that are detected by their whole outline. This does not decide answers.
+    /// Number of objects that are detected by their whole outline. It does not affect the answers.
     #[must_use]
-    pub fn detected(&self) -> usize {
+    pub fn detected_count(&self) -> usize {
         self.outlines
             .values()
             .filter(|outline| outline.is_detected())
             .count()
     }
 
-    /// Whether the segment of this number is seen.
+    /// True if the segment of this number is seen.
     #[must_use]
-    pub fn sees(&self, segment: u32) -> bool {
-        self.shades.contains_key(&segment)
+    pub fn is_seen(&self, segment: u32) -> bool {
+        self.colors.contains_key(&segment)
     }
 
-    /// The segments of the frame that are not tiny, each with its number and class.
+    /// Number and class of each segment of the frame that is not tiny.
     pub fn segments(&self) -> impl Iterator<Item = (u32, &str)> {
         self.frame
             .segments
@@ -207,7 +205,7 @@ impl Observation {
             .map(|segment| (segment.id, &*segment.class))
     }
 
-    /// For each thing by its number, the share of its outline that is confirmed, from 0 to 1, and the z of the whole outline.
+    /// Number of each object, confirmed share of its outline from 0 to 1, and z of the whole outline.
     pub fn outlines(&self) -> impl Iterator<Item = (u32, f64, f64)> {
         self.outlines
             .iter()

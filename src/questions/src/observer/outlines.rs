@@ -3,28 +3,27 @@
 //! In each element (the pixels of a mask, and all others, in one cell) the difference of the means is compared with the predicted one: a
 //! matched filter whose template is the prediction, whitened by measured variances. Its amplitude is 1 for the predicted contrast and 0 for
 //! none; its detectability d′ is the signal-to-noise ratio of the prediction. Noise is neither white nor independent along an outline. Two
-//! factors correct for this, each measured in the same image from the residual of the contrasts, and never below 1. Those of disturbed
-//! tiles are measured separately, so that an object that covers a part of the image changes nothing elsewhere.
+//! factors correct for this, each measured in the same image from the residual of the contrasts, and never below 1. They are
+//! measured separately for disturbed tiles, so that an object that covers a part of the image changes nothing elsewhere.
 
 use super::cells::{Cells, Element, Scale};
 use super::channel::{Fit, ROUNDING, TileFit};
 use darkqa_ground::types::Rgb;
 
-/// Value of normal noise that is exceeded with probability 0.001 / 3: one false alarm in a thousand tests, over three scales
-/// (chosen).
+/// z that normal noise exceeds with probability 0.001 / 3: one false alarm in a thousand tests, over three scales (chosen).
 pub(super) const THRESHOLD: f64 = 3.402_932_835_385_304_3;
 
-/// Least amplitude: nearer to "as predicted" than to "nothing".
+/// Minimum amplitude: nearer to the predicted contrast (1) than to none (0).
 const MIN_AMPLITUDE: f64 = 0.5;
 
-/// Share of the elements of an outline that must be confirmed for a thing to be seen. It is a rule (chosen), not a result.
+/// Minimum share of confirmed elements of the outline of a seen object (chosen).
 pub(super) const MIN_CONFIRMED: f64 = 0.5;
 
-/// Fewest elements of a thing at which a coarser scale counts, so that one lucky element does not make a thing seen (chosen).
-/// The finest scale always counts.
+/// Minimum number of elements of an object for a coarser scale to count, so that one lucky element is not enough (chosen). The finest scale
+/// always counts.
 const MIN_ELEMENTS: u32 = 3;
 
-/// Fixed-point numbers have 16 binary digits after the point, so that sums are exact and have no order.
+/// Scale of fixed-point numbers, with 16 fractional bits. Fixed-point sums are exact and do not depend on the order.
 const FIXED: f64 = 65_536.0;
 
 /// Sums over the pixels of a patch, by channel.
@@ -46,7 +45,7 @@ impl PatchSums {
         }
     }
 
-    /// The means of received codes, predicted codes and variances of a channel, over `count` pixels.
+    /// Means of received codes, predicted codes and variances of a channel, over `count` pixels.
     pub(super) fn means(&self, channel: usize, count: f64) -> [f64; 3] {
         let [predicted, variance] = self.predicted[channel];
         [
@@ -56,24 +55,24 @@ impl PatchSums {
         ]
     }
 
+    /// Returns the sums without those of a part.
     fn without(&self, part: &Self) -> Self {
-        let minus = |a: u64, b: u64| a.saturating_sub(b);
         Self {
-            received: [0, 1, 2].map(|i| minus(self.received[i], part.received[i])),
+            received: [0, 1, 2].map(|i| self.received[i].saturating_sub(part.received[i])),
             predicted: [0, 1, 2]
-                .map(|i| [0, 1].map(|j| minus(self.predicted[i][j], part.predicted[i][j]))),
+                .map(|i| [0, 1].map(|j| self.predicted[i][j].saturating_sub(part.predicted[i][j]))),
         }
     }
 }
 
-/// The sums of the patches of the smallest cells.
+/// Sums over the patches of the smallest cells.
 pub(super) fn patch_sums(
     cells: &Cells,
     untouched: &[u8],
     fit: &Fit,
     image: &Rgb,
 ) -> Vec<PatchSums> {
-    // Converting to an integer clamps to its range, which curves leave only in light near 0.
+    // The conversion to an integer saturates; curves exceed its range only in light near 0.
     let fixed = |value: f64| (value * FIXED + 0.5) as u32;
     let tables: [[[u32; 2]; 256]; 3] = [0, 1, 2].map(|channel| {
         let fit = &fit.channels[channel];
@@ -115,24 +114,23 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    /// Whether the thing is detected by its whole outline. This does not decide answers: clutter that happens to agree is
-    /// enough for it.
+    /// True if the object is detected by its whole outline. It does not affect the answers, because clutter may agree by chance.
     pub(super) fn is_detected(&self) -> bool {
         self.z >= THRESHOLD
     }
 }
 
-/// The outline of each mask; index 0 is unused.
+/// Measures the outline of each mask; index 0 is unused.
 pub(super) fn outlines(cells: &Cells, sums: &[PatchSums], tiles: &[TileFit]) -> Vec<Outline> {
     let mut outlines = vec![Outline::default(); cells.masks + 1];
     for (index, scale) in cells.scales.iter().enumerate() {
         let min_elements = if index == 0 { 1 } else { MIN_ELEMENTS };
-        measure(scale, sums, tiles, min_elements, &mut outlines);
+        measure_scale(scale, sums, tiles, min_elements, &mut outlines);
     }
     outlines
 }
 
-/// The contrast of an element in one channel.
+/// Contrast of an element in one channel.
 #[derive(Debug, Clone, Copy)]
 struct Contrast {
     /// Difference of the received means, in codes.
@@ -143,33 +141,34 @@ struct Contrast {
     variance: f64,
 }
 
-/// Sums of an element, or of an outline, over the channels.
+/// Matched filter of an element or an outline: sums over the channels, with p the predicted contrast, d the received contrast and v its
+/// variance.
 #[derive(Debug, Clone, Copy, Default)]
-struct Filter {
-    /// Σ p d / v: the matched filter's output.
+struct MatchedFilter {
+    /// Σ p d / v: output of the filter.
     output: f64,
-    /// Σ p² / v: the power of the prediction.
+    /// Σ p² / v: power of the prediction.
     power: f64,
-    /// Σ p (d − p) / v: the residual.
-    rest: f64,
+    /// Σ p (d − p) / v: residual.
+    residual: f64,
 }
 
-impl Filter {
+impl MatchedFilter {
     fn add(&mut self, other: &Self) {
         self.output += other.output;
         self.power += other.power;
-        self.rest += other.rest;
+        self.residual += other.residual;
     }
 
-    /// z of the filter if its variance is `inflation` times its power; `None` without power, or with too small an amplitude.
+    /// z of the filter if its variance is `inflation` times its power; `None` without power or if the amplitude is too small.
     fn z(&self, inflation: f64) -> Option<f64> {
-        let is_enough = self.power > 0.0 && self.output >= MIN_AMPLITUDE * self.power;
-        is_enough.then(|| self.output / (inflation * self.power).sqrt())
+        let is_strong_enough = self.power > 0.0 && self.output >= MIN_AMPLITUDE * self.power;
+        is_strong_enough.then(|| self.output / (inflation * self.power).sqrt())
     }
 }
 
-/// Measures the elements of one scale, and raises the outlines that they confirm better than another scale.
-fn measure(
+/// Measures the elements of one scale and updates the outlines that they confirm better than the other scales.
+fn measure_scale(
     scale: &Scale,
     sums: &[PatchSums],
     tiles: &[TileFit],
@@ -177,17 +176,19 @@ fn measure(
     outlines: &mut [Outline],
 ) {
     let filters = filters(scale, sums, tiles);
-    let mut whole = vec![Filter::default(); outlines.len()];
+    let mut whole = vec![MatchedFilter::default(); outlines.len()];
     for (element, filter) in scale.elements.iter().zip(&filters) {
         whole[element.mask as usize].add(filter);
     }
     let single = [false, true].map(|is_disturbed| {
-        let alike = scale
-            .elements
-            .iter()
-            .zip(&filters)
-            .filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
-        inflation(alike.map(|(_, filter)| filter))
+        inflation(
+            scale
+                .elements
+                .iter()
+                .zip(&filters)
+                .filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed)
+                .map(|(_, filter)| filter),
+        )
     });
     let shared = inflation(whole.iter());
     let mut counts = vec![[0_u32; 2]; outlines.len()];
@@ -207,10 +208,12 @@ fn measure(
     }
 }
 
-/// Ratio of the scatter of the filters' outputs to that expected from their power; at least 1.
-fn inflation<'a>(filters: impl Iterator<Item = &'a Filter> + Clone) -> f64 {
+/// Ratio of the scatter of the outputs of filters to the scatter expected from their power; at least 1.
+fn inflation<'a>(filters: impl Iterator<Item = &'a MatchedFilter> + Clone) -> f64 {
     let power: f64 = filters.clone().map(|filter| filter.power).sum();
-    let squares: f64 = filters.map(|filter| filter.rest * filter.rest).sum();
+    let squares: f64 = filters
+        .map(|filter| filter.residual * filter.residual)
+        .sum();
     if power > 0.0 {
         (squares / power).max(1.0)
     } else {
@@ -218,8 +221,8 @@ fn inflation<'a>(filters: impl Iterator<Item = &'a Filter> + Clone) -> f64 {
     }
 }
 
-/// The filter of each element, after the variance of each channel is raised to the residual of its contrasts.
-fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Filter> {
+/// Returns the filter of each element. The variance of each channel is first scaled by the excess scatter of its contrasts.
+fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<MatchedFilter> {
     let mut sums = vec![PatchSums::default(); scale.patches.len()];
     for (part, whole) in smallest.iter().zip(&scale.part_of) {
         sums[*whole as usize].add(part);
@@ -245,13 +248,13 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Filt
     elements()
         .map(|(element, contrast)| {
             let excess = excess[usize::from(tiles[element.tile].is_disturbed)];
-            let mut filter = Filter::default();
+            let mut filter = MatchedFilter::default();
             for (contrast, excess) in contrast.iter().zip(excess) {
                 let (predicted, variance) = (contrast.predicted, contrast.variance * excess);
-                filter.add(&Filter {
+                filter.add(&MatchedFilter {
                     output: predicted * contrast.received / variance,
                     power: predicted * predicted / variance,
-                    rest: predicted * (contrast.received - predicted) / variance,
+                    residual: predicted * (contrast.received - predicted) / variance,
                 });
             }
             filter
@@ -259,15 +262,16 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Filt
         .collect()
 }
 
-/// Ratio of the contrasts' scatter about the predicted ones to that expected from their variances; at least 1.
+/// Ratio of the scatter of contrasts around the predicted ones to the scatter expected from their variances; at least 1.
 fn excess(contrasts: impl Iterator<Item = Contrast>) -> f64 {
     let [sum, count] = contrasts.fold([0.0, 0.0], |[sum, count], contrast| {
-        let rest = contrast.received - contrast.predicted;
-        [sum + rest * rest / contrast.variance, count + 1.0]
+        let residual = contrast.received - contrast.predicted;
+        [sum + residual * residual / contrast.variance, count + 1.0]
     });
     (sum / f64::max(count, 1.0)).max(1.0)
 }
 
+/// Contrast of an element in each channel.
 fn contrast(
     element: &Element,
     inside: &PatchSums,

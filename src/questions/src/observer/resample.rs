@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use darkqa_ground::types::Rgb;
 
-/// The image in a given width and height. Each pixel is the mean of the area that it covers, rounded half up.
+/// Resamples an image to a width and height. Each pixel is the mean of the area that it covers, rounded half up.
 #[must_use]
 pub fn area_mean(image: &Rgb, [width, height]: [usize; 2]) -> Cow<'_, Rgb> {
     if [image.width(), image.height()] == [width, height] {
@@ -31,7 +31,7 @@ pub fn area_mean(image: &Rgb, [width, height]: [usize; 2]) -> Cow<'_, Rgb> {
         .map_or_else(|_| Cow::Owned(Rgb::black(height, width)), Cow::Owned)
 }
 
-/// For each of `to` equal parts of `from` pixels, the pixels that it covers and how much of them, in parts of a pixel / `to`.
+/// For each of `to` equal parts of `from` pixels, returns the covered pixels with their overlaps, in units of 1 / `to` pixel.
 fn spans(from: usize, to: usize) -> Vec<Vec<(usize, u64)>> {
     (0..to)
         .map(|part: usize| {
@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pixel_is_the_mean_of_what_it_covers() {
+    fn pixel_is_the_mean_of_its_area() {
         let image = |codes: &[u8], width: usize| {
             let samples: Vec<u8> = codes.iter().flat_map(|code| [*code; 3]).collect();
             Rgb::new(codes.len() / width, width, samples).unwrap()

@@ -74,7 +74,7 @@ impl<'a> Untouched<'a> {
         }
     }
 
-    fn look(&self, received: &Rgb) -> Vec<Outline> {
+    fn observe(&self, received: &Rgb) -> Vec<Outline> {
         let untouched = self.image.samples();
         let sums = self.tiles.sums(untouched, received.samples());
         let fit = local::fit(&self.tiles, &sums);
@@ -83,8 +83,8 @@ impl<'a> Untouched<'a> {
     }
 }
 
-fn look(masks: &[u32], untouched: &Rgb, received: &Rgb) -> Vec<Outline> {
-    Untouched::new(masks, untouched).look(received)
+fn observe(masks: &[u32], untouched: &Rgb, received: &Rgb) -> Vec<Outline> {
+    Untouched::new(masks, untouched).observe(received)
 }
 
 /// Codes of a disc on a background, and the same in noise of a standard deviation, independent in every sample.
@@ -128,7 +128,7 @@ fn z_is_contrast_over_noise_times_the_root_of_the_pixels() {
     let found: Vec<f64> = (0..8)
         .flat_map(|seed| {
             let noisy = in_noise(&untouched, deviation, seed);
-            look(&masks, &untouched, &noisy).split_off(2)
+            observe(&masks, &untouched, &noisy).split_off(2)
         })
         .map(|outline| outline.z)
         .collect();
@@ -144,7 +144,7 @@ fn z_is_contrast_over_noise_times_the_root_of_the_pixels() {
 fn contrast_is_seen_if_it_is_the_predicted_one() {
     let masks = discs(1, 60.0);
     let untouched = image(|i| if masks[i] == 2 { 150.0 } else { 100.0 });
-    let seen = |received: &Rgb| look(&masks, &untouched, received)[2].confirmed >= 0.5;
+    let seen = |received: &Rgb| observe(&masks, &untouched, received)[2].confirmed >= 0.5;
     let step = |inside: f64, outside: f64, seed: u64| {
         let flat = image(|i| if masks[i] == 2 { inside } else { outside });
         in_noise(&flat, 3.0, seed)
@@ -182,7 +182,7 @@ fn less_than_half_of_the_predicted_contrast_is_not_confirmed() {
             let own = if masks[i] == 2 { share } else { 1.0 };
             100.0 + own * (code(masks[i]) - 100.0)
         });
-        let found = look(&masks, &untouched, &in_noise(&received, 4.0, 1))[2];
+        let found = observe(&masks, &untouched, &in_noise(&received, 4.0, 1))[2];
         assert_eq!(found.confirmed >= 0.5, expected, "{share}: {found:?}");
     }
 }
@@ -212,7 +212,7 @@ fn noise_alone_shows_nothing() {
                 };
                 100.0 + 8.0 * noise
             });
-            for outline in &known.look(&received)[2..] {
+            for outline in &known.observe(&received)[2..] {
                 things += 1;
                 detected[kind] += u32::from(outline.is_detected());
                 seen[kind] += u32::from(outline.confirmed >= 0.5);
@@ -245,7 +245,7 @@ fn frames_without_contrast_show_nothing() {
         (&vec![1; width * height], &untouched, &untouched),
         (&vec![0; width * height], &untouched, &untouched),
     ] {
-        let found = look(masks, untouched, received);
+        let found = observe(masks, untouched, received);
         assert!(
             found.iter().all(|outline| outline.confirmed <= 0.0),
             "{found:?}"

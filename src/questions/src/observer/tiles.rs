@@ -1,7 +1,7 @@
-//! The untouched codes of each part of a frame, [`Tiles`], and the received codes at their pixels, [`TileSums`].
+//! Untouched codes of each tile of a frame, [`Tiles`], and received codes at the same pixels, [`TileSums`].
 //!
-//! A tile is a cell of the coarsest scale. Sums over the pixels of one tile, channel and untouched code are all that the channels
-//! are estimated from, for the whole frame as for any part of it.
+//! A tile is a cell of the coarsest scale. The channels are estimated from the sums over the pixels of each tile, channel and untouched
+//! code, both for the whole frame and for any part of it.
 
 use std::ops::Range;
 
@@ -10,10 +10,10 @@ use darkqa_ground::types::Rgb;
 /// Number of codes of a channel.
 pub(super) const CODES: usize = 256;
 
-/// Least standard deviation of the untouched codes of a tile that has contrast, in codes (chosen).
+/// Minimum standard deviation of the untouched codes of a tile with contrast, in codes (chosen).
 const MIN_CONTRAST: f64 = 4.0;
 
-/// Sums over the pixels whose untouched code is the same, in one channel.
+/// Sums over the pixels with the same untouched code, in one channel.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct CodeSums {
     /// Sum of the received codes.
@@ -37,7 +37,7 @@ pub(super) struct Tiles {
     codes: Vec<u8>,
     /// Number of pixels of each of `codes`.
     counts: Vec<u32>,
-    /// Whether the untouched codes of each tile have contrast.
+    /// True for each tile whose untouched codes have contrast.
     contrasted: Vec<bool>,
 }
 
@@ -45,7 +45,7 @@ pub(super) struct Tiles {
 #[derive(Debug)]
 pub(super) struct TileSums(Vec<CodeSums>);
 
-/// The pixels of one tile with the same untouched code in one channel.
+/// Pixels of one tile with the same untouched code in one channel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SameCode {
     pub(super) code: usize,
@@ -58,7 +58,7 @@ pub(super) struct SameCode {
 }
 
 impl Tiles {
-    /// The tiles of an untouched image, `side` pixels wide and high; at the right and lower edges they are cut.
+    /// Cuts an untouched image into tiles of `side` × `side` pixels; tiles at the right and lower edges may be smaller.
     pub(super) fn new(untouched: &Rgb, side: usize) -> Self {
         let width = untouched.width();
         let columns = width.div_ceil(side);
@@ -106,17 +106,17 @@ impl Tiles {
         self.contrasted.len()
     }
 
-    /// Whether the untouched codes of a tile have contrast.
+    /// True if the untouched codes of a tile have contrast.
     pub(super) fn has_contrast(&self, tile: usize) -> bool {
         self.contrasted[tile]
     }
 
-    /// Place of a tile: its column and its row.
-    pub(super) fn place(&self, tile: usize) -> [f64; 2] {
+    /// Column and row of a tile.
+    pub(super) fn column_and_row(&self, tile: usize) -> [f64; 2] {
         [(tile % self.columns) as f64, (tile / self.columns) as f64]
     }
 
-    /// The sums of an image of the same size.
+    /// Sums the received codes of an image of the same size.
     pub(super) fn sums(&self, untouched: &[u8], received: &[u8]) -> TileSums {
         let mut sums = Vec::with_capacity(self.codes.len());
         let mut row_of_tiles = vec![[[CodeSums::default(); CODES]; 3]; self.columns];
@@ -145,7 +145,7 @@ impl Tiles {
         TileSums(sums)
     }
 
-    /// The pixels of a channel of a tile by their untouched code.
+    /// Pixels of a channel of a tile, by their untouched code.
     pub(super) fn by_code<'a>(
         &'a self,
         sums: &'a TileSums,
@@ -170,7 +170,7 @@ impl Tiles {
     }
 }
 
-/// Variance of the codes of a histogram; 0 of an empty one.
+/// Variance of the codes in a histogram; 0 for an empty one.
 fn variance(counts: &[u32; CODES]) -> f64 {
     let [n, sum, squares] =
         counts
@@ -184,7 +184,7 @@ fn variance(counts: &[u32; CODES]) -> f64 {
     squares / n - sum / n * (sum / n)
 }
 
-/// Adds the pixels of a part of a row.
+/// Adds the pixels of a part of a row to the sums of a tile.
 fn add(sums: &mut [[CodeSums; CODES]; 3], untouched: &[u8], received: &[u8]) {
     let (untouched, _) = untouched.as_chunks::<3>();
     let (received, _) = received.as_chunks::<3>();

@@ -6,7 +6,10 @@ use super::{ClassFlag, RuleBook, SCHEMA};
 use darkqa_ground::types::Choices;
 
 impl RuleBook {
-    /// Returns the first inconsistency as an error message.
+    /// Checks the rulebook.
+    ///
+    /// # Errors
+    /// The first inconsistency, as a message.
     pub(super) fn check(&self) -> Result<(), String> {
         if self.schema != SCHEMA {
             return Err(format!("schema {:?}; {SCHEMA:?} expected", self.schema));
@@ -78,7 +81,7 @@ impl RuleBook {
         Ok(())
     }
 
-    /// Every asked class has a word, no two classes share one, and the grammar is that of known words.
+    /// Checks that every asked class has a word, that no two classes share a word, and that `[words]` lists known words only.
     fn check_words(&self) -> Result<(), String> {
         let mut known = BTreeSet::new();
         for (class, rule) in &self.class {

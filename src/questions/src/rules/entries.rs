@@ -1,4 +1,4 @@
-//! The tables of a rulebook. Fields without a comment are explained in `rules.toml`.
+//! Tables of a rulebook. Fields without a comment are explained in `rules.toml`.
 
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
@@ -46,7 +46,7 @@ pub struct EvidenceRule {
 pub enum ClassFlag {
     /// Part of the building, such as a wall.
     Structural,
-    /// Lies flat on a surface, so it is never the closest object.
+    /// Flat on a surface, so never the closest object.
     Flat,
     /// Contains objects of many kinds; never asked.
     Generic,
@@ -62,33 +62,33 @@ pub enum ClassFlag {
 pub struct ClassRule {
     /// Properties of the class; may be empty.
     pub flags: BTreeSet<ClassFlag>,
-    /// Words by which questions call things of the class; may be empty for classes that no question names.
+    /// Words that questions use for objects of the class; may be empty for classes that no question names.
     #[serde(default)]
     pub words: Vec<String>,
-    /// Classes whose unnamed pixels may hide a thing of this class.
+    /// Classes whose unnamed pixels may hide an object of this class.
     #[serde(default)]
     pub hidden: BTreeSet<String>,
 }
 
-/// The grammar of the words in questions.
+/// Grammar and spelling of the words in questions.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GrammarRule {
     /// Words that are plural.
     pub plural: BTreeSet<String>,
-    /// Words that take the article "an"; others take "a".
+    /// Words with the article "an"; the others take "a".
     pub an: BTreeSet<String>,
-    /// The word in questions for words that data sets write otherwise.
+    /// Spelling in questions of words that data sets spell differently.
     pub spelled: BTreeMap<String, String>,
 }
 
-/// Vague words, which stand for several kinds of objects.
+/// Vague words, which are used for several kinds of objects.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoarseRule {
     /// Names of segments without information.
     pub vague: BTreeSet<String>,
-    /// By label space, the words that identify an object. In a space that is not listed, all words do.
+    /// Words that identify an object, by label space. In a label space that is not listed, all words do.
     pub spaces: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -101,7 +101,7 @@ impl CoarseRule {
 
     /// True if the word of a label space identifies an object.
     #[must_use]
-    pub fn says(&self, space: &str, word: &str) -> bool {
+    pub fn identifies_object(&self, space: &str, word: &str) -> bool {
         let words = self.spaces.get(space);
         words.is_none_or(|words| words.contains(word)) && !word.is_empty()
     }
@@ -111,9 +111,9 @@ impl CoarseRule {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WordRules {
-    /// Words whose segments are flat, whatever their class.
+    /// Words whose segments are flat, regardless of their class.
     pub flat: BTreeSet<String>,
-    /// By class, words that do not fit the class in plain English.
+    /// Words that do not fit their class in plain English, by class.
     pub unlike: BTreeMap<String, BTreeSet<String>>,
 }
 
@@ -136,16 +136,16 @@ pub struct RoomRule {
     pub order: Vec<String>,
 }
 
-/// A token: a kind of object that matters for the type of room, found by the word and class of a segment.
+/// A token: a kind of object that matters for the room type, recognized by the word and class of a segment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TokenRule {
     /// Name of the token.
     pub token: String,
-    /// Words of the data set that it stands for.
+    /// Words of the data set that the token covers.
     #[serde(default)]
     pub names: BTreeSet<String>,
-    /// Beginnings of words that it stands for.
+    /// Prefixes of words that the token covers.
     #[serde(default)]
     pub starts: Vec<String>,
     /// Class that the segment must have; `None` for any class.
@@ -153,7 +153,7 @@ pub struct TokenRule {
     pub class: Option<String>,
 }
 
-/// A combination of objects that is evidence for a type of room.
+/// A combination of objects that is evidence for a room type.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Clue {
@@ -189,13 +189,13 @@ fn one() -> usize {
     1
 }
 
-/// A rule by which one of two rival room types wins.
+/// A rule that decides between two rival room types.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contest {
     /// Room type that wins.
     pub winner: String,
-    /// Room type that it wins against.
+    /// Room type that loses.
     pub loser: String,
     /// Minimum score of the winner.
     #[serde(default)]
@@ -211,7 +211,7 @@ pub struct Contest {
     pub unseen: Vec<String>,
 }
 
-/// Thresholds for a room seen through a door: how much smaller and farther its segments are.
+/// Minimum ratios of area and depth between a room and another one that is seen through a door.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Doorway {
@@ -219,7 +219,7 @@ pub struct Doorway {
     pub depth_ratio_ppm: u64,
 }
 
-/// Limits of a frame in which a class or token can be called absent.
+/// Limits for a frame in which a class or token can be called absent.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClosedWorld {
@@ -227,7 +227,7 @@ pub struct ClosedWorld {
     pub mirror_ppm: u64,
 }
 
-/// The thresholds of "What type of room is this?"
+/// Thresholds of "What type of room is this?"
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoomTypeRule {
@@ -237,7 +237,7 @@ pub struct RoomTypeRule {
     pub large_ppm: u64,
 }
 
-/// The template of "Is this room suitable for this?"
+/// Template of "Is this room suitable for this?"
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AffordanceRule {
@@ -292,7 +292,7 @@ pub struct ColorRule {
     pub neighbours: Vec<[Color; 2]>,
 }
 
-/// The colours that are offered as choices.
+/// Colours that are offered as choices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ColorChoices {
@@ -300,11 +300,11 @@ pub enum ColorChoices {
     All11,
     /// The colours listed in `fixed8`.
     Fixed8,
-    /// The answer and four colours that are not its neighbours.
+    /// The answer and four colours that are unlikely to be confused with it.
     K5,
 }
 
-/// The thresholds of "Which object is closest to the camera?"
+/// Thresholds of "Which object is closest to the camera?"
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClosestRule {
@@ -320,7 +320,7 @@ pub struct ClosestRule {
     pub choices: usize,
 }
 
-/// The objects between which the gap is measured.
+/// Objects between which the gap is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum GapScope {

@@ -1,7 +1,7 @@
-//! The rulebook: every threshold, table and template that questions are generated with, [`Rules`].
+//! Rulebook with all thresholds, tables and templates for generating questions: [`Rules`].
 //!
-//! A rulebook is one TOML file. The built-in one is `rules.toml`; its comments explain each entry and give its source. The
-//! fields here have the same names.
+//! A rulebook is a TOML file. The built-in one is `rules.toml`; its comments explain each entry and give its source. The fields here have
+//! the same names.
 
 mod check;
 mod entries;
@@ -21,7 +21,7 @@ const BUILT_IN: &str = include_str!("../rules.toml");
 /// Schema of the file, with its version.
 const SCHEMA: &str = "darkqa.rules/1";
 
-/// A checked rulebook with its digests.
+/// A validated rulebook with its digests.
 #[derive(Debug, Clone)]
 pub struct Rules {
     book: RuleBook,
@@ -29,14 +29,14 @@ pub struct Rules {
     measure_digest: Digest,
 }
 
-/// The content of a rulebook file.
+/// Content of a rulebook file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RuleBook {
     schema: String,
-    /// Version of the rules; it stands in the evidence of each question.
+    /// Version of the rules, recorded in the evidence of each question.
     pub version: String,
-    /// Seed of every pick between candidates that are equally good.
+    /// Seed of every pick among equally good candidates.
     pub seed: u64,
     pub measure: MeasureRule,
     pub qualified: EvidenceRule,
@@ -47,7 +47,7 @@ pub struct RuleBook {
     pub names: WordRules,
     pub confusable: Vec<Confusable>,
     pub room: RoomRule,
-    /// The first token that matches a segment counts.
+    /// Tokens in order of priority: the first one that matches a segment counts.
     pub token: Vec<TokenRule>,
     pub clue: Vec<Clue>,
     pub contest: Vec<Contest>,
@@ -87,49 +87,52 @@ impl Rules {
             wrong(format!("line {line}: {problem}"))
         })?;
         book.check().map_err(wrong)?;
-        // The digest covers the values, not the text: a comment does not change it.
-        let content = |part: String| Digest::from_parts([part.as_bytes()]);
-        let whole = serde_json::to_string(&book).map_err(|e| wrong(e.to_string()))?;
-        let measured = (&book.measure, &book.coarse);
-        let measure = serde_json::to_string(&measured).map_err(|e| wrong(e.to_string()))?;
+        let digest = digest_values(&book).map_err(|e| wrong(e.to_string()))?;
+        let measure_digest =
+            digest_values(&(&book.measure, &book.coarse)).map_err(|e| wrong(e.to_string()))?;
         Ok(Self {
             book,
-            digest: content(whole),
-            measure_digest: content(measure),
+            digest,
+            measure_digest,
         })
     }
 
-    /// The content of the rulebook.
+    /// Content of the rulebook.
     #[must_use]
     pub fn book(&self) -> &RuleBook {
         &self.book
     }
 
-    /// The digest of the whole rulebook.
+    /// Digest of the whole rulebook.
     #[must_use]
     pub fn digest(&self) -> Digest {
         self.digest
     }
 
-    /// The digest of `[measure]` and `[coarse]`, the parts of the rulebook that decide the statistics of a frame.
+    /// Digest of `[measure]` and `[coarse]`, which determine the statistics of a frame.
     #[must_use]
     pub fn measure_digest(&self) -> Digest {
         self.measure_digest
     }
 }
 
+/// Digest of the values of a rulebook or of a part; comments in the file do not change it.
+fn digest_values(values: &impl Serialize) -> serde_json::Result<Digest> {
+    let json = serde_json::to_string(values)?;
+    Ok(Digest::from_parts([json.as_bytes()]))
+}
+
 impl RuleBook {
-    /// Whether a class has a property; false for unknown classes.
+    /// True if a class has a property; false for unknown classes.
     #[must_use]
-    pub fn is(&self, class: &str, flag: ClassFlag) -> bool {
+    pub fn has_flag(&self, class: &str, flag: ClassFlag) -> bool {
         let class = self.class.get(class);
         class.is_some_and(|class| class.flags.contains(&flag))
     }
 
-    /// The word in questions for a thing that an annotator calls by `word`; `None` if questions do not use this word for things
-    /// of the class.
+    /// Word in questions for an object that a data set names `word`; `None` if questions do not use this word for objects of the class.
     #[must_use]
-    pub fn called(&self, class: &str, word: &str) -> Option<&str> {
+    pub fn question_word(&self, class: &str, word: &str) -> Option<&str> {
         let plain = word.replace('_', " ");
         let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
         let words = &self.class.get(class)?.words;
@@ -139,9 +142,9 @@ impl RuleBook {
             .map(String::as_str)
     }
 
-    /// A template with the word of a thing filled in; `plural` is used for plural words.
+    /// Fills the word of an object into a template; `plural` is used for plural words.
     #[must_use]
-    pub fn filled(&self, singular: &str, plural: &str, word: &str) -> String {
+    pub fn fill_template(&self, singular: &str, plural: &str, word: &str) -> String {
         if self.words.plural.contains(word) {
             return plural.replace("{object}", word);
         }
@@ -155,8 +158,7 @@ impl RuleBook {
             .replace("{object}", word)
     }
 
-    /// Whether a word of a data set may be another word for things of a class: its last words are one by which questions call
-    /// such things, as in "decorative lamp".
+    /// True if a word of a data set may name an object of a class, because it ends in a word of the class: "decorative lamp" in "lamp".
     #[must_use]
     pub fn resembles(&self, word: &str, class: &str) -> bool {
         let plain = word.replace('_', " ");
@@ -166,12 +168,13 @@ impl RuleBook {
             .into_iter()
             .flat_map(|class| &class.words)
             .any(|known| {
-                let before = spelled.strip_suffix(known.as_str());
-                before.is_some_and(|before| before.is_empty() || before.ends_with(' '))
+                spelled
+                    .strip_suffix(known.as_str())
+                    .is_some_and(|before| before.is_empty() || before.ends_with(' '))
             })
     }
 
-    /// The token of a segment by its word and class; the class itself if no token matches.
+    /// Token of a segment, given its word and class; the class itself if no token matches.
     #[must_use]
     pub fn token<'a>(&'a self, name: &str, class: &'a str) -> &'a str {
         let token = self.token.iter().find(|token| {
@@ -192,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_built_in_rules_are_complete() {
+    fn built_in_rules_are_complete() {
         let rules = Rules::built_in().unwrap();
         let book = rules.book();
         let asked = book
@@ -244,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_rules_say_what_is_wrong() {
+    fn invalid_rules_are_reported() {
         for (from, to, says) in [
             ("gap_mm = 300", "gap_mm = \"wide\"", "line "),
             ("gap_mm = 300", "gap_mn = 300", "unknown field `gap_mn`"),

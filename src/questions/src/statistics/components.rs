@@ -1,6 +1,6 @@
 //! Connected components of equal label: [`components`].
 
-use super::rim::runs;
+use super::erosion::runs;
 
 /// A run of one label in a row.
 struct LabelRun {
@@ -9,23 +9,23 @@ struct LabelRun {
     label: u32,
 }
 
-/// The component of each pixel. Pixels of equal label that touch by edges or corners are one component, numbered row by row
-/// from 1. Pixels whose label `of` maps to 0 get 0.
+/// Returns the component of each pixel. Pixels with equal labels that touch by edges or corners form one component; components are numbered
+/// row by row from 1. `to_label` gives the label of a value; pixels with label 0 belong to no component and get 0.
 pub(super) fn components<T: Copy + PartialEq>(
-    labels: &[T],
+    values: &[T],
     [width, height]: [usize; 2],
-    of: impl Fn(T) -> u32,
+    to_label: impl Fn(T) -> u32,
 ) -> Vec<u32> {
     let mut parents: Vec<u32> = Vec::new();
     let mut rows: Vec<Vec<(LabelRun, u32)>> = Vec::with_capacity(height);
     for y in 0..height {
-        let row = &labels[y * width..][..width];
+        let row = &values[y * width..][..width];
         let mut found: Vec<(LabelRun, u32)> = Vec::new();
         let above: &[(LabelRun, u32)] = rows.last().map_or(&[], |above| above);
-        // Runs of both rows come from left to right. A run above that ends before this one begins is not needed again.
+        // The runs of both rows are sorted from left to right. Runs above that end before this one begins are no longer needed.
         let mut first = 0;
         for (left, right) in runs(row) {
-            let label = of(row[left]);
+            let label = to_label(row[left]);
             if label == 0 {
                 continue;
             }
@@ -53,10 +53,10 @@ pub(super) fn components<T: Copy + PartialEq>(
         }
         rows.push(found);
     }
-    number(&rows, &mut parents, [width, height])
+    number_components(&rows, &mut parents, [width, height])
 }
 
-/// Joins the trees of two nodes and returns the common root, which is the older one.
+/// Joins the trees of two nodes and returns their common root, the older of the two roots.
 fn join(parents: &mut [u32], a: u32, b: u32) -> u32 {
     let (a, b) = (root(parents, a), root(parents, b));
     let (old, new) = (a.min(b), a.max(b));
@@ -64,6 +64,7 @@ fn join(parents: &mut [u32], a: u32, b: u32) -> u32 {
     old
 }
 
+/// Returns the root of a node and shortens the path to it.
 fn root(parents: &mut [u32], mut node: u32) -> u32 {
     while parents[node as usize] != node {
         parents[node as usize] = parents[parents[node as usize] as usize];
@@ -72,7 +73,8 @@ fn root(parents: &mut [u32], mut node: u32) -> u32 {
     node
 }
 
-fn number(
+/// Numbers the components row by row from 1 and returns the number of each pixel.
+fn number_components(
     rows: &[Vec<(LabelRun, u32)>],
     parents: &mut [u32],
     [width, height]: [usize; 2],
@@ -127,7 +129,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn piecesare_connected(
+        fn components_match_flood_fill(
             (width, height, labels) in (1..12_usize, 1..12_usize).prop_flat_map(|(width, height)| {
                 (Just(width), Just(height), prop::collection::vec(0..3_u32, width * height))
             }),

@@ -1,12 +1,12 @@
-//! ComputeStats of the paper's Algorithm 1: [`measure`].
+//! Measurement of a frame, `ComputeStats` of the paper's Algorithm 1: [`measure`].
 
 use std::collections::BTreeMap;
 
 use super::FrameStatistics;
-use super::light::{frame_depth, luma};
-use super::reference::LightSamples;
-use super::scene::SceneMaps;
-use super::shape::MaskShapes;
+use super::light_samples::LightSamples;
+use super::mask_core::{frame_depth, luma};
+use super::mask_shapes::MaskShapes;
+use super::scene_maps::SceneMaps;
 use crate::colors::Palette;
 use crate::rules::Rules;
 use darkqa_ground::error::Result;
@@ -35,7 +35,7 @@ pub fn measure(
     let mut cores = shapes.cores(frame, &scene, thresholds, palette);
     let samples = LightSamples::from_frame(frame, &scene, thresholds);
 
-    // Pixels by class: all, outside every segment, and without a word of their own.
+    // Pixels by class: all, outside every segment, and without a specific word.
     let mut classes = BTreeMap::new();
     let mut loose = BTreeMap::new();
     let mut unnamed = BTreeMap::new();
@@ -55,7 +55,7 @@ pub fn measure(
     let mut words = BTreeMap::new();
     let mut segments = Vec::new();
     for (index, shape) in shapes.list.iter().enumerate() {
-        // Mask 0 holds the pixels outside every segment.
+        // Mask 0 is for pixels outside every segment.
         let mask = index as u32 + 1;
         let Some(mut segment) = shapes.segment(frame, &scene, coarse, mask, shape) else {
             continue;

@@ -1,26 +1,28 @@
-//! Morphological opening of a set of pixels, which removes thin margins: [`open`].
+//! Morphological opening of a mask, which removes thin margins: [`open_mask`].
 
-use super::rim::runs;
+use super::erosion::runs;
 
-/// Opens a set of pixels in place with a square of radius `radius`: the pixels remain that are covered by squares lying wholly
-/// within the set. Pixels outside the image are not in the set, so an unlabelled border around the image is also a margin.
-pub(super) fn open(set: &mut [bool], [width, height]: [usize; 2], radius: usize) {
+/// Opens a mask in place with a square of radius `radius`: only pixels covered by squares that are entirely within the mask remain. Pixels
+/// outside the image are not in the mask, so an unlabelled border around the image is also a margin.
+pub(super) fn open_mask(set: &mut [bool], [width, height]: [usize; 2], radius: usize) {
     let whole = 2 * radius + 1;
     let mut streaks = vec![0_usize; width];
-    // The centres of such squares, widened by the radius along their rows.
+    // The centers of such squares, widened by the radius along their rows.
     let mut spread = vec![false; set.len()];
     for y in 0..height {
         let row = &set[y * width..][..width];
         for (left, right) in runs(row) {
-            let long_enough = row[left] && right - left >= whole;
-            let (from, to) = if long_enough {
+            let is_long_enough = row[left] && right - left >= whole;
+            let (from, to) = if is_long_enough {
                 (left + radius, right - radius)
             } else {
                 (right, right)
             };
             streaks[left..from].fill(0);
             streaks[to..right].fill(0);
-            streaks[from..to].iter_mut().for_each(|streak| *streak += 1);
+            for streak in &mut streaks[from..to] {
+                *streak += 1;
+            }
         }
         let Some(center) = y.checked_sub(radius) else {
             continue;
@@ -34,7 +36,7 @@ pub(super) fn open(set: &mut [bool], [width, height]: [usize; 2], radius: usize)
             }
         }
     }
-    // Then along the columns: `since` is the distance to the last centre above, then to the next one below.
+    // Then the same along the columns: `since` is the distance to the last center above, then to the next one below.
     set.fill(false);
     for direction in [Direction::Down, Direction::Up] {
         let mut since = vec![radius + 1; width];
@@ -96,7 +98,7 @@ mod tests {
                 })
                 .collect();
             let expected = reference(&set, [width, height], radius);
-            open(&mut set, [width, height], radius);
+            open_mask(&mut set, [width, height], radius);
             prop_assert_eq!(set, expected);
         }
     }

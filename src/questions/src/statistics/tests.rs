@@ -168,7 +168,7 @@ fn names_of_segments_override_the_words_of_labels() {
     let found = measured(&frame);
     let chair = &found.segments[0];
     assert_eq!(
-        (chair.word.as_str(), chair.stands, chair.region),
+        (chair.word.as_str(), chair.place, chair.region),
         ("office chair", SegmentPlace::Elsewhere, Some(3))
     );
     assert_eq!(found.segments[1].word, "wall");

@@ -59,7 +59,7 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
         } else {
             word
         };
-        let (word, stands) = plain_word(word);
+        let (word, place) = plain_word(word);
         *frame.classes.entry(class.to_owned()).or_insert(0) += area;
         *frame.words.entry(word.clone()).or_insert(0) += area;
         let mut colors = [0; NONE + 1];
@@ -69,7 +69,7 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
             class: class.to_owned(),
             word,
             source: WordSource::Label,
-            stands,
+            place,
             region: None,
             parts: 0,
             area,

@@ -39,7 +39,7 @@ fn yes_needs_one_good_segment() {
         (|c| c.bbox = [0, 0, 20, 900], None),
         (|c| c.bbox = [0, 0, 19, 900], Some(Reason::Thin)),
         (
-            |c| c.stands = SegmentPlace::Elsewhere,
+            |c| c.place = SegmentPlace::Elsewhere,
             Some(Reason::Elsewhere),
         ),
     ] {
@@ -177,7 +177,7 @@ fn no_needs_that_no_confusable_class_is_visible() {
         for class in group
             .classes
             .iter()
-            .filter(|class| rules.book().is(class, crate::rules::ClassFlag::Asked))
+            .filter(|class| rules.book().has_flag(class, crate::rules::ClassFlag::Asked))
         {
             for other in group.classes.iter().filter(|other| *other != class) {
                 let seen = frame(&[("wall", "wall", 500_000), (other, "", 1)]);

@@ -2,38 +2,41 @@
 
 use glam::{Vec3, vec3};
 
-use super::super::dice::Dice;
-use super::super::mesh::Mesh;
+use super::super::mesh::{Mesh, cos_sin};
 use super::super::paint::Paint;
-use super::super::scene::{Piece, kind};
+use super::super::scene::{Piece, Pose, kind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
-use super::storage::cabinet_of;
-use super::{FurnitureSet, at, parts};
+use super::storage::cabinet_in_paint;
+use super::{FurnitureSet, parts};
 
-fn ceramic(dice: &mut Dice) -> (Surface, &'static str) {
+fn ceramic(rng: &mut SeededRng) -> (Surface, &'static str) {
     let names = ["white", "white", "white", "pink", "green", "blue", "black"];
-    let paint = Paint::random(&names, dice);
+    let paint = Paint::random(&names, rng);
     (Surface::gloss(paint), paint.name)
 }
 
 /// A sink on a cabinet, with its tap.
-pub(in super::super) fn vanity(dice: &mut Dice) -> FurnitureSet {
+pub(in super::super) fn vanity(rng: &mut SeededRng) -> FurnitureSet {
     let names = ["brown", "brown", "grey", "blue", "green", "black"];
-    let paint = Paint::random(&names, dice);
-    let base = cabinet_of(
+    let paint = Paint::random(&names, rng);
+    let base = cabinet_in_paint(
         kind("bathroom cabinet", "cabinet"),
         vec3(0.8, 0.74, 0.48),
         2,
         paint,
     );
-    FurnitureSet::from_piece(base).and(parts::piece("sink:3", dice), at(vec3(0.0, 0.74, 0.0), 0.0))
+    FurnitureSet::from_piece(base).with(
+        parts::piece("sink:3", rng),
+        Pose::new(vec3(0.0, 0.74, 0.0), 0.0),
+    )
 }
 
 /// A bathtub along the wall, open above.
-pub(in super::super) fn bathtub(dice: &mut Dice) -> Piece {
-    let (white, name) = ceramic(dice);
+pub(in super::super) fn bathtub(rng: &mut SeededRng) -> Piece {
+    let (white, name) = ceramic(rng);
     let steel = Surface::steel();
-    let (length, height, depth) = (dice.between(1.55, 1.75), 0.56, 0.74);
+    let (length, height, depth) = (rng.between(1.55, 1.75), 0.56, 0.74);
     let mut mesh = Mesh::default();
     let outer = |y: f32, grow: f32| {
         ring(
@@ -93,8 +96,7 @@ fn ring(middle: Vec3, half_width: f32, half_depth: f32) -> Vec<Vec3> {
     let radius = 0.16_f32.min(half_depth * 0.8);
     let mut points: Vec<Vec3> = (0..24)
         .map(|i| {
-            let around =
-                super::super::mesh::cos_sin(std::f32::consts::TAU * (i as f32 + 0.5) / 24.0);
+            let around = cos_sin(std::f32::consts::TAU * (i as f32 + 0.5) / 24.0);
             let sign = |v: f32| if v < 0.0 { -1.0 } else { 1.0 };
             middle
                 + vec3(

@@ -2,32 +2,32 @@
 
 use glam::{Vec3, vec3};
 
-use super::super::dice::Dice;
 use super::super::mesh::Mesh;
-use super::super::paint::{Paint, USUAL};
+use super::super::paint::{COMMON_COLORS, Paint};
 use super::super::pattern::Pattern;
-use super::super::scene::{Piece, kind};
+use super::super::scene::{Piece, Pose, kind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
-use super::{FurnitureSet, at, legs};
+use super::{FurnitureSet, add_legs};
 
 /// A bed with a blanket and one or two pillows.
-pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
-    let is_double = dice.chance(0.6);
+pub(in super::super) fn bed(rng: &mut SeededRng) -> FurnitureSet {
+    let is_double = rng.chance(0.6);
     let width = if is_double {
-        dice.between(1.45, 1.7)
+        rng.between(1.45, 1.7)
     } else {
-        dice.between(0.95, 1.1)
+        rng.between(0.95, 1.1)
     };
     let half = width / 2.0;
     let length = 2.05;
     let mut mesh = Mesh::default();
-    let wood = Surface::wood(Paint::random(&["brown", "brown", "black"], dice), 0);
+    let wood = Surface::wood(Paint::random(&["brown", "brown", "black"], rng), 0);
     let sheet = Surface::cloth(Paint::nameless([238, 236, 230]));
-    let cover = Paint::random(&USUAL, dice);
-    let blanket = Surface::fabric(cover, dice);
-    legs(&mut mesh, vec3(width, 0.2, length), 0.06, 0.07, &wood);
+    let cover = Paint::random(&COMMON_COLORS, rng);
+    let blanket = Surface::fabric(cover, rng);
+    add_legs(&mut mesh, vec3(width, 0.2, length), 0.06, 0.07, &wood);
     mesh.board(half, [0.16, 0.3], [0.02, length], &wood);
-    let head_height = dice.between(0.85, 1.1);
+    let head_height = rng.between(0.85, 1.1);
     mesh.cushion(half + 0.03, [0.1, head_height], [0.0, 0.07], 0.03, &wood);
     mesh.cushion(
         half - 0.02,
@@ -37,7 +37,7 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
         &sheet,
     );
     // The blanket overhangs both sides and the foot of the bed. It is folded back at `fold`, measured from the head.
-    let fold = dice.between(0.55, 0.7);
+    let fold = rng.between(0.55, 0.7);
     mesh.cushion(
         half + 0.035,
         [0.2, 0.56],
@@ -50,17 +50,17 @@ pub(in super::super) fn bed(dice: &mut Dice) -> FurnitureSet {
         [0.44, 0.575],
         [fold - 0.16, fold + 0.06],
         0.05,
-        &if dice.chance(0.5) { sheet } else { blanket },
+        &if rng.chance(0.5) { sheet } else { blanket },
     );
     let mut set = FurnitureSet::from_piece(Piece::new(kind("bed", "bed"), mesh, cover.name));
     set.size = vec3(width + 0.1, head_height, length + 0.04);
-    let paint = Paint::random(&["white", "grey", "pink", "yellow", "blue", "green"], dice);
+    let paint = Paint::random(&["white", "grey", "pink", "yellow", "blue", "green"], rng);
     let count = if is_double { 2 } else { 1 };
     for i in 0..count {
         let x = (i as f32 - (count as f32 - 1.0) / 2.0) * width * 0.48;
         let size = vec3(width / count as f32 * 0.8, 0.42, 0.17);
         let piece = pillow("pillow", size, 0.95, &Surface::cloth(paint), paint.name);
-        set = set.and(piece, at(vec3(x, 0.56, 0.24), 0.0));
+        set = set.with(piece, Pose::new(vec3(x, 0.56, 0.24), 0.0));
     }
     set
 }
@@ -79,16 +79,16 @@ pub(in super::super) fn pillow(
 }
 
 /// A cushion for a sofa or a chair, with its center at the origin.
-pub(in super::super) fn cushion(dice: &mut Dice) -> Piece {
-    let paint = Paint::random(&USUAL, dice);
-    let mut surface = Surface::fabric(paint, dice);
+pub(in super::super) fn cushion(rng: &mut SeededRng) -> Piece {
+    let paint = Paint::random(&COMMON_COLORS, rng);
+    let mut surface = Surface::fabric(paint, rng);
     let mut name = paint.name;
-    if dice.chance(0.15) {
-        let other = Paint::random(&["white", "black"], dice);
-        surface = surface.with(Pattern::Stripes(0.05, other.color));
+    if rng.chance(0.15) {
+        let other = Paint::random(&["white", "black"], rng);
+        surface = surface.with_pattern(Pattern::Stripes(0.05, other.color));
         // Two colors: the cushion has no single color name.
         name = "";
     }
-    let side = dice.between(0.38, 0.45);
+    let side = rng.between(0.38, 0.45);
     pillow("cushion", vec3(side, side, 0.15), 0.3, &surface, name)
 }

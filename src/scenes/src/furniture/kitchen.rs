@@ -2,14 +2,14 @@
 
 use glam::{Vec3, vec3};
 
-use super::super::dice::Dice;
 use super::super::mesh::Mesh;
 use super::super::paint::Paint;
 use super::super::pattern::Pattern;
-use super::super::scene::{Piece, kind};
+use super::super::scene::{Piece, Pose, kind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
-use super::storage::cabinet_of;
-use super::{FurnitureSet, at, parts};
+use super::storage::cabinet_in_paint;
+use super::{FurnitureSet, parts};
 
 /// The height of counters in metres.
 pub(in super::super) const COUNTER: f32 = 0.9;
@@ -24,21 +24,21 @@ pub(in super::super) struct Style {
 }
 
 impl Style {
-    pub(in super::super) fn new(dice: &mut Dice) -> Self {
+    pub(in super::super) fn new(rng: &mut SeededRng) -> Self {
         let cabinets = [
             "white", "brown", "brown", "blue", "green", "grey", "red", "yellow",
         ];
         let counters = ["white", "black", "grey", "brown", "green", "blue"];
         Self {
-            cabinets: Paint::random(&cabinets, dice),
-            counter: Paint::random(&counters, dice),
-            appliances: Paint::random(&["white", "black", "grey", "red", "blue"], dice),
+            cabinets: Paint::random(&cabinets, rng),
+            counter: Paint::random(&counters, rng),
+            appliances: Paint::random(&["white", "black", "grey", "red", "blue"], rng),
         }
     }
 
     /// An appliance of the table of parts in the paint of the kitchen.
-    pub(in super::super) fn appliance(&self, name: &str, dice: &mut Dice) -> Piece {
-        parts::painted(name, self.appliances, dice)
+    pub(in super::super) fn appliance(&self, name: &str, rng: &mut SeededRng) -> Piece {
+        parts::piece_in_paint(name, self.appliances, rng)
     }
 }
 
@@ -47,16 +47,16 @@ pub(in super::super) fn base_cabinets(
     width: f32,
     sink: bool,
     style: &Style,
-    dice: &mut Dice,
+    rng: &mut SeededRng,
 ) -> FurnitureSet {
     let doors = ((width / 0.5) as usize).max(1);
-    let base = cabinet_of(
+    let base = cabinet_in_paint(
         kind("kitchen cabinet", "cabinet"),
         vec3(width, COUNTER - 0.04, DEPTH - 0.02),
         doors,
         style.cabinets,
     );
-    let top = Surface::gloss(style.counter).with(Pattern::Stone);
+    let top = Surface::gloss(style.counter).with_pattern(Pattern::Stone);
     let mut mesh = Mesh::default();
     let (low, high) = (COUNTER - 0.04, COUNTER);
     let hole = [0.27, 0.13, 0.5];
@@ -78,9 +78,9 @@ pub(in super::super) fn base_cabinets(
     }
     mesh.board(width / 2.0, [high, high + 0.06], [0.0, 0.02], &top);
     let counter = Piece::new(kind("kitchen counter", "counter"), mesh, style.counter.name);
-    let set = FurnitureSet::from_piece(base).and(counter, at(Vec3::ZERO, 0.0));
+    let set = FurnitureSet::from_piece(base).with(counter, Pose::new(Vec3::ZERO, 0.0));
     let set = if sink {
-        set.and(parts::piece("sink:2", dice), at(Vec3::ZERO, 0.0))
+        set.with(parts::piece("sink:2", rng), Pose::new(Vec3::ZERO, 0.0))
     } else {
         set
     };
@@ -93,7 +93,7 @@ pub(in super::super) fn base_cabinets(
 /// Wall cabinets, with their lower edge at y = 0.
 pub(in super::super) fn wall_cabinets(width: f32, style: &Style) -> Piece {
     let doors = ((width / 0.45) as usize).max(1);
-    cabinet_of(
+    cabinet_in_paint(
         kind("kitchen cabinet", "cabinet"),
         vec3(width, 0.68, 0.35),
         doors,

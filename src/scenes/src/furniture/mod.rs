@@ -26,31 +26,26 @@ pub(super) struct FurnitureSet {
 }
 
 impl FurnitureSet {
-    /// A set of one piece, with the size of that piece.
+    /// Creates a set of one piece, with the size of that piece.
     pub(super) fn from_piece(piece: Piece) -> Self {
         let [low, high] = bounds(&piece.mesh.faces);
         let width = 2.0 * high.x.max(-low.x);
         let size = vec3(width, high.y, high.z);
         Self {
-            pieces: vec![(piece, at(Vec3::ZERO, 0.0))],
+            pieces: vec![(piece, Pose::new(Vec3::ZERO, 0.0))],
             size,
         }
     }
 
-    /// The set with one more piece.
-    pub(super) fn and(mut self, piece: Piece, pose: Pose) -> Self {
+    /// Returns the set with one more piece.
+    pub(super) fn with(mut self, piece: Piece, pose: Pose) -> Self {
         self.pieces.push((piece, pose));
         self
     }
 }
 
-/// The pose at a place, rotated about y by an angle in radians.
-pub(super) fn at(place: Vec3, angle: f32) -> Pose {
-    Pose { at: place, angle }
-}
-
-/// Adds four square legs below a plate.
-fn legs(mesh: &mut Mesh, size: Vec3, inset: f32, thick: f32, surface: &Surface) {
+/// Adds four square legs below a plate of this width and depth; the height of `size` is that of the legs.
+fn add_legs(mesh: &mut Mesh, size: Vec3, inset: f32, thick: f32, surface: &Surface) {
     for (x, z) in [(-1.0, 0.0), (1.0, 0.0), (-1.0, 1.0), (1.0, 1.0)] {
         let foot = vec3(
             x * (size.x / 2.0 - inset),

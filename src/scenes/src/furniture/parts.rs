@@ -1,43 +1,43 @@
-//! Pieces that a table describes: [`piece`], by name, and [`found`], by the place where such things are found.
+//! Pieces described by a table: [`piece`] makes one by its name, [`names_found_at`] lists names by place.
 //!
-//! `parts.txt` lists small objects, lamps and other furniture of a fixed form; a new object is a few lines of text. The head of the table
-//! documents the format.
+//! `parts.txt` describes small objects, lamps and other furniture of a fixed form. A new object needs only a few lines of text; the head of
+//! the table documents the format.
 
 use std::sync::LazyLock;
 
 use glam::{Vec3, vec3};
 
-use super::super::dice::Dice;
 use super::super::mesh::Mesh;
-use super::super::paint::{self, ALL, Paint, rgb};
+use super::super::paint::{self, ALL_COLORS, Paint, linear_rgb};
 use super::super::pattern::Pattern;
 use super::super::scene::{LightSource, Piece, ThingKind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::{Surface, SurfaceFinish};
 
 const TABLE: &str = include_str!("parts.txt");
 
-/// The entries of the table; none if a line of it cannot be read, which a test rules out.
-static RECIPES: LazyLock<Vec<Recipe>> = LazyLock::new(|| read(TABLE).unwrap_or_default());
+/// Entries of the table; empty if a line cannot be parsed, which a test rules out.
+static RECIPES: LazyLock<Vec<Recipe>> = LazyLock::new(|| parse(TABLE).unwrap_or_default());
 
-/// The colour of warm light, as a camera that is white-balanced for daylight sees it.
+/// Colour of warm light for a camera that is white-balanced for daylight.
 const WARM: Vec3 = Vec3::new(1.0, 0.94, 0.85);
 
 /// An entry of the table.
 #[derive(Debug)]
 struct Recipe {
-    /// The name in the table, which tells apart things of one word.
+    /// Name in the table, which distinguishes variants of a thing: `sink:2`.
     name: &'static str,
     kind: ThingKind,
-    /// The places where such a thing is found, as `floor`.
+    /// Places where such a thing is found, such as `floor`.
     places: Vec<&'static str>,
-    /// The least and the greatest factor that its size is multiplied by.
+    /// Minimum and maximum factor by which the size is scaled.
     scale: [f32; 2],
-    /// The main colours that it may have: names of paints, or sRGB codes in hexadecimal digits.
+    /// Possible main colours: names of paints or hexadecimal sRGB codes. Any colour if empty.
     colors: Vec<&'static str>,
-    parts: Vec<Solid>,
+    solids: Vec<Solid>,
 }
 
-/// A solid of a piece, as its line has it.
+/// A solid of a piece: one line of the table.
 #[derive(Debug)]
 struct Solid {
     copies: Copies,
@@ -52,12 +52,15 @@ enum Copies {
     One,
     /// Also at −x.
     Mirrored,
-    /// This many, evenly around a vertical axis at x and z; the solid is given as seen from the axis.
+    /// This many, evenly around a vertical axis at x and z; the coordinates of the solid are relative to the axis.
     Around(usize, [f32; 2]),
 }
 
-/// The entries of a table; the line that cannot be read if there is one.
-fn read(table: &'static str) -> Result<Vec<Recipe>, &'static str> {
+/// Parses a table.
+///
+/// # Errors
+/// The first line that cannot be parsed.
+fn parse(table: &'static str) -> Result<Vec<Recipe>, &'static str> {
     let mut recipes: Vec<Recipe> = Vec::new();
     for line in table
         .lines()
@@ -65,17 +68,17 @@ fn read(table: &'static str) -> Result<Vec<Recipe>, &'static str> {
         .filter(|line| !line.trim().is_empty())
     {
         if line.starts_with('[') {
-            recipes.push(head(line).ok_or(line)?);
+            recipes.push(parse_head(line).ok_or(line)?);
         } else {
-            let part = part(line).filter(Solid::is_known).ok_or(line)?;
-            recipes.last_mut().ok_or(line)?.parts.push(part);
+            let solid = parse_solid(line).filter(Solid::is_valid).ok_or(line)?;
+            recipes.last_mut().ok_or(line)?.solids.push(solid);
         }
     }
     Ok(recipes)
 }
 
-/// The first line of an entry.
-fn head(line: &'static str) -> Option<Recipe> {
+/// Parses the first line of an entry.
+fn parse_head(line: &'static str) -> Option<Recipe> {
     let (name, rest) = line.strip_prefix('[')?.split_once(']')?;
     let (word, _) = name.split_once(':').unwrap_or((name, ""));
     let mut cells = rest.split('|').map(|cell| cell.split_whitespace());
@@ -88,12 +91,12 @@ fn head(line: &'static str) -> Option<Recipe> {
         places,
         scale: [scale.next()??, scale.next()??],
         colors: cells.next()?.collect(),
-        parts: Vec::new(),
+        solids: Vec::new(),
     })
 }
 
-/// A further line of an entry.
-fn part(line: &'static str) -> Option<Solid> {
+/// Parses any other line of an entry.
+fn parse_solid(line: &'static str) -> Option<Solid> {
     let mut words = line.split_whitespace().peekable();
     let copies = match words.next_if(|word| word.starts_with('*')) {
         None => Copies::One,
@@ -115,15 +118,16 @@ fn part(line: &'static str) -> Option<Solid> {
 }
 
 impl Solid {
-    fn is_known(&self) -> bool {
-        let dull = Surface::plain([128, 128, 128]);
+    /// True if shape and numbers are valid.
+    fn is_valid(&self) -> bool {
+        let surface = Surface::plain([128, 128, 128]);
         self.shape == "light" && self.numbers.len() == 5
-            || self.add_to(&mut Mesh::default(), &dull).is_some()
+            || self.add_to(&mut Mesh::default(), &surface).is_some()
     }
 
-    /// Adds the solid to a mesh; `None` if it has another number of numbers or an unknown name.
+    /// Adds the solid to a mesh; `None` if its shape is unknown or its numbers do not fit the shape.
     fn add_to(&self, mesh: &mut Mesh, surface: &Surface) -> Option<()> {
-        let point = |place: &[f32]| Vec3::from_slice(place);
+        let point = Vec3::from_slice;
         let pairs = |numbers: &[f32]| -> Vec<(f32, f32)> {
             numbers
                 .chunks_exact(2)
@@ -135,7 +139,7 @@ impl Solid {
                 mesh.block(vec3(x, y, z), vec3(to_x, to_y, to_z), surface);
             }
             ("soft", &[radius, x, to_x, y, to_y, z, to_z]) => {
-                mesh.soft(vec3(x, y, z), vec3(to_x, to_y, to_z), radius, surface);
+                mesh.rounded_box(vec3(x, y, z), vec3(to_x, to_y, to_z), radius, surface);
             }
             ("rod", [radius, ends @ ..]) if ends.len() == 6 => {
                 mesh.rod(point(ends), point(&ends[3..]), *radius, surface);
@@ -145,10 +149,10 @@ impl Solid {
             }
             ("ball", at) if at.len() == 6 => mesh.ball(point(at), point(&at[3..]), surface),
             ("lathe", [x, y, z, depth, profile @ ..]) if profile.len() >= 4 => {
-                mesh.oval(vec3(*x, *y, *z), &pairs(profile), *depth, surface);
+                mesh.lathe(vec3(*x, *y, *z), &pairs(profile), *depth, surface);
             }
             ("turn", [x, y, z, depth, profile @ ..]) if profile.len() >= 4 => {
-                mesh.vessel(vec3(*x, *y, *z), &pairs(profile), *depth, surface);
+                mesh.smooth_lathe(vec3(*x, *y, *z), &pairs(profile), *depth, surface);
             }
             _ => return None,
         }
@@ -165,85 +169,89 @@ impl Solid {
                 mesh.add(&one, Vec3::ZERO, 0.0);
                 mesh.add(&one.mirrored(), Vec3::ZERO, 0.0);
             }
-            Copies::Around(count, [x, z]) => (0..count).for_each(|turn| {
-                let angle = std::f32::consts::TAU * turn as f32 / count as f32;
-                mesh.add(&one, vec3(x, 0.0, z), angle);
-            }),
+            Copies::Around(count, [x, z]) => {
+                for turn in 0..count {
+                    let angle = std::f32::consts::TAU * turn as f32 / count as f32;
+                    mesh.add(&one, vec3(x, 0.0, z), angle);
+                }
+            }
         }
     }
 }
 
-/// The paint that a word of the table stands for.
-fn paint(word: &str, dice: &mut Dice) -> Paint {
+/// Returns the paint for a colour of the table: a name or a hexadecimal code.
+fn parse_paint(word: &str, rng: &mut SeededRng) -> Paint {
     let number = u32::from_str_radix(word, 16).ok();
     match number.filter(|_| word.len() == 6) {
-        Some(number) => Paint::nameless(paint::codes(number)),
-        None => Paint::random(&[word], dice),
+        Some(number) => Paint::nameless(paint::codes_from_hex(number)),
+        None => Paint::random(&[word], rng),
     }
 }
 
-/// The surface that a word of the table stands for: a colour, and a sign for its material.
-fn surface(word: &str, main: Paint, dice: &mut Dice) -> Surface {
+/// Returns the surface for a word of the table: a colour, followed by a sign for the material.
+fn parse_surface(word: &str, main: Paint, rng: &mut SeededRng) -> Surface {
     let color = word.trim_end_matches(['+', '~', '=', '/', '^', '%']);
     let paint = match color {
         "steel" => return Surface::steel(),
         "shade" => {
             return Surface {
-                color: rgb([255, 238, 206]),
+                color: linear_rgb([255, 238, 206]),
                 pattern: Pattern::Plain,
                 finish: SurfaceFinish::Glow(1.6),
             };
         }
         "flame" => {
             return Surface {
-                color: rgb([255, 168, 60]),
+                color: linear_rgb([255, 168, 60]),
                 pattern: Pattern::Plain,
                 finish: SurfaceFinish::Glow(1.1),
             };
         }
         "main" => main,
-        "any" => Paint::random(&ALL, dice),
-        color => paint(color, dice),
+        "any" => Paint::random(&ALL_COLORS, rng),
+        color => parse_paint(color, rng),
     };
     match &word[color.len()..] {
         "+" => Surface::gloss(paint),
         "~" => Surface::cloth(paint),
         "=" => Surface::wood(paint, 0),
         "/" => Surface::wood(paint, 1),
-        "^" => Surface::paint(paint).with(Pattern::Pile),
-        "%" => Surface::paint(paint).with(Pattern::Tiles([0.24, 0.08], rgb([186, 180, 170]))),
+        "^" => Surface::paint(paint).with_pattern(Pattern::Pile),
+        "%" => Surface::paint(paint)
+            .with_pattern(Pattern::Tiles([0.24, 0.08], linear_rgb([186, 180, 170]))),
         _ => Surface::paint(paint),
     }
 }
 
-/// The piece of a name, of a random size in one of its colours. Empty for a name that the table does not have.
-pub(in super::super) fn piece(name: &str, dice: &mut Dice) -> Piece {
-    let colors = |recipe: &Recipe| match &recipe.colors[..] {
-        [] => ALL.to_vec(),
-        colors => colors.to_vec(),
+/// Makes the piece of a name, with a random size in one of its colours. Empty for a name that is not in the table.
+pub(in super::super) fn piece(name: &str, rng: &mut SeededRng) -> Piece {
+    let color = match find(name).map(|recipe| &recipe.colors[..]) {
+        Some([]) => rng.pick(&ALL_COLORS),
+        Some(colors) => rng.pick(colors),
+        None => "",
     };
-    let choice = RECIPES
-        .iter()
-        .find(|recipe| recipe.name == name)
-        .map_or("", |recipe| dice.pick(&colors(recipe)));
-    let main = paint(choice, dice);
-    painted(name, main, dice)
+    let main = parse_paint(color, rng);
+    piece_in_paint(name, main, rng)
 }
 
-/// The piece of a name in a paint, of a random size.
-pub(in super::super) fn painted(name: &str, main: Paint, dice: &mut Dice) -> Piece {
+fn find(name: &str) -> Option<&'static Recipe> {
+    RECIPES.iter().find(|recipe| recipe.name == name)
+}
+
+/// Makes the piece of a name, with a random size in this paint.
+pub(in super::super) fn piece_in_paint(name: &str, main: Paint, rng: &mut SeededRng) -> Piece {
     let mut mesh = Mesh::default();
-    let Some(recipe) = RECIPES.iter().find(|recipe| recipe.name == name) else {
+    let Some(recipe) = find(name) else {
         let nothing = ThingKind {
             word: "",
             class: "objects",
         };
         return Piece::new(nothing, mesh, "");
     };
-    let scale = dice.between(recipe.scale[0], recipe.scale[1]);
+    let scale = rng.between(recipe.scale[0], recipe.scale[1]);
     let mut light = None;
-    for part in &recipe.parts {
-        match (part.shape, &part.numbers[..]) {
+    for solid in &recipe.solids {
+        match (solid.shape, &solid.numbers[..]) {
             ("light", &[x, y, z, radius, strength]) => {
                 light = Some(LightSource::Bulb {
                     middle: vec3(x, y, z) * scale,
@@ -251,7 +259,7 @@ pub(in super::super) fn painted(name: &str, main: Paint, dice: &mut Dice) -> Pie
                     radiance: WARM * strength,
                 });
             }
-            _ => part.add_all_to(&mut mesh, &surface(part.surface, main, dice)),
+            _ => solid.add_all_to(&mut mesh, &parse_surface(solid.surface, main, rng)),
         }
     }
     mesh.scale(scale);
@@ -260,8 +268,8 @@ pub(in super::super) fn painted(name: &str, main: Paint, dice: &mut Dice) -> Pie
     piece
 }
 
-/// The names of the things that are found at a place, as `floor`.
-pub(in super::super) fn found(place: &str) -> Vec<&'static str> {
+/// Names of the things that are found at a place, such as `floor`.
+pub(in super::super) fn names_found_at(place: &str) -> Vec<&'static str> {
     RECIPES
         .iter()
         .filter(|recipe| recipe.places.contains(&place))
@@ -275,17 +283,17 @@ mod tests {
 
     #[test]
     fn every_line_of_the_table_is_read() {
-        assert_eq!(read(TABLE).err(), None);
+        assert_eq!(parse(TABLE).err(), None);
         let names: Vec<&str> = RECIPES.iter().map(|recipe| recipe.name).collect();
-        for (place, name) in names.iter().enumerate() {
-            assert!(!names[..place].contains(name), "{name} is there twice");
-            let made = piece(name, &mut Dice::new(1, &[name]));
+        for (index, name) in names.iter().enumerate() {
+            assert!(!names[..index].contains(name), "{name} is there twice");
+            let made = piece(name, &mut SeededRng::new(1, &[name]));
             assert!(made.mesh.faces.len() > 1, "{name}");
         }
     }
 
     #[test]
-    fn a_line_that_makes_no_sense_is_named() {
+    fn invalid_line_is_the_error() {
         let head = "[x] objects | floor | 1 1 | red\n";
         for line in [
             "box main 1 2 3",
@@ -293,8 +301,8 @@ mod tests {
             "*x box main 0 1 0 1 0 1",
         ] {
             let table: &'static str = format!("{head}{line}").leak();
-            assert_eq!(read(table).err(), Some(line));
+            assert_eq!(parse(table).err(), Some(line));
         }
-        assert!(read("[x] objects | floor | one | red").is_err());
+        assert!(parse("[x] objects | floor | one | red").is_err());
     }
 }

@@ -2,23 +2,23 @@
 
 use glam::{Vec3, vec3};
 
-use super::super::dice::Dice;
 use super::super::mesh::{Mesh, cos_sin};
 use super::super::paint::Paint;
 use super::super::scene::{Piece, kind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
 
 /// A plant in its pot, with its height in metres.
-pub(in super::super) fn plant(height: f32, dice: &mut Dice) -> Piece {
+pub(in super::super) fn plant(height: f32, rng: &mut SeededRng) -> Piece {
     let pot = Surface::paint(Paint::random(
         &["brown", "black", "grey", "orange", "blue"],
-        dice,
+        rng,
     ));
     let radius = height * 0.13 + 0.03;
     let foot = vec3(0.0, 0.0, radius + 0.1 * height);
     let pot_height = height * 0.28;
     let mut mesh = Mesh::default();
-    mesh.oval(
+    mesh.lathe(
         foot,
         &[
             (0.0, 0.0),
@@ -31,25 +31,25 @@ pub(in super::super) fn plant(height: f32, dice: &mut Dice) -> Piece {
         &pot,
     );
     let soil = Surface::plain([58, 42, 32]);
-    mesh.oval(
+    mesh.lathe(
         foot + vec3(0.0, pot_height * 0.86, 0.0),
         &[(0.0, 0.0), (radius * 0.86, 0.0)],
         1.0,
         &soil,
     );
     let greens = [[58, 112, 50], [44, 96, 52], [86, 132, 58]];
-    let leaves = 16 + dice.below(10);
+    let leaves = 16 + rng.below(10);
     let stem = foot + vec3(0.0, pot_height * 0.8, 0.0);
     for i in 0..leaves {
-        let green = Surface::plain(dice.pick(&greens));
-        let angle = 2.4 * i as f32 + dice.between(-0.2, 0.2);
+        let green = Surface::plain(rng.pick(&greens));
+        let angle = 2.4 * i as f32 + rng.between(-0.2, 0.2);
         let rise = (i as f32 + 0.5) / leaves as f32;
-        leaf(
+        add_leaf(
             &mut mesh,
             stem,
             angle,
             height * (0.25 + 0.47 * rise),
-            height * dice.between(0.2, 0.3) * (1.25 - rise * 0.7),
+            height * rng.between(0.2, 0.3) * (1.25 - rise * 0.7),
             height,
             &green,
         );
@@ -58,7 +58,7 @@ pub(in super::super) fn plant(height: f32, dice: &mut Dice) -> Piece {
 }
 
 /// Adds a leaf on a bent stem: it rises by `rise`, reaches out by `reach`, and hangs down at its end.
-fn leaf(
+fn add_leaf(
     mesh: &mut Mesh,
     stem: Vec3,
     angle: f32,

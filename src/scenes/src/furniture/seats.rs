@@ -2,35 +2,47 @@
 
 use glam::vec3;
 
-use super::super::dice::Dice;
 use super::super::mesh::Mesh;
-use super::super::paint::{Paint, USUAL};
-use super::super::scene::{Piece, ThingKind, kind};
+use super::super::paint::{COMMON_COLORS, Paint};
+use super::super::scene::{Piece, Pose, ThingKind, kind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
 use super::beds::cushion;
-use super::{FurnitureSet, at, legs};
+use super::{FurnitureSet, add_legs};
 
 /// A chair with four legs and a back.
-pub(in super::super) fn chair(name: ThingKind, paint: Paint, dice: &mut Dice) -> Piece {
-    let surface = if dice.chance(0.5) {
+pub(in super::super) fn chair(name: ThingKind, paint: Paint, rng: &mut SeededRng) -> Piece {
+    let surface = if rng.chance(0.5) {
         Surface::wood(paint, 1)
     } else {
         Surface::gloss(paint)
     };
-    chair_of(name, paint, &surface, usize::from(dice.chance(0.5)))
+    let back = if rng.chance(0.5) {
+        ChairBack::Closed
+    } else {
+        ChairBack::Slats
+    };
+    chair_with_back(name, paint, &surface, back)
 }
 
-/// A chair in one of two styles: a back of slats (0) or a closed back.
-pub(in super::super) fn chair_of(
+/// Kind of back of a chair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) enum ChairBack {
+    Slats,
+    Closed,
+}
+
+/// A chair with a given kind of back.
+pub(in super::super) fn chair_with_back(
     name: ThingKind,
     paint: Paint,
     surface: &Surface,
-    style: usize,
+    back: ChairBack,
 ) -> Piece {
     let mut mesh = Mesh::default();
     let (width, depth, seat) = (0.44, 0.44, 0.45);
     let half = width / 2.0;
-    legs(&mut mesh, vec3(width, seat, depth), 0.03, 0.04, surface);
+    add_legs(&mut mesh, vec3(width, seat, depth), 0.03, 0.04, surface);
     mesh.cushion(
         half,
         [seat - 0.03, seat + 0.025],
@@ -40,8 +52,8 @@ pub(in super::super) fn chair_of(
     );
     let top = 0.94;
     let post = vec3(0.04, top - seat, 0.04);
-    mesh.slabs(vec3(half - 0.03, seat, 0.03), post, surface);
-    if style == 0 {
+    mesh.mirrored_slabs(vec3(half - 0.03, seat, 0.03), post, surface);
+    if back == ChairBack::Slats {
         mesh.cushion(half, [top - 0.12, top], [0.01, 0.05], 0.015, surface);
         for i in -2..=2 {
             let x = i as f32 * 0.075;
@@ -58,46 +70,46 @@ pub(in super::super) fn chair_of(
 }
 
 /// A sofa for a number of people, with cushions.
-pub(in super::super) fn sofa(seats: usize, dice: &mut Dice) -> FurnitureSet {
-    let paint = Paint::random(&USUAL, dice);
-    let set = FurnitureSet::from_piece(upholstered(kind("sofa", "sofa"), seats, paint, dice));
-    let mut set = set;
+pub(in super::super) fn sofa(seats: usize, rng: &mut SeededRng) -> FurnitureSet {
+    let paint = Paint::random(&COMMON_COLORS, rng);
+    let mut set = FurnitureSet::from_piece(upholstered(kind("sofa", "sofa"), seats, paint, rng));
     let width = set.size.x;
     for x in [-1.0, 1.0] {
-        if dice.chance(0.55) {
-            let mut piece = cushion(dice);
+        if rng.chance(0.55) {
+            let mut piece = cushion(rng);
             if piece.color == paint.name {
-                piece = cushion(dice);
+                piece = cushion(rng);
             }
-            set = set.and(
+            set = set.with(
                 piece,
-                at(vec3(x * (width / 2.0 - 0.42), 0.64, 0.36), x * -0.2),
+                Pose::new(vec3(x * (width / 2.0 - 0.42), 0.64, 0.36), x * -0.2),
             );
         }
     }
     set
 }
 
-pub(in super::super) fn armchair(dice: &mut Dice) -> Piece {
-    let paint = Paint::random(&USUAL, dice);
-    upholstered(kind("armchair", "chair"), 1, paint, dice)
+pub(in super::super) fn armchair(rng: &mut SeededRng) -> Piece {
+    let paint = Paint::random(&COMMON_COLORS, rng);
+    upholstered(kind("armchair", "chair"), 1, paint, rng)
 }
 
-fn upholstered(name: ThingKind, seats: usize, paint: Paint, dice: &mut Dice) -> Piece {
-    let cloth = Surface::fabric(paint, dice);
+/// An armchair or sofa with this number of seats.
+fn upholstered(name: ThingKind, seats: usize, paint: Paint, rng: &mut SeededRng) -> Piece {
+    let cloth = Surface::fabric(paint, rng);
     let foot = Surface::plain([64, 44, 30]);
-    let seat = dice.between(0.6, 0.68);
-    let arm = dice.between(0.14, 0.2);
+    let seat = rng.between(0.6, 0.68);
+    let arm = rng.between(0.14, 0.2);
     let width = seats as f32 * seat + 2.0 * arm;
     let half = width / 2.0;
-    let (depth, back) = (0.9, dice.between(0.8, 0.9));
+    let (depth, back) = (0.9, rng.between(0.8, 0.9));
     let mut mesh = Mesh::default();
-    legs(&mut mesh, vec3(width, 0.12, depth), 0.07, 0.05, &foot);
+    add_legs(&mut mesh, vec3(width, 0.12, depth), 0.07, 0.05, &foot);
     mesh.cushion(half, [0.1, 0.34], [0.02, depth], 0.04, &cloth);
     mesh.cushion(half, [0.12, back], [0.0, 0.2], 0.06, &cloth);
     for x in [-1.0, 1.0_f32] {
         let (a, b) = (x * half, x * (half - arm));
-        mesh.soft(
+        mesh.rounded_box(
             vec3(a.min(b), 0.1, 0.0),
             vec3(a.max(b), 0.62, depth + 0.01),
             0.06,
@@ -106,13 +118,13 @@ fn upholstered(name: ThingKind, seats: usize, paint: Paint, dice: &mut Dice) -> 
     }
     for i in 0..seats {
         let left = -half + arm + i as f32 * seat;
-        mesh.soft(
+        mesh.rounded_box(
             vec3(left + 0.004, 0.32, 0.16),
             vec3(left + seat - 0.004, 0.46, depth + 0.03),
             0.05,
             &cloth,
         );
-        mesh.soft(
+        mesh.rounded_box(
             vec3(left + 0.006, 0.44, 0.13),
             vec3(left + seat - 0.006, back + 0.03, 0.3),
             0.07,

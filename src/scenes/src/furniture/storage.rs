@@ -2,14 +2,14 @@
 
 use glam::{Vec3, vec3};
 
-use super::super::dice::Dice;
 use super::super::mesh::Mesh;
-use super::super::paint::{ALL, Paint, rgb};
+use super::super::paint::{ALL_COLORS, Paint, linear_rgb};
 use super::super::pattern::Pattern;
 use super::super::scene::{Piece, ThingKind, kind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::{Surface, SurfaceFinish};
 
-/// The colours of storage. A colour that is listed twice is twice as likely.
+/// Colours of storage furniture. A colour that is listed twice is twice as likely.
 const COLORS: [&str; 10] = [
     "brown", "brown", "brown", "white", "grey", "grey", "black", "blue", "green", "yellow",
 ];
@@ -27,10 +27,10 @@ pub(in super::super) fn chest(
     word: &'static str,
     size: Vec3,
     [rows, columns]: [usize; 2],
-    dice: &mut Dice,
+    rng: &mut SeededRng,
 ) -> Piece {
     let half = size.x / 2.0;
-    let paint = Paint::random(&COLORS, dice);
+    let paint = Paint::random(&COLORS, rng);
     let surface = finish(paint);
     let knob = Surface::steel();
     let mut mesh = Mesh::default();
@@ -78,14 +78,14 @@ pub(in super::super) fn cabinet(
     name: ThingKind,
     size: Vec3,
     doors: usize,
-    dice: &mut Dice,
+    rng: &mut SeededRng,
 ) -> Piece {
-    let paint = Paint::random(&COLORS, dice);
-    cabinet_of(name, size, doors, paint)
+    let paint = Paint::random(&COLORS, rng);
+    cabinet_in_paint(name, size, doors, paint)
 }
 
 /// A cabinet in a paint, with a number of doors side by side.
-pub(in super::super) fn cabinet_of(
+pub(in super::super) fn cabinet_in_paint(
     name: ThingKind,
     size: Vec3,
     doors: usize,
@@ -153,38 +153,33 @@ pub(in super::super) fn cabinet_of(
 }
 
 /// Shelves with books and boxes on them.
-pub(in super::super) fn bookshelf(dice: &mut Dice) -> Piece {
-    let paint = Paint::random(&["brown", "grey", "black"], dice);
+pub(in super::super) fn bookshelf(rng: &mut SeededRng) -> Piece {
+    let paint = Paint::random(&["brown", "grey", "black"], rng);
     let surface = Surface::wood(paint, 1);
-    let (width, height, depth) = (dice.between(0.8, 1.2), dice.between(1.6, 2.0), 0.3);
+    let (width, height, depth) = (rng.between(0.8, 1.2), rng.between(1.6, 2.0), 0.3);
     let half = width / 2.0;
     let shelves = 5;
     let mut mesh = Mesh::default();
     let side = vec3(0.03, height, depth);
-    mesh.slabs(vec3(half - 0.015, 0.0, depth / 2.0), side, &surface);
+    mesh.mirrored_slabs(vec3(half - 0.015, 0.0, depth / 2.0), side, &surface);
     mesh.board(half, [0.0, height], [0.0, 0.015], &surface);
     let rise = (height - 0.06) / shelves as f32;
     for shelf in 0..=shelves {
         let y = 0.04 + shelf as f32 * rise;
         mesh.board(half, [y - 0.02, y + 0.005], [0.0, depth], &surface);
         if shelf < shelves {
-            books(
-                &mut mesh,
-                [-half + 0.03, half - 0.03],
-                y + 0.005,
-                rise,
-                dice,
-            );
+            add_books(&mut mesh, [-half + 0.03, half - 0.03], y + 0.005, rise, rng);
         }
     }
     Piece::new(kind("bookshelf", "shelving"), mesh, paint.name)
 }
 
-fn books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, dice: &mut Dice) {
+/// Adds a row of books and boxes to a shelf at height `y` that is `rise` high.
+fn add_books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, rng: &mut SeededRng) {
     let mut x = from;
-    let end = to - dice.between(0.0, 0.3) * (to - from);
+    let end = to - rng.between(0.0, 0.3) * (to - from);
     while x < end - 0.05 {
-        if dice.chance(0.06) {
+        if rng.chance(0.06) {
             let side = 0.16_f32.min(end - x);
             mesh.slab(
                 vec3(x + side / 2.0, y, 0.14),
@@ -194,16 +189,16 @@ fn books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, dice: &mut Di
             x += side + 0.02;
             continue;
         }
-        let (thick, tall) = (dice.between(0.022, 0.05), dice.between(0.55, 0.82) * rise);
-        let paint = Paint::random(&ALL, dice);
+        let (thick, tall) = (rng.between(0.022, 0.05), rng.between(0.55, 0.82) * rise);
+        let paint = Paint::random(&ALL_COLORS, rng);
         let dull = Surface {
-            color: paint.color * 0.7 + rgb([120, 110, 100]) * 0.2,
+            color: paint.color * 0.7 + linear_rgb([120, 110, 100]) * 0.2,
             pattern: Pattern::Plain,
             finish: SurfaceFinish::Matte,
         };
         mesh.block(
             vec3(x, y, 0.04),
-            vec3(x + thick, y + tall, dice.between(0.2, 0.26)),
+            vec3(x + thick, y + tall, rng.between(0.2, 0.26)),
             &dull,
         );
         x += thick + 0.003;
@@ -211,27 +206,27 @@ fn books(mesh: &mut Mesh, [from, to]: [f32; 2], y: f32, rise: f32, dice: &mut Di
 }
 
 /// A wall shelf with a few books. Its back is at the wall, and its board at y = 0.
-pub(in super::super) fn wall_shelf(dice: &mut Dice) -> Piece {
+pub(in super::super) fn wall_shelf(rng: &mut SeededRng) -> Piece {
     let paint = Paint::random(
         &["white", "brown", "black", "blue", "green", "yellow", "red"],
-        dice,
+        rng,
     );
     let surface = finish(paint);
-    let width = dice.between(0.9, 1.3);
+    let width = rng.between(0.9, 1.3);
     let half = width / 2.0;
     let mut mesh = Mesh::default();
     for y in [0.0, 0.34] {
         mesh.board(half, [y - 0.03, y], [0.0, 0.24], &surface);
     }
     let side = vec3(0.024, 0.37, 0.24);
-    mesh.slabs(vec3(half - 0.012, -0.03, 0.12), side, &surface);
+    mesh.mirrored_slabs(vec3(half - 0.012, -0.03, 0.12), side, &surface);
     mesh.board(half, [-0.03, 0.34], [0.0, 0.012], &surface);
-    books(
+    add_books(
         &mut mesh,
         [-half + 0.04, -half + 0.04 + width * 0.3],
         0.0,
         0.3,
-        dice,
+        rng,
     );
     Piece::new(kind("shelf", "shelving"), mesh, paint.name)
 }

@@ -2,14 +2,14 @@
 
 use glam::{Vec3, vec3};
 
-use super::super::dice::Dice;
 use super::super::mesh::Mesh;
 use super::super::paint::Paint;
 use super::super::scene::{Piece, ThingKind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
-use super::legs;
+use super::add_legs;
 
-/// The colours of tables. A colour that is listed more often is more likely.
+/// Colours of tables. A colour that is listed more often is more likely.
 const COLORS: [&str; 11] = [
     "brown", "brown", "brown", "white", "black", "orange", "grey", "purple", "green", "blue",
     "yellow",
@@ -23,11 +23,11 @@ fn finish(paint: Paint) -> Surface {
 }
 
 /// A table of a size, with four legs.
-pub(in super::super) fn table(name: ThingKind, size: Vec3, dice: &mut Dice) -> Piece {
-    let paint = Paint::random(&COLORS, dice);
+pub(in super::super) fn table(name: ThingKind, size: Vec3, rng: &mut SeededRng) -> Piece {
+    let paint = Paint::random(&COLORS, rng);
     let surface = finish(paint);
     let mut mesh = Mesh::default();
-    legs(&mut mesh, size - vec3(0.0, 0.03, 0.0), 0.06, 0.06, &surface);
+    add_legs(&mut mesh, size - vec3(0.0, 0.03, 0.0), 0.06, 0.06, &surface);
     mesh.board(
         size.x / 2.0 - 0.05,
         [size.y - 0.11, size.y - 0.03],
@@ -45,11 +45,16 @@ pub(in super::super) fn table(name: ThingKind, size: Vec3, dice: &mut Dice) -> P
 }
 
 /// A round table on one foot.
-pub(in super::super) fn round(name: ThingKind, radius: f32, height: f32, dice: &mut Dice) -> Piece {
-    let paint = Paint::random(&COLORS, dice);
+pub(in super::super) fn round(
+    name: ThingKind,
+    radius: f32,
+    height: f32,
+    rng: &mut SeededRng,
+) -> Piece {
+    let paint = Paint::random(&COLORS, rng);
     let surface = finish(paint);
     let mut mesh = Mesh::default();
-    mesh.oval(
+    mesh.lathe(
         vec3(0.0, 0.0, radius),
         &[
             (0.0, 0.025),

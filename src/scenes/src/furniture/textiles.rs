@@ -2,19 +2,19 @@
 
 use glam::{Vec3, vec2, vec3};
 
-use super::super::dice::Dice;
-use super::super::mesh::Mesh;
-use super::super::paint::{Paint, USUAL};
+use super::super::mesh::{Mesh, cos_sin};
+use super::super::paint::{COMMON_COLORS, Paint};
 use super::super::pattern::Pattern;
 use super::super::scene::{Piece, kind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
 
 /// The two curtains at the sides of a window of a width, from y = 0 downwards. Each is one thing; the rod belongs to the
 /// first.
-pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Piece; 2] {
-    let paint = Paint::random(&USUAL, dice);
-    let cloth = Surface::fabric(paint, dice);
-    let width = dice.between(0.42, 0.6);
+pub(in super::super) fn curtains(window: f32, drop: f32, rng: &mut SeededRng) -> [Piece; 2] {
+    let paint = Paint::random(&COMMON_COLORS, rng);
+    let cloth = Surface::fabric(paint, rng);
+    let width = rng.between(0.42, 0.6);
     let name = kind("curtain", "curtain");
     let half = |left: f32, rod: bool| {
         let mut mesh = Mesh::default();
@@ -31,13 +31,13 @@ pub(in super::super) fn curtains(window: f32, drop: f32, dice: &mut Dice) -> [Pi
 }
 
 /// A towel over a rail on the wall, with the rail at y = 0.
-pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
-    let paint = Paint::random(&USUAL, dice);
-    let cloth = Surface::paint(paint).with(Pattern::Pile);
-    let (width, drop) = (dice.between(0.36, 0.5), dice.between(0.55, 0.75));
+pub(in super::super) fn towel(rng: &mut SeededRng) -> Piece {
+    let paint = Paint::random(&COMMON_COLORS, rng);
+    let cloth = Surface::paint(paint).with_pattern(Pattern::Pile);
+    let (width, drop) = (rng.between(0.36, 0.5), rng.between(0.55, 0.75));
     let mut mesh = Mesh::default();
     for (z, share) in [(0.09, 1.0), (0.045, 0.8)] {
-        let wave = |x: f32| 0.006 * super::super::mesh::cos_sin(x * 14.0).y;
+        let wave = |x: f32| 0.006 * cos_sin(x * 14.0).y;
         let row = |y: f32| -> Vec<Vec3> {
             (0..=12)
                 .map(|i| {
@@ -68,7 +68,7 @@ pub(in super::super) fn towel(dice: &mut Dice) -> Piece {
 }
 
 /// A rug of a size, with its center at the origin.
-pub(in super::super) fn rug(width: f32, depth: f32, dice: &mut Dice) -> Piece {
+pub(in super::super) fn rug(width: f32, depth: f32, rng: &mut SeededRng) -> Piece {
     let tints = [
         [136, 74, 62],
         [78, 92, 116],
@@ -77,8 +77,9 @@ pub(in super::super) fn rug(width: f32, depth: f32, dice: &mut Dice) -> Piece {
         [72, 66, 74],
     ];
     let borders = [[226, 216, 196], [70, 58, 56], [206, 188, 140]];
-    let border = Surface::plain(dice.pick(&borders)).color;
-    let surface = Surface::plain(dice.pick(&tints)).with(Pattern::Rug(vec2(width, depth), border));
+    let border = Surface::plain(rng.pick(&borders)).color;
+    let surface =
+        Surface::plain(rng.pick(&tints)).with_pattern(Pattern::Rug(vec2(width, depth), border));
     let mut mesh = Mesh::default();
     mesh.board(
         width / 2.0,

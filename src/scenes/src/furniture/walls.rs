@@ -1,17 +1,17 @@
-//! Pieces that hang on walls or stand at them, with their back at z = 0.
+//! Pieces that hang on or lean against walls, with their back at z = 0.
 
 use glam::{Vec3, vec2, vec3};
 
-use super::super::dice::Dice;
 use super::super::mesh::Mesh;
 use super::super::paint::Paint;
 use super::super::pattern::Pattern;
-use super::super::scene::{LightSource, Piece, kind};
+use super::super::scene::{LightSource, Piece, ThingKind, kind};
+use super::super::seeded_rng::SeededRng;
 use super::super::surface::{Surface, SurfaceFinish};
 use super::parts;
 
 /// Adds four bars around a rectangle with its lower edge at y = 0.
-fn frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface: &Surface) {
+fn add_frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface: &Surface) {
     let (left, right) = (-width / 2.0, width / 2.0);
     for [low, high] in [
         [vec3(left - bar, -bar, 0.0), vec3(left, height + bar, thick)],
@@ -26,7 +26,8 @@ fn frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface
     }
 }
 
-fn sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface) {
+/// Adds a vertical rectangle with its lower edge at y = 0.
+fn add_sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface) {
     let (left, right) = (-width / 2.0, width / 2.0);
     mesh.quad(
         [
@@ -39,25 +40,25 @@ fn sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface) {
     );
 }
 
-pub(in super::super) fn picture(dice: &mut Dice) -> Piece {
-    let width = dice.between(0.25, 0.9);
-    let height = (width * dice.between(0.6, 1.35)).min(0.75);
-    let wood = Surface::paint(Paint::random(&["black", "brown", "grey"], dice));
-    let pattern = Pattern::Canvas(vec2(width, height), dice.below(100_000) as u32);
-    let canvas = Surface::plain([200, 200, 200]).with(pattern);
+pub(in super::super) fn picture(rng: &mut SeededRng) -> Piece {
+    let width = rng.between(0.25, 0.9);
+    let height = (width * rng.between(0.6, 1.35)).min(0.75);
+    let wood = Surface::paint(Paint::random(&["black", "brown", "grey"], rng));
+    let pattern = Pattern::Painting(vec2(width, height), rng.below(100_000) as u32);
+    let canvas = Surface::plain([200, 200, 200]).with_pattern(pattern);
     let mut mesh = Mesh::default();
-    frame(&mut mesh, width, height, 0.03, 0.03, &wood);
-    sheet(&mut mesh, width, height, 0.015, &canvas);
+    add_frame(&mut mesh, width, height, 0.03, 0.03, &wood);
+    add_sheet(&mut mesh, width, height, 0.015, &canvas);
     Piece::new(kind("picture", "picture"), mesh, "")
 }
 
 /// A mirror of a size in its frame.
-pub(in super::super) fn mirror(width: f32, height: f32, dice: &mut Dice) -> Piece {
-    let rim = Surface::gloss(Paint::random(&["black", "brown", "grey"], dice));
-    let glass = Surface::plain([255, 255, 255]).finished(SurfaceFinish::Mirror);
+pub(in super::super) fn mirror(width: f32, height: f32, rng: &mut SeededRng) -> Piece {
+    let rim = Surface::gloss(Paint::random(&["black", "brown", "grey"], rng));
+    let glass = Surface::plain([255, 255, 255]).with_finish(SurfaceFinish::Mirror);
     let mut mesh = Mesh::default();
-    frame(&mut mesh, width, height, 0.025, 0.03, &rim);
-    sheet(&mut mesh, width, height, 0.015, &glass);
+    add_frame(&mut mesh, width, height, 0.025, 0.03, &rim);
+    add_sheet(&mut mesh, width, height, 0.015, &glass);
     Piece::new(kind("mirror", "mirror"), mesh, "")
 }
 
@@ -71,12 +72,12 @@ pub(in super::super) fn monitor(width: f32) -> Piece {
     panel(kind("monitor", "tv_monitor"), width, true)
 }
 
-fn panel(name: super::super::scene::ThingKind, width: f32, foot: bool) -> Piece {
+fn panel(name: ThingKind, width: f32, foot: bool) -> Piece {
     let height = width * 0.58;
     let case = Surface::gloss(Paint::nameless([24, 24, 26]));
     let screen = Surface::plain([34, 40, 52])
-        .with(Pattern::Screen(vec2(width, height)))
-        .finished(SurfaceFinish::Glossy);
+        .with_pattern(Pattern::Screen(vec2(width, height)))
+        .with_finish(SurfaceFinish::Glossy);
     let mut mesh = Mesh::default();
     let lift = if foot { 0.09 } else { 0.0 };
     let z = if foot { 0.1 } else { 0.0 };
@@ -104,8 +105,8 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
         finish: SurfaceFinish::Glow(1.4),
     };
     let mut mesh = Mesh::default();
-    sheet(&mut mesh, width, height, 0.012, &view);
-    frame(&mut mesh, width, height, 0.06, 0.05, &white);
+    add_sheet(&mut mesh, width, height, 0.012, &view);
+    add_frame(&mut mesh, width, height, 0.06, 0.05, &white);
     mesh.board(0.02, [0.0, height], [0.0, 0.04], &white);
     mesh.board(
         half,
@@ -125,13 +126,13 @@ pub(in super::super) fn window(width: f32, height: f32, daylight: f32) -> Piece 
 }
 
 /// Blinds in front of a window of a size with its sill at y = 0; `share` is the covered part of the height.
-pub(in super::super) fn blinds(width: f32, height: f32, share: f32, dice: &mut Dice) -> Piece {
+pub(in super::super) fn blinds(width: f32, height: f32, share: f32, rng: &mut SeededRng) -> Piece {
     let half = width / 2.0;
     let paint = Paint::random(
         &[
             "white", "grey", "brown", "green", "blue", "yellow", "orange", "red",
         ],
-        dice,
+        rng,
     );
     let slat = Surface::paint(paint);
     let mut mesh = Mesh::default();
@@ -152,21 +153,21 @@ pub(in super::super) fn blinds(width: f32, height: f32, share: f32, dice: &mut D
     Piece::new(kind("blinds", "blinds"), mesh, paint.name)
 }
 
-/// A door of a width and height in its frame, turned by an angle into the room behind it.
-pub(in super::super) fn door([width, height]: [f32; 2], turned: f32, dice: &mut Dice) -> Piece {
-    let rail = Surface::plain(dice.pick(&[[196, 192, 182], [92, 64, 44], [150, 146, 138]]));
+/// A door of a width and height in its frame, opened by an angle into the room behind it.
+pub(in super::super) fn door([width, height]: [f32; 2], angle: f32, rng: &mut SeededRng) -> Piece {
+    let rail = Surface::plain(rng.pick(&[[196, 192, 182], [92, 64, 44], [150, 146, 138]]));
     let half = width / 2.0;
     let mut mesh = Mesh::default();
     let side = vec3(0.08, height, 0.14);
-    mesh.slabs(vec3(half + 0.03, 0.0, -0.05), side, &rail);
+    mesh.mirrored_slabs(vec3(half + 0.03, 0.0, -0.05), side, &rail);
     mesh.board(
         half + 0.07,
         [height - 0.02, height + 0.06],
         [-0.12, 0.02],
         &rail,
     );
-    let leaf = parts::piece("door", dice);
-    let hinge = vec3(0.01 - half, 0.0, if turned > 0.0 { -0.07 } else { 0.045 });
-    mesh.add(&leaf.mesh, hinge, turned);
+    let leaf = parts::piece("door", rng);
+    let hinge = vec3(0.01 - half, 0.0, if angle > 0.0 { -0.07 } else { 0.045 });
+    mesh.add(&leaf.mesh, hinge, angle);
     Piece::new(leaf.kind, mesh, "")
 }

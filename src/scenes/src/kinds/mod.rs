@@ -1,4 +1,4 @@
-//! The kinds of rooms, one file each: their size and furniture.
+//! Kinds of rooms: size and furniture, one file for each kind.
 
 mod bathroom;
 mod bedroom;
@@ -8,8 +8,8 @@ mod living_room;
 mod office;
 mod shared;
 
-use super::dice::Dice;
 use super::plan::FloorPlan;
+use super::seeded_rng::SeededRng;
 
 /// A kind of room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,7 +33,7 @@ impl RoomKind {
         Self::Office,
     ];
 
-    /// The name of the kind, as `living room`.
+    /// Name of the kind, such as `living room`.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Bedroom => "bedroom",
@@ -45,18 +45,18 @@ impl RoomKind {
         }
     }
 
-    /// A furnished room of this kind.
-    pub(super) fn furnish(self, dice: Dice) -> FloorPlan {
+    /// Creates a furnished room of this kind.
+    pub(super) fn furnish(self, rng: SeededRng) -> FloorPlan {
         let (mut plan, floor) = match self {
-            Self::Bedroom => (bedroom::furnish(dice), "floor"),
-            Self::Bathroom => (bathroom::furnish(dice), "bathfloor"),
-            Self::Kitchen => (kitchen::furnish(dice), "kitchenfloor"),
-            Self::LivingRoom => (living_room::furnish(dice), "floor"),
-            Self::DiningRoom => (dining_room::furnish(dice), "floor"),
-            Self::Office => (office::furnish(dice), "floor"),
+            Self::Bedroom => (bedroom::furnish(rng), "floor"),
+            Self::Bathroom => (bathroom::furnish(rng), "bathfloor"),
+            Self::Kitchen => (kitchen::furnish(rng), "kitchenfloor"),
+            Self::LivingRoom => (living_room::furnish(rng), "floor"),
+            Self::DiningRoom => (dining_room::furnish(rng), "floor"),
+            Self::Office => (office::furnish(rng), "floor"),
         };
-        plan.clutter(floor);
-        plan.walls();
+        plan.add_clutter(floor);
+        plan.add_walls();
         plan
     }
 }

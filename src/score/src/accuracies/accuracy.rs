@@ -1,4 +1,4 @@
-//! The accuracy of each model in each condition: [`AccuracySummary`].
+//! Accuracy of each model in each condition: [`AccuracySummary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,18 +13,18 @@ use crate::grid::{Grid, GridItem, TrialResult};
 use crate::subject::{CHANCE, ModelInCondition};
 use darkqa_ground::types::{Family, UnreadReason, Variant};
 
-/// Accuracy of one subject on one family in one reading.
+/// Accuracy of one subject on one family in one parsing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AccuracyCell {
     #[serde(flatten)]
     pub subject: ModelInCondition,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// How the replies were read.
+    /// Parsing of the replies.
     pub mode: ReadingMode,
     /// Number of replies that named the true choice.
     pub right: usize,
-    /// Number of replies in which no choice could be read. They count as wrong, as people do who cannot tell.
+    /// Number of unreadable replies. They count as wrong, like “cannot tell” by a person.
     pub unparsed: usize,
     /// Number of trials without a reply. They are not scored.
     pub failed: usize,
@@ -43,19 +43,19 @@ impl AccuracyCell {
     }
 }
 
-/// All cells of a run, ordered by subject, family and reading.
+/// All cells of a run, ordered by subject, family and parsing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AccuracySummary {
     pub cells: Vec<AccuracyCell>,
-    /// Number of replies that the strict parsing could not read, by reason.
+    /// Number of unreadable replies in the strict parsing, by reason.
     pub unread: BTreeMap<UnreadReason, usize>,
-    /// Chance with each question once, if several orders of its choices are asked and this changes chance.
+    /// Chance with each question counted once, if several orders of choices are asked and this changes chance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chance_of_questions: Option<Estimate>,
 }
 
 impl AccuracySummary {
-    /// Cells of a family in one reading. `None` selects the cells of all families together.
+    /// Cells of a family in one parsing. `None` selects the cells of all families together.
     pub fn family_cells<'s>(
         &'s self,
         family: Option<&'s Family>,
@@ -66,7 +66,7 @@ impl AccuracySummary {
             .filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
     }
 
-    /// Cell of a subject, family and reading, if there is one.
+    /// Cell of a subject, family and parsing, if it exists.
     #[must_use]
     pub fn cell(
         &self,
@@ -80,7 +80,8 @@ impl AccuracySummary {
     }
 }
 
-/// Accuracies of a run. `health` belongs to its subjects; `questions` are all that it asks, for the chance line.
+/// Computes the accuracies of a run. `health` has one entry for each subject; `questions` are all questions of the run, for the chance
+/// line.
 #[must_use]
 pub(crate) fn summarize(
     grid: &Grid<'_>,
@@ -97,7 +98,7 @@ pub(crate) fn summarize(
             })
         })
         .collect();
-    // A family that a subject was not asked about has no cell.
+    // A family that a subject was not asked about gets no cell.
     cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
     cells.extend(chance_cells(&questions));
     AccuracySummary {
@@ -127,7 +128,7 @@ fn cell(
         .items
         .iter()
         .enumerate()
-        .filter(|(_, item)| item.is_of(family))
+        .filter(|(_, item)| item.is_in_family(family))
     {
         let result = grid.result(subject, index);
         failed += usize::from(result == TrialResult::Failed);
@@ -147,7 +148,7 @@ fn cell(
     }
 }
 
-/// True if a person said that they cannot tell: that is read, and is no choice.
+/// True if a person answered that they cannot tell, which is readable but not a choice.
 fn cannot_tell(grid: &Grid<'_>, subject: usize, item: usize) -> bool {
     let trial = grid.trial(subject, item);
     trial
@@ -173,7 +174,7 @@ fn always(
             cluster.right += u32::from(question.right == question.replies);
         }
     };
-    // Items of a question stand together.
+    // Items of the same question are adjacent.
     let mut last: Option<&GridItem<'_>> = None;
     let mut count = ClusterCount::default();
     for (item, result) in grid.family_items(subject, family) {
@@ -194,7 +195,7 @@ fn always(
     Estimate::clustered(&clusters)
 }
 
-/// The chance line: a cell for each family and reading, with the accuracy of a uniform guess.
+/// Cells of the chance line: the accuracy of a uniform guess for each family and parsing.
 fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     let families: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
     std::iter::once(None)

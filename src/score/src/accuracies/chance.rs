@@ -1,9 +1,9 @@
-//! The accuracy of guessing: [`chance`].
+//! Accuracy of uniform guesses: [`chance`].
 
 use crate::estimate::Estimate;
 use darkqa_ground::types::{AskedItem, Family, Question};
 
-/// Family of a question, the number of its choices, and how many orders of them are asked.
+/// Family of a question, number of choices, and number of their orders that are asked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OfferedChoices {
     /// Family of the question.
@@ -15,7 +15,7 @@ pub struct OfferedChoices {
 }
 
 impl OfferedChoices {
-    /// The choices that an item offers.
+    /// Creates the entry of an item.
     pub fn from_item(item: &AskedItem) -> Self {
         Self {
             family: item.family.as_ref().clone(),
@@ -35,17 +35,17 @@ impl From<&Question> for OfferedChoices {
     }
 }
 
-/// The exact accuracy of a uniform guess: the mean of 1 / number of choices over all orders that are asked. `None` without questions.
+/// Exact accuracy of a uniform guess: the mean of 1 / number of choices over all orders that are asked. `None` without questions.
 ///
-/// The sum runs over the numbers of choices, so that the order of the questions cannot change a digit.
+/// Questions are grouped by their number of choices, so that their order cannot change the rounding of the sum.
 pub(crate) fn chance<'a>(
     questions: impl IntoIterator<Item = &'a OfferedChoices>,
 ) -> Option<Estimate> {
     mean(questions, |question| question.orders)
 }
 
-/// The same with each question once, as the paper counts (DarkQA, section IV), if that is another number: a question with many choices has
-/// many orders. `None` otherwise.
+/// Accuracy of a uniform guess with each question counted once, as in the paper (DarkQA, section IV); `None` if it equals [`chance`]. The
+/// two differ if several orders are asked, because a question with many choices has many orders.
 pub(crate) fn chance_of_questions<'a>(
     questions: impl IntoIterator<Item = &'a OfferedChoices> + Clone,
 ) -> Option<Estimate> {

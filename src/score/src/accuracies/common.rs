@@ -1,4 +1,4 @@
-//! The items that all models were asked: [`CommonItems`].
+//! Items that all models were asked: [`CommonItems`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,11 +9,11 @@ use crate::grid::Grid;
 use crate::subject::ModelInCondition;
 use darkqa_ground::types::{QuestionId, View};
 
-/// The questions that a model was asked, in any condition.
+/// Number of questions that a model was asked, in any condition.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AskedQuestions {
     pub model: String,
-    /// Whether the model saw no image.
+    /// True if the model was asked without images.
     pub is_blind: bool,
     /// Number of questions.
     pub questions: usize,
@@ -22,9 +22,9 @@ pub struct AskedQuestions {
 /// Items that models share although they were not asked the same questions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommonItems {
-    /// The questions of each model, with and without images.
+    /// Number of questions of each model, with and without images.
     pub asked: Vec<AskedQuestions>,
-    /// Number of questions that any model was asked.
+    /// Number of questions that at least one model was asked.
     pub questions: usize,
     /// Number of questions to which every model with images replied.
     pub shared_questions: usize,
@@ -33,7 +33,7 @@ pub struct CommonItems {
 }
 
 impl CommonItems {
-    /// The common items of a grid; `None` if all models were asked the same questions.
+    /// Finds the common items of a grid; `None` if all models were asked the same questions.
     #[must_use]
     pub fn new(grid: &Grid<'_>) -> Option<Self> {
         let all: BTreeSet<&QuestionId> = grid
@@ -59,30 +59,34 @@ impl CommonItems {
             return None;
         }
         let shared = shared_items(grid);
-        let restricted = grid.restricted(&shared);
-        let items = restricted.items.iter();
-        let offers: Vec<OfferedChoices> = items
-            .clone()
+        let restricted = grid.select_items(&shared);
+        let offers: Vec<OfferedChoices> = restricted
+            .items
+            .iter()
             .map(|item| OfferedChoices::from_item(item.asked))
             .collect();
-        let shared: BTreeSet<&QuestionId> = items.map(|item| &*item.asked.question).collect();
-        let asked = asked
-            .into_iter()
-            .map(|((is_blind, model), questions)| AskedQuestions {
-                model: model.to_owned(),
-                is_blind,
-                questions: questions.len(),
-            });
+        let shared_questions: BTreeSet<&QuestionId> = restricted
+            .items
+            .iter()
+            .map(|item| &*item.asked.question)
+            .collect();
         Some(Self {
-            asked: asked.collect(),
+            asked: asked
+                .into_iter()
+                .map(|((is_blind, model), questions)| AskedQuestions {
+                    model: model.to_owned(),
+                    is_blind,
+                    questions: questions.len(),
+                })
+                .collect(),
             questions: all.len(),
-            shared_questions: shared.len(),
+            shared_questions: shared_questions.len(),
             summary: summarize(&restricted, &healths(&restricted), offers),
         })
     }
 }
 
-/// The subjects with their indices, without those of people beside models.
+/// Subjects with their indices. People are left out if there are models.
 fn model_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g ModelInCondition)> {
     let models = grid.subjects.iter().map(|subject| &*subject.model);
     let models: BTreeSet<&str> = grid.listing.without_people(models).into_iter().collect();
@@ -92,8 +96,8 @@ fn model_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g Mo
         .filter(move |(_, subject)| models.contains(&*subject.model))
 }
 
-/// Whether each item has a reply of every model with images, in any condition. Models without any reply do not count, and people count
-/// only if there are no models.
+/// For each item, returns whether every model with images replied to it, in any condition. Models without any reply do not count, and
+/// people count only if there are no models.
 #[must_use]
 pub fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
     let mut models = BTreeMap::<&str, Vec<bool>>::new();
@@ -109,8 +113,7 @@ pub fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
         }
     }
     models.retain(|_, replied| replied.contains(&true));
-    let items = 0..grid.items.len();
-    items
+    (0..grid.items.len())
         .map(|item| models.values().all(|replied| replied[item]))
         .collect()
 }

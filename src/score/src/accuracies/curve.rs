@@ -19,14 +19,14 @@ pub struct Curve {
     pub enhancer: Option<EnhancerName>,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// Threshold and area in the strict parsing, which is the headline.
+    /// Threshold and area in the strict parsing, which is the main result.
     pub summary: CurveSummary,
-    /// The same in the lenient parsing.
+    /// Threshold and area in the lenient parsing.
     pub lenient: CurveSummary,
 }
 
 impl Curve {
-    /// The quantity over which the curve runs.
+    /// Quantity on the horizontal axis of the curve.
     #[must_use]
     pub fn axis(&self) -> Axis {
         self.variant.kind.map_or(Axis::LIGHT, Kind::axis)
@@ -42,7 +42,7 @@ impl Curve {
     }
 }
 
-/// The points of one curve: one model in one variant, raw or with one enhancer.
+/// Points of one curve: one model in one variant, raw or with one enhancer.
 #[derive(Debug)]
 pub struct CurvePoints {
     pub model: String,
@@ -61,7 +61,7 @@ impl CurvePoints {
             .filter(|subject| subject.view == Some(View::Image) && subject.variant.kind.is_some())
             .map(|subject| (&*subject.model, &subject.variant, subject.enhancer.as_ref()))
             .collect();
-        // Equal keys stand together, and models in their order.
+        // Sorts equal keys together to remove duplicates, then restores the order of the models.
         keys.sort_unstable();
         keys.dedup();
         keys.sort_by_cached_key(|(model, ..)| grid.listing.place(model));
@@ -95,8 +95,7 @@ impl CurvePoints {
     }
 }
 
-/// All curves of a grid: each model in each variant, raw and with each enhancer. A curve needs L0 and at least one degraded
-/// level.
+/// Computes all curves of a grid: each model in each variant, raw and with each enhancer. A curve needs L0 and at least one degraded level.
 #[must_use]
 pub fn curves(grid: &Grid<'_>, draws: &Resamples, family: Option<&Family>) -> Vec<Curve> {
     CurvePoints::all(grid)

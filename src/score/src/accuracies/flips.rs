@@ -1,4 +1,4 @@
-//! The level at which an item is first answered wrongly: [`FirstFailure`].
+//! First level at which each item is answered wrongly: [`FirstFailure`].
 
 use super::curve::CurvePoints;
 use crate::choice::ReadingMode;
@@ -8,7 +8,7 @@ use darkqa_ground::types::AxisLevel;
 /// First failing levels of the items, for one model in one variant, raw or with one enhancer.
 #[derive(Debug)]
 pub struct FirstFailure {
-    /// The model, the variant and the enhancer, with the levels that were asked.
+    /// Model, variant and enhancer, with the asked levels.
     pub curve: CurvePoints,
 }
 
@@ -22,8 +22,7 @@ pub(crate) fn first_failures(grid: &Grid<'_>) -> Vec<FirstFailure> {
 }
 
 impl FirstFailure {
-    /// The first level at which an item of the grid is not answered correctly. `None` if it never fails, or if a level before that has
-    /// no reply.
+    /// First level at which an item of the grid is not answered correctly. `None` if no level fails, or if an earlier level has no reply.
     #[must_use]
     pub fn first(&self, grid: &Grid<'_>, item: usize) -> Option<AxisLevel> {
         for &(level, subject) in &self.curve.subjects {

@@ -46,7 +46,7 @@ impl Health {
         self.failed.values().sum()
     }
 
-    /// Number of replies that could not be read. People who cannot tell said so.
+    /// Number of unreadable replies. “Cannot tell” by a person is readable.
     #[must_use]
     pub fn unreadable(&self) -> usize {
         let unread = self.replies - self.read;

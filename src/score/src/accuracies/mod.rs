@@ -1,4 +1,4 @@
-//! Accuracies of models: in each condition, over the levels, and beside chance.
+//! Accuracies of models in each condition and over the levels, compared with chance.
 
 mod accuracy;
 mod chance;

@@ -1,4 +1,4 @@
-//! The strict score of a set whose questions form groups: all questions of a group right ([`StrictScore`]).
+//! Strict score of a data set whose questions form groups: share of groups with only right answers ([`StrictScore`]).
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -8,70 +8,71 @@ use crate::grid::{Grid, TrialResult};
 use crate::subject::ModelInCondition;
 use darkqa_ground::types::{Family, QuestionId, RunQuestion, StrictGroup};
 
-/// Share of groups in which a subject answers all questions right, in one reading.
+/// Share of groups in which a subject answers all questions right, in one parsing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupCell {
     pub subject: ModelInCondition,
-    /// Question family, with the groups that are wholly of it; `None` for all groups.
+    /// Family whose pure groups are scored; `None` for all groups.
     pub family: Option<Family>,
-    /// How the replies were read.
+    /// Parsing of the replies.
     pub mode: ReadingMode,
     /// Number of groups in which every question was answered right every time.
     pub right: usize,
     /// Number of groups with a question that was not asked or has no reply. They are not scored.
     pub incomplete: usize,
-    /// Share of `right` among the complete groups; `None` if there is none.
+    /// Share of `right` among the complete groups; `None` without complete groups.
     pub share: Option<Estimate>,
     /// Number of clusters of the complete groups.
     pub clusters: usize,
 }
 
-/// The chance that a uniform guess is right on all questions of a group.
+/// Probability that uniform guesses are right on all questions of a group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupChance {
     /// Question family; `None` for all groups.
     pub family: Option<Family>,
-    /// Mean over the groups that the run asks completely; `None` without such a group.
+    /// Mean over the groups that the run asks completely; `None` without such groups.
     pub share: Option<Estimate>,
 }
 
-/// The strict score that benchmarks of several questions about one thing have beside accuracy.
+/// Strict score: the share of groups of related questions in which every answer is right. Some benchmarks report it in addition to
+/// accuracy.
 ///
-/// A group is one unit, and right if all its questions are right, in every order of choices and every repeat in which they were asked.
-/// It counts if every question that the set holds of it has a reply. Groups that share a cluster are one cluster.
+/// A group is right if all its questions are right, in every order of choices and every repeat in which they were asked. It is scored if
+/// every question of the group in the data set has a reply. Groups that share a cluster belong to one cluster.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StrictScore {
-    /// Ordered by subject, family and reading.
+    /// Cells, ordered by subject, family and parsing.
     pub cells: Vec<GroupCell>,
-    /// All groups first, then by family.
+    /// Chance for all groups, then for each family.
     pub chance: Vec<GroupChance>,
     /// Number of groups with at least one question in the run.
     pub groups: usize,
-    /// Number of groups of one question: their strict score is accuracy.
+    /// Number of groups of one question, for which the strict score is the accuracy.
     pub single: usize,
     /// Number of groups whose questions are about several frames.
     pub across_frames: usize,
-    /// Number of groups that the run asks only in part, so that they are complete for no subject.
+    /// Number of groups that the run asks only in part, so that no subject can complete them.
     pub never_complete: usize,
 }
 
-/// The questions of a group that are asked.
+/// Asked questions of a group.
 struct Group<'a> {
-    /// The number of questions that the set holds.
+    /// Number of questions in the data set.
     size: usize,
     questions: Vec<&'a RunQuestion>,
-    /// The only family; `None` if there are several.
+    /// Family of all questions; `None` if there are several families.
     family: Option<&'a Family>,
-    /// Indices of its items in the grid.
+    /// Indices of the items in the grid.
     items: Vec<usize>,
-    /// Index of its cluster among those of groups.
+    /// Index of the cluster of groups.
     cluster: usize,
 }
 
 /// Result of a group for one subject.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum GroupResult {
-    /// None of its questions was asked.
+    /// No question of the group was asked.
     Absent,
     Incomplete,
     Right,
@@ -79,7 +80,7 @@ enum GroupResult {
 }
 
 impl StrictScore {
-    /// The strict score of a grid, whose questions name their groups; `None` if none has one.
+    /// Computes the strict score of a grid from the groups that its questions name; `None` if no question names a group.
     #[must_use]
     pub fn new(grid: &Grid<'_>, questions: &[RunQuestion]) -> Option<Self> {
         let groups = groups(grid, questions);
@@ -109,7 +110,8 @@ impl StrictScore {
             family: family.cloned(),
             share: chance(grid, &of_family(*family)),
         });
-        let count = |is: fn(&Group<'_>) -> bool| groups.iter().filter(|group| is(group)).count();
+        let count =
+            |counts: fn(&Group<'_>) -> bool| groups.iter().filter(|group| counts(group)).count();
         Some(Self {
             cells,
             chance: chance.collect(),
@@ -124,11 +126,11 @@ impl StrictScore {
                     .len()
                     > 1
             }),
-            never_complete: count(|group| !group.is_asked_whole()),
+            never_complete: count(|group| !group.is_complete()),
         })
     }
 
-    /// The cell of a subject in the other reading.
+    /// Cell of the same subject and family in the lenient parsing.
     pub fn lenient(&self, strict: &GroupCell) -> Option<&GroupCell> {
         self.cells.iter().find(|cell| {
             cell.mode == ReadingMode::Lenient
@@ -138,7 +140,7 @@ impl StrictScore {
     }
 }
 
-/// The groups of the questions by name, with their items and clusters.
+/// Groups of the questions, sorted by name, with their items and clusters.
 fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
     let mut by_name = BTreeMap::<&str, Vec<(&StrictGroup, &RunQuestion)>>::new();
     for question in questions {
@@ -184,37 +186,37 @@ fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
     groups
 }
 
-/// Puts groups that share a cluster of the grid into one cluster, so that groups of different ones are independent.
+/// Puts groups that share a cluster of the grid into one cluster, so that groups of different clusters are independent.
 fn join_clusters(grid: &Grid<'_>, groups: &mut [Group<'_>]) {
     let mut roots: Vec<usize> = (0..groups.len()).collect();
-    let root = |roots: &[usize], mut at: usize| {
-        while roots[at] != at {
-            at = roots[at];
+    let root = |roots: &[usize], mut group: usize| {
+        while roots[group] != group {
+            group = roots[group];
         }
-        at
+        group
     };
     let mut first = HashMap::<u32, usize>::new();
-    for (at, group) in groups.iter().enumerate() {
+    for (index, group) in groups.iter().enumerate() {
         for item in &group.items {
-            let known = *first.entry(grid.items[*item].cluster).or_insert(at);
-            let (one, other) = (root(&roots, known), root(&roots, at));
-            // The least index is the root, so that no chain grows long.
+            let known = *first.entry(grid.items[*item].cluster).or_insert(index);
+            let (one, other) = (root(&roots, known), root(&roots, index));
+            // The smallest index is the root, so that paths stay short.
             roots[one.max(other)] = one.min(other);
         }
     }
-    for (at, group) in groups.iter_mut().enumerate() {
-        group.cluster = root(&roots, at);
+    for (index, group) in groups.iter_mut().enumerate() {
+        group.cluster = root(&roots, index);
     }
 }
 
 impl Group<'_> {
-    /// Whether the run asks every question that the set holds of the group.
-    fn is_asked_whole(&self) -> bool {
+    /// True if the run asks every question of the group in the data set.
+    fn is_complete(&self) -> bool {
         self.questions.len() == self.size
     }
 
-    /// Result of the group for a subject. An order or a repeat that was not asked of the subject does not count, if every question has a
-    /// reply and none failed.
+    /// Result of the group for a subject. Orders and repeats that the subject was not asked are ignored, if every question has a reply and
+    /// no trial failed.
     fn result(&self, grid: &Grid<'_>, subject: usize, mode: ReadingMode) -> GroupResult {
         let mut replied = BTreeSet::<&QuestionId>::new();
         let (mut is_asked, mut has_failed, mut is_right) = (false, false, true);
@@ -240,7 +242,7 @@ impl Group<'_> {
     }
 }
 
-/// The cell of a subject on the groups of a family; `None` if it was asked none of their questions.
+/// Computes the cell of a subject on the groups of a family; `None` if the subject was asked none of their questions.
 fn cell(
     grid: &Grid<'_>,
     subject: usize,
@@ -275,13 +277,10 @@ fn cell(
     })
 }
 
-/// The mean over groups of the product of 1 / number of choices, over every time that a question of the group was asked. `None` if the
-/// run asks no group whole. Groups are in the order of their names, so that the order of questions cannot change a digit.
+/// Mean over the groups of the product of 1 / number of choices, with one factor for each time that a question of the group was asked.
+/// `None` if the run asks no group completely. Groups are sorted by name, so that the order of questions cannot change the rounding.
 fn chance(grid: &Grid<'_>, groups: &[&Group<'_>]) -> Option<Estimate> {
-    let groups: Vec<&&Group<'_>> = groups
-        .iter()
-        .filter(|group| group.is_asked_whole())
-        .collect();
+    let groups: Vec<&&Group<'_>> = groups.iter().filter(|group| group.is_complete()).collect();
     let sum: f64 = groups
         .iter()
         .map(|group| -> f64 {
@@ -293,8 +292,9 @@ fn chance(grid: &Grid<'_>, groups: &[&Group<'_>]) -> Option<Estimate> {
                     let times = group
                         .items
                         .iter()
-                        .filter(|item| *grid.items[**item].asked.question == question.id);
-                    let times = i32::try_from(times.count().max(1)).unwrap_or(i32::MAX);
+                        .filter(|item| *grid.items[**item].asked.question == question.id)
+                        .count();
+                    let times = i32::try_from(times.max(1)).unwrap_or(i32::MAX);
                     (question.choices.len() as f64).recip().powi(times)
                 })
                 .product()

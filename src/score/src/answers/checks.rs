@@ -1,4 +1,5 @@
-//! Manual checks of questions: the share that people found right ([`CheckedShare`]), and the agreement of two of them ([`CheckAgreement`]).
+//! Manual checks of questions: shares of wrong and ambiguous questions ([`CheckedShare`]), and agreement of two people
+//! ([`CheckAgreement`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,14 +7,14 @@ use crate::comparisons::{AgreementCounts, clustered_kappa, kappa};
 use crate::estimate::{ClusterCount, Estimate};
 use darkqa_ground::types::{Family, QuestionId};
 
-/// A person's finding about a question.
+/// Result of a person's check of a question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CheckFinding {
     /// The person gave the answer of the rule.
     Right,
     /// The person gave another answer.
     Wrong,
-    /// To the person, none or several of the choices fit.
+    /// For the person, none or several of the choices fit.
     Ambiguous,
 }
 
@@ -27,10 +28,10 @@ pub struct Check {
     pub finding: CheckFinding,
 }
 
-/// The checks of all people, by person and question.
+/// Checks of all people, by person and question.
 pub type Checks = BTreeMap<(String, QuestionId), Check>;
 
-/// Shares of a family's questions, as one person found them.
+/// Shares of wrong and ambiguous questions of a family, according to one person.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedShare {
     pub person: String,
@@ -44,16 +45,16 @@ pub struct CheckedShare {
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckAgreement {
     pub people: [String; 2],
-    /// Share of questions about which both found the same.
+    /// Share of questions with the same result of both people.
     pub same: Estimate,
-    /// Cohen's κ of finding a question right (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` if one of them found all questions
-    /// right, or none.
+    /// Cohen's κ of finding a question right (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` if one person found all questions right, or
+    /// none.
     pub kappa: Option<f64>,
-    /// Lower and upper end of the 95 % interval of κ; `None` with too few scenes in which they vary.
+    /// Lower and upper bound of the 95 % interval of κ; `None` if the results vary in too few scenes.
     pub interval: Option<[f64; 2]>,
 }
 
-/// The shares of each person, for each family and for all.
+/// Computes the shares of each person, for each family and for all families together.
 pub fn shares(checks: &Checks) -> Vec<CheckedShare> {
     let people: BTreeSet<&String> = checks.keys().map(|(person, _)| person).collect();
     let families: BTreeSet<&Family> = checks.values().map(|check| &check.family).collect();
@@ -81,18 +82,18 @@ pub fn shares(checks: &Checks) -> Vec<CheckedShare> {
     shares
 }
 
-/// The share of checks that hold, with its interval by scene.
-fn share(checks: &[&Check], holds: impl Fn(&Check) -> bool) -> Option<Estimate> {
+/// Share of checks for which `counts` is true, with its interval by scene.
+fn share(checks: &[&Check], counts: impl Fn(&Check) -> bool) -> Option<Estimate> {
     let mut scenes: BTreeMap<&str, ClusterCount> = BTreeMap::new();
     for check in checks {
         let count = scenes.entry(&check.scene).or_default();
         count.replies += 1;
-        count.right += u32::from(holds(check));
+        count.right += u32::from(counts(check));
     }
     Estimate::clustered(&scenes.into_values().collect::<Vec<_>>())
 }
 
-/// The agreement of each two people who checked the same questions.
+/// Computes the agreement of each two people who checked the same questions.
 pub fn agreements(checks: &Checks) -> Vec<CheckAgreement> {
     let people: BTreeSet<&String> = checks.keys().map(|(person, _)| person).collect();
     let people: Vec<&String> = people.into_iter().collect();

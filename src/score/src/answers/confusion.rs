@@ -1,4 +1,4 @@
-//! Answers given against true answers: [`Confusion`], [`Hallucination`], [`FalseAnswer`] and [`Collapse`].
+//! Given answers compared with true answers: [`Confusion`], [`Hallucination`], [`FalseAnswer`] and [`Collapse`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,11 +18,11 @@ const MAX_LABELS: usize = 26;
 pub struct Confusion {
     pub subject: ModelInCondition,
     pub family: Family,
-    /// The different answers, sorted.
+    /// All possible answers, sorted.
     pub labels: Vec<String>,
-    /// Number of replies by true answer, then by answer given. The last column counts replies without a readable answer.
+    /// Number of replies by true answer, then by given answer. The last column counts unreadable replies.
     pub counts: Vec<Vec<usize>>,
-    /// The answer given most often; `None` if no answer could be read.
+    /// Most common answer; `None` without a readable reply.
     pub collapse: Option<Collapse>,
 }
 
@@ -59,6 +59,7 @@ pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
     all
 }
 
+/// Number of replies of a subject, by true answer and given answer.
 fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -> Vec<Vec<usize>> {
     let mut counts = vec![vec![0; labels.len() + 1]; labels.len()];
     for (item, result) in grid.family_items(subject, Some(family)) {
@@ -78,7 +79,7 @@ fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -
 }
 
 impl Confusion {
-    /// For each answer, the number of times it was given and the number of times it was true.
+    /// Number of times that each answer was given, and number of times that it was true.
     #[must_use]
     pub fn shares(&self) -> Vec<(usize, usize)> {
         let predicted = |label: usize| self.counts.iter().map(|row| row[label]).sum();
@@ -90,41 +91,41 @@ impl Confusion {
     }
 }
 
-/// Distribution of the answers given, compared with the true answers. A model that no longer sees gives the same answer
-/// to everything.
+/// Distribution of the given answers, compared with the true answers. A model that cannot see anything gives the same answer to every
+/// question.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Collapse {
-    /// The answer given most often.
+    /// Most common answer.
     pub top: String,
     /// Share of that answer among all replies, readable or not, with its interval by cluster.
     pub share: Estimate,
     /// Share of the same replies for which that answer is true.
     pub truth: f64,
-    /// Share of that answer that is expected if one of the choices is drawn for each of the same replies.
+    /// Expected share of that answer if one of the choices is drawn at random for each of the same replies.
     pub guess: f64,
-    /// Entropy of the answers given, in bits, over replies with a readable answer.
+    /// Entropy of the given answers in bits, over readable replies.
     pub entropy: f64,
-    /// Entropy of the true answers, in bits, over all replies.
+    /// Entropy of the true answers in bits, over all replies.
     pub true_entropy: f64,
     /// Number of clusters of the replies.
     pub clusters: usize,
-    /// The answer's share against that of the same model at L0; `None` for L0 itself, enhanced images and models without L0.
+    /// Comparison of the share with that of the same model at L0; `None` for L0 itself, enhanced images and models without L0.
     pub clean: Option<AgainstClean>,
 }
 
-/// How much more often an answer is given than at L0, on the same items.
+/// Comparison of the share of an answer with its share at L0, on the same items.
 ///
-/// The answer that is tested is the commonest of both sides together. Swaps of the sides do not change that choice, so that the test
-/// keeps its size although the answer is chosen by the data.
+/// The tested answer is the most common one of both sides together. Swapping the sides does not change this choice, so the test keeps its
+/// size although the data select the answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AgainstClean {
     /// Shares of the answer in the strict parsing, with their difference.
     pub strict: PairedComparison,
-    /// The same in the lenient parsing.
+    /// Shares of the answer in the lenient parsing.
     pub lenient: PairedComparison,
-    /// Whether the answer is the commonest of both sides together.
+    /// True if the answer is the most common one of both sides together.
     pub is_commonest: bool,
-    /// p-values after the correction over all tests that sentences rest on, by parsing; `None` if no sentence is about the answer.
+    /// p-values after the correction over all tests behind sentences, by parsing; `None` if no sentence is about the answer.
     pub p_report: [Option<f64>; 2],
 }
 
@@ -134,11 +135,11 @@ impl AgainstClean {
         if dark.enhancer.is_some() || !dark.variant.is_degraded() {
             return None;
         }
-        let clean = ModelInCondition::seeing(&dark.model, AxisLevel::L0, &dark.variant, None);
-        let clean = grid.stand_in(&clean)?;
+        let clean = ModelInCondition::with_images(&dark.model, AxisLevel::L0, &dark.variant, None);
+        let clean = grid.find_up_to_group(&clean)?;
         let mut times = BTreeMap::<&str, usize>::new();
         for (index, item) in grid.items.iter().enumerate() {
-            if !item.is_of(Some(family)) {
+            if !item.is_in_family(Some(family)) {
                 continue;
             }
             let [a, b] =
@@ -156,7 +157,7 @@ impl AgainstClean {
             given.is_some_and(|given| given == answer)
         };
         let paired = |mode| {
-            let has = |_: usize, item: &GridItem<'_>| item.is_of(Some(family));
+            let has = |_: usize, item: &GridItem<'_>| item.is_in_family(Some(family));
             PairedComparison::counting(grid, [subject, clean], mode, has, is_given)
         };
         Some(Self {
@@ -167,7 +168,7 @@ impl AgainstClean {
         })
     }
 
-    /// p-value of no difference in a parsing; 1 if another answer is the commonest.
+    /// p-value of no difference in a parsing; 1 if another answer is more common.
     pub(crate) fn p(&self, mode: ReadingMode) -> f64 {
         match mode {
             _ if !self.is_commonest => 1.0,
@@ -176,7 +177,7 @@ impl AgainstClean {
         }
     }
 
-    /// Whether the answer is shown to be given more often than at L0, in both parsings and after the correction over all sentences.
+    /// True if the answer is shown to be more common than at L0, in both parsings and after the correction over all sentences.
     fn is_detected(&self) -> bool {
         let is_small = |p: &Option<f64>| p.is_some_and(|p| p < ALPHA);
         let is_more = |paired: &PairedComparison| paired.difference.value > 0.0;
@@ -184,18 +185,21 @@ impl AgainstClean {
     }
 }
 
-/// By how much the share of one answer must exceed its true share to be called a collapse; chosen.
+/// Minimum excess of the share of an answer over its true share for an answer collapse (chosen).
 pub const MIN_EXCESS: f64 = 0.2;
 
-/// Fewest clusters of a collapse; chosen, as for thresholds.
+/// Minimum number of clusters for an answer collapse (chosen, the same as for thresholds).
 const MIN_CLUSTERS: usize = 8;
 
 impl Collapse {
-    /// The answer that a subject gives most often; of several, the first by name.
+    /// Describes the most common answer of a subject, the first by name of several.
     fn from_confusion(grid: &Grid<'_>, subject: usize, confusion: &Confusion) -> Option<Self> {
         let shares = confusion.shares();
-        let labels = shares.iter().enumerate().rev();
-        let (top, (predicted, truth)) = labels.max_by_key(|(_, (predicted, _))| *predicted)?;
+        let (top, (predicted, truth)) = shares
+            .iter()
+            .enumerate()
+            .rev()
+            .max_by_key(|(_, (predicted, _))| *predicted)?;
         if *predicted == 0 {
             return None;
         }
@@ -229,14 +233,14 @@ impl Collapse {
         })
     }
 
-    /// Whether one answer is given far too often, and detected to be given more often than by the same model at L0.
+    /// True if one answer is far too frequent, and detected to be more frequent than for the same model at L0.
     #[must_use]
     pub fn is_shown(&self) -> bool {
         self.is_far_too_frequent() && self.clean.as_ref().is_some_and(AgainstClean::is_detected)
     }
 
-    /// Whether one answer is given far too often: [`MIN_EXCESS`] above its true share, and with an interval above both its true
-    /// share and that of guessing. A model that draws yes or no where few answers are “yes” does not collapse.
+    /// True if one answer is far too frequent: its share is [`MIN_EXCESS`] above its true share, and its interval is above both its true
+    /// share and the share expected by guessing. A model that guesses yes or no, when few answers are “yes”, does not collapse.
     #[must_use]
     pub fn is_far_too_frequent(&self) -> bool {
         let rounding = 1e-9;
@@ -268,7 +272,7 @@ pub enum FalseAnswer {
 }
 
 impl FalseAnswer {
-    /// The answer in words.
+    /// The answer as a word.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -277,18 +281,18 @@ impl FalseAnswer {
         }
     }
 
-    /// Whether an item is a presence question to which this answer is false: the other word is true.
+    /// True if an item is a presence question to which this answer is false, because the other word is true.
     pub(crate) fn is_false_for(self, item: &GridItem<'_>) -> bool {
         let truth = match self {
             Self::No => Self::Yes,
             Self::Yes => Self::No,
         };
         let known = item.asked.truth;
-        item.is_of(Some(&Family::Presence))
+        item.is_in_family(Some(&Family::Presence))
             && known.is_some_and(|known| truth.is_choice(item, known))
     }
 
-    /// Whether a reading of a reply is this answer. A reply that could not be read is neither word.
+    /// True if a parsed reply is this answer. An unreadable reply is neither word.
     pub(crate) fn is_given(self, item: &GridItem<'_>, chosen: Option<u8>) -> bool {
         chosen.is_some_and(|index| self.is_choice(item, usize::from(index)))
     }
@@ -309,20 +313,18 @@ pub struct Hallucination {
     pub false_negative: Option<Estimate>,
 }
 
-/// Hallucination of every subject on presence questions (DarkQA, section IV). Replies without a readable answer count as
-/// replies, but as neither "yes" nor "no".
+/// Computes the hallucination of every subject on presence questions (DarkQA, section IV). Unreadable replies count as replies, but as
+/// neither "yes" nor "no".
 #[must_use]
 pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
-    let rates = grid
-        .subjects
+    grid.subjects
         .iter()
         .enumerate()
         .map(|(index, subject)| Hallucination {
             subject: subject.clone(),
             false_positive: rate(grid, index, FalseAnswer::Yes),
             false_negative: rate(grid, index, FalseAnswer::No),
-        });
-    rates
+        })
         .filter(|rates| rates.false_positive.is_some() || rates.false_negative.is_some())
         .collect()
 }

@@ -1,16 +1,16 @@
-//! Replies that follow the words of a question whatever its image shows: [`ImageDependence`], [`Independence`].
+//! Detection of replies that follow the text of a question and ignore its image: [`ImageDependence`], [`Independence`].
 //!
-//! A server that drops images, or that caches replies by the text alone, answers each wording (a question with its choices in one order)
-//! alike for all images. Two tests look at replies to images whose true answer is not the usual reply to the wording:
+//! A server that drops images, or that caches replies by the text, gives the same answer to a wording (a question with its choices in one
+//! order) for all images. Two tests use the replies to images whose true answer is not the usual reply to the wording:
 //!
-//! - If nearly all of them are the usual reply, the replies do not depend on the image. A model that sees or guesses gives it at most every
-//!   second time, or as often as the letter that it prefers (exact binomial test).
-//! - If at least a third are, some images may be lost. Then the replies to images with the same true answer depend on the wording. They do not
-//!   if a model answers by the image, with any confusions of one answer with another, or if it guesses, with any preference for letters. So the
-//!   replies to images with the same true answer and the same number of choices are exchanged, and the pairs of equal replies to one wording are
-//!   counted (a stratified permutation test; p as by Phipson and Smyth 2010, doi:10.2202/1544-6115.1585).
+//! - If nearly all of these replies are the usual reply, the replies do not depend on the image. A model that sees or guesses gives the
+//!   usual reply at most every second time, or as often as the letter that it prefers (exact binomial test).
+//! - If at least a third of these replies are the usual reply, some images may be lost. Then replies to images with the same true answer
+//!   depend on the wording. They do not if a model answers by the image, even if it confuses answers, or if it guesses, even if it prefers
+//!   letters. Replies to images with the same true answer and the same number of choices are therefore permuted, and the pairs of equal
+//!   replies to one wording are counted (stratified permutation test; p by Phipson and Smyth 2010, doi:10.2202/1544-6115.1585).
 //!
-//! Only untouched images count, because in the dark a model may fall back on the words.
+//! Only untouched images are used, because a model may fall back on the text in the dark.
 
 use std::collections::BTreeMap;
 
@@ -34,8 +34,8 @@ pub struct LitReply {
 }
 
 impl LitReply {
-    /// The reply of a record, with the digest of its words; `None` unless it is the first reply of a model that answers a question with a known
-    /// true choice about an untouched image.
+    /// Extracts the reply of a record, with the digest of its wording. `None` unless it is the first reply of a model to a question about
+    /// an untouched image with a known true choice.
     pub fn from_record<D: Detail>(
         record: &Record<D>,
         wording: impl FnOnce() -> Digest,
@@ -56,7 +56,7 @@ impl LitReply {
         })
     }
 
-    /// The same of a trial.
+    /// Extracts the reply of a trial, under the same conditions as [`Self::from_record`].
     pub fn from_trial(trial: TrialRef<'_>, wording: impl FnOnce() -> Digest) -> Option<Self> {
         let is_counted = trial.condition().is_some_and(is_untouched)
             && trial.repeat() == 0
@@ -76,14 +76,14 @@ fn is_untouched(condition: &Condition) -> bool {
     condition.treatment == Treatment::Untouched && condition.enhancer.is_none()
 }
 
-/// The replies that do not depend on the image.
+/// Extent to which replies do not depend on the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Extent {
-    /// Practically all.
+    /// Nearly all replies.
     All,
-    /// A part of them.
+    /// A part of the replies.
     Part,
-    /// All, because they are one and the same letter; the index of the choice.
+    /// All replies, because they are the same letter, given as the index of the choice.
     OneLetter(usize),
 }
 
@@ -97,39 +97,40 @@ pub struct Independence {
     pub wordings: usize,
     /// Number of replies to images whose true answer is not the usual reply to the wording.
     pub other_truth: usize,
-    /// Number of these that are the usual reply all the same.
+    /// Number of these replies that are the usual reply.
     pub usual: usize,
-    /// The p-value of the test: binomial for all, permutation for a part; `None` for one letter, which may be a preference.
+    /// p-value of the binomial test for all replies, or of the permutation test for a part; `None` for one letter, which may be a
+    /// preference.
     pub p: Option<f64>,
 }
 
-/// Level of the test. It is made again whenever a model has half as many replies more, from 24 to 100,000: 20 times at most, so that at
-/// most 1 % of the models that answer by the image or guess are named in a run.
+/// Significance level of a test. It is repeated whenever the number of replies has grown by half, from 24 to 100,000: at most 20 times, so
+/// that at most 1 % of the models that answer by the image or guess are reported in a run.
 const LEVEL: f64 = 0.0005;
 
-/// Number of permutations; chosen, so that the smallest p-value is 0.0001.
+/// Number of permutations (chosen, so that the smallest p-value is 0.0001).
 const PERMUTATIONS: usize = 9_999;
 
-/// Number of replies from which the test is made; chosen.
-pub const FEWEST: usize = 24;
+/// Minimum number of replies for a test (chosen).
+pub const MIN_REPLIES: usize = 24;
 
-/// Smallest number of replies to images whose true answer is not the usual reply; chosen.
-const FEWEST_OTHER: usize = 12;
+/// Minimum number of replies to images whose true answer is not the usual reply (chosen).
+const MIN_OTHER_TRUTH: usize = 12;
 
-/// Largest number of replies that are exchanged, so that the test takes less than a second; chosen.
-const MOST: usize = 2_000;
+/// Maximum number of permuted replies, so that the test takes less than a second (chosen).
+const MAX_PERMUTED: usize = 2_000;
 
-/// Share of the usual replies from which all replies are taken to be independent of the image; chosen.
+/// Minimum share of usual replies for which all replies count as independent of the image (chosen).
 const NEARLY_ALL: f64 = 0.9;
 
-/// Share of one letter among all replies from which a model always answers it; chosen.
+/// Minimum share of one letter among all replies of a model that always answers the same letter (chosen).
 const ONE_LETTER: f64 = 0.98;
 
 impl Independence {
     /// Tests the replies of a model, in any order; `None` if they may depend on the image.
     #[must_use]
     pub fn find(replies: &[LitReply]) -> Option<Self> {
-        if replies.len() < FEWEST {
+        if replies.len() < MIN_REPLIES {
             return None;
         }
         let mut sorted = replies.to_vec();
@@ -137,7 +138,7 @@ impl Independence {
         let letter = one_letter(&sorted);
         let counts = Counts::new(&sorted, letter);
         let share = counts.usual as f64 / counts.other_truth.max(1) as f64;
-        if counts.other_truth < FEWEST_OTHER || share < 1.0 / 3.0 {
+        if counts.other_truth < MIN_OTHER_TRUTH || share < 1.0 / 3.0 {
             return None;
         }
         let (extent, p) = match letter {
@@ -155,7 +156,7 @@ impl Independence {
         })
     }
 
-    /// The finding about a model, in two sentences.
+    /// Describes the finding about a model, in two sentences.
     #[must_use]
     pub fn words(&self, model: &str) -> String {
         let Self {
@@ -195,7 +196,7 @@ impl Independence {
     }
 }
 
-/// The replies of one model, tested whenever there are half as many more.
+/// Replies of one model, tested whenever their number has grown by half.
 #[derive(Debug, Clone, Default)]
 pub struct ImageDependence {
     replies: Vec<LitReply>,
@@ -205,13 +206,13 @@ pub struct ImageDependence {
 }
 
 impl ImageDependence {
-    /// Adds a reply; returns the finding once, as soon as there is one.
+    /// Adds a reply. Returns the finding as soon as there is one, and only once.
     pub fn add(&mut self, reply: LitReply) -> Option<Independence> {
         if self.is_found {
             return None;
         }
         self.replies.push(reply);
-        let next = (self.tested + self.tested / 2).max(FEWEST);
+        let next = (self.tested + self.tested / 2).max(MIN_REPLIES);
         if self.replies.len() < next {
             return None;
         }
@@ -222,13 +223,13 @@ impl ImageDependence {
     }
 }
 
-/// The letter that practically all replies are; `None` without one.
+/// Letter of nearly all replies; `None` if no letter is so frequent.
 fn one_letter(replies: &[LitReply]) -> Option<usize> {
     let (letter, count) = most_frequent(replies)?;
     (count as f64 >= ONE_LETTER * replies.len() as f64).then_some(letter)
 }
 
-/// The most frequent choice, the later of two, with its number.
+/// Most frequent choice with its number of replies; the one with the higher index if two are equally frequent.
 fn most_frequent(replies: &[LitReply]) -> Option<(usize, usize)> {
     let mut counts = BTreeMap::<usize, usize>::new();
     for reply in replies {
@@ -237,7 +238,7 @@ fn most_frequent(replies: &[LitReply]) -> Option<(usize, usize)> {
     counts.into_iter().max_by_key(|(_, count)| *count)
 }
 
-/// How often the usual reply to a wording was given to images with another true answer.
+/// Counts of the usual reply to a wording among replies to images with another true answer.
 struct Counts {
     wordings: usize,
     other_truth: usize,
@@ -245,7 +246,8 @@ struct Counts {
 }
 
 impl Counts {
-    /// Counts over wordings with several replies, which are sorted by wording. `letter` is the usual reply to all of them, if given.
+    /// Counts over wordings with several replies. The replies must be sorted by wording. `letter` is the usual reply to all wordings, if
+    /// given.
     fn new(sorted: &[LitReply], letter: Option<usize>) -> Self {
         let mut counts = Self {
             wordings: 0,
@@ -268,23 +270,23 @@ impl Counts {
         counts
     }
 
-    /// The p-value of this number of usual replies, if each is given at most every second time, or as often as the most frequent letter of
-    /// all replies; `None` if it is above the level.
+    /// p-value of this number of usual replies if each is given at most every second time, or as often as the most frequent letter of all
+    /// replies; `None` if it is above the level.
     fn binomial_test(&self, replies: &[LitReply]) -> Option<f64> {
         let (_, preferred) = most_frequent(replies)?;
         let chance = (preferred as f64 / replies.len() as f64).max(0.5);
         let (n, x) = (self.other_truth as f64, self.usual as f64);
-        // The probability of at least x of n (DLMF 8.17.5).
+        // Probability of at least x of n (DLMF 8.17.5).
         let p = beta_reg(x, n - x + 1.0, chance);
         (p <= LEVEL).then_some(p)
     }
 }
 
-/// The p-value of the pairs of equal replies to one wording, if the replies to images with the same true answer are exchanged; `None`
-/// if it is above the level, which ends the test early.
+/// p-value of the number of pairs of equal replies to one wording, under permutation of the replies to images with the same true answer;
+/// `None` if it is above the level, which ends the test early.
 fn permutation_test(sorted: &[LitReply]) -> Option<f64> {
-    // Every n-th of the sorted replies has the same composition as all.
-    let step = sorted.len().div_ceil(MOST);
+    // Every n-th of the sorted replies has nearly the same composition as all replies.
+    let step = sorted.len().div_ceil(MAX_PERMUTED);
     let mut replies: Vec<LitReply> = sorted.iter().copied().step_by(step).collect();
     replies.sort_unstable_by_key(|reply| (reply.choices, reply.truth, *reply));
     let mut numbers = BTreeMap::<Digest, usize>::new();

@@ -5,4 +5,4 @@ pub mod confusion;
 mod image_dependence;
 pub mod record;
 
-pub use image_dependence::{FEWEST, ImageDependence, Independence, LitReply};
+pub use image_dependence::{ImageDependence, Independence, LitReply, MIN_REPLIES};

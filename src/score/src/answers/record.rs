@@ -1,4 +1,4 @@
-//! Reading of a reply into the record of its trial, for both experiments: [`Detail`], [`answered`], [`reread`].
+//! Parsing of a reply into the record of its trial, for both experiments: [`Detail`], [`answered`], [`reread`].
 
 use crate::choice::llm_match::{Protocol, mark};
 use crate::choice::option_probabilities::option_probabilities;
@@ -10,35 +10,35 @@ use darkqa_ground::types::{
     UnreadReason,
 };
 
-/// A detail that takes the answer from a reply.
+/// Part of a record that stores the answer parsed from a reply.
 pub trait Detail: StoredDetail {
-    /// Version of the rules by which answers are read, as `lenient/4`; `None` if no choice is read.
+    /// Version of the parsing rules, such as `lenient/4`; `None` if no choice is parsed.
     const REPLY_READING: Option<&'static str>;
 
-    /// Reads the answer from a reply into the detail; a stored reply can be read again.
+    /// Parses the answer in a reply and stores it. A stored reply can be parsed again.
     ///
     /// # Errors
     /// If the choices of the detail are not valid.
     fn read(&mut self, reply: &Reply) -> Result<()>;
 
-    /// Index of the choice in the lenient parsing; `None` if none was read.
+    /// Index of the choice in the lenient parsing; `None` if no choice was found.
     fn chosen(&self) -> Option<usize>;
 
     /// Parses the line of a record. Each kind has its own function, so that this crate compiles it, for speed, and not the caller.
     ///
     /// # Errors
-    /// If the line is not such a record.
+    /// If the line is not a record of this kind.
     fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>>;
 }
 
 impl Detail for ChoiceDetail {
     const REPLY_READING: Option<&'static str> = Some(LENIENT_VERSION);
 
-    /// Stores both readings of a reply, and the outcome, which follows from the strict parsing.
+    /// Stores both parsings of a reply, and the outcome, which follows from the strict parsing.
     fn read(&mut self, reply: &Reply) -> Result<()> {
         let why = self.strict.and_then(|strict| strict.why);
         if why == Some(UnreadReason::CannotTell) && reply.text.is_empty() {
-            // A person said so by a button; there is no text to read again.
+            // A person pressed the button for it, so there is no text to parse again.
             return Ok(());
         }
         let choices = Choices::known_by(self.choices.clone().into(), self.truth)?;
@@ -53,7 +53,7 @@ impl Detail for ChoiceDetail {
         };
         self.strict = Some(strict.into());
         self.lenient = Some(lenient.into());
-        // A stored reply that is parsed again lacks the observer's view and the probabilities of the choices.
+        // A stored reply lacks the observer's findings and the probabilities of the choices, so the stored ones are kept.
         if let Some(chances) = &reply.chances {
             self.options = option_probabilities(chances, &self.choices);
         }
@@ -75,7 +75,7 @@ impl Detail for ChoiceDetail {
 impl Detail for OpenDetail {
     const REPLY_READING: Option<&'static str> = None;
 
-    /// Stores the marks that the two protocols read in a judge's reply.
+    /// Stores the marks that the two protocols parse from a judge's reply.
     fn read(&mut self, reply: &Reply) -> Result<()> {
         if self.step == Step::Mark {
             self.upstream = mark(&reply.text, Protocol::Upstream);
@@ -93,7 +93,7 @@ impl Detail for OpenDetail {
     }
 }
 
-/// The record with a reply and the answer that is read from it.
+/// Returns the record with a reply and the answer parsed from it.
 ///
 /// # Errors
 /// If the choices of the record are not valid.
@@ -112,7 +112,7 @@ pub fn answered<D: Detail>(mut record: Record<D>, reply: Reply) -> Result<Record
     Ok(record)
 }
 
-/// The record with its stored reply read again, by the rules of this version of the program.
+/// Returns the record with its stored reply parsed again, by the rules of this version of the program.
 ///
 /// # Errors
 /// As for [`answered`].
@@ -130,6 +130,8 @@ pub fn reread<D: Detail>(mut record: Record<D>) -> Result<Record<D>> {
 
 fn read<D: Detail>(record: &mut Record<D>, reply: &Reply) -> Result<()> {
     let question = &record.question.0;
-    let read = record.detail.read(reply);
-    read.map_err(|e| e.at(format!("the record of question {question:?}")))
+    record
+        .detail
+        .read(reply)
+        .map_err(|e| e.at(format!("the record of question {question:?}")))
 }

@@ -1,31 +1,31 @@
-//! Effect of the image on a model's probabilities: the [`distances`] of probabilities with an image from those without.
+//! Effect of the image on the probabilities of a model: [`distances`] between the probabilities with and without the image.
 
-use super::confident_reply::usable;
+use super::confident_reply::usable_probabilities;
 use crate::grid::Grid;
 use crate::subject::ModelInCondition;
 use darkqa_ground::types::View;
 
-/// For each item its cluster and the Jensen–Shannon distance, 0 to 1, between the probabilities of a subject and those of the same
-/// model without an image (the root of the divergence in bits: Endres and Schindelin 2003, IEEE Trans. Inf. Theory 49:1858). Empty if
-/// there are none of the latter.
+/// Returns, for each item, its cluster and the Jensen–Shannon distance, from 0 to 1, between the probabilities of a subject and those of
+/// the same model without an image (the root of the divergence in bits: Endres and Schindelin 2003, IEEE Trans. Inf. Theory 49:1858). Empty
+/// if the model was not asked without images.
 pub(super) fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
-    let seeing = &grid.subjects[subject];
-    let blind = grid.find(&ModelInCondition::new(&seeing.model, None));
-    let Some(blind) = blind.filter(|_| seeing.view == Some(View::Image)) else {
+    let with_image = &grid.subjects[subject];
+    let blind = grid.find(&ModelInCondition::new(&with_image.model, None));
+    let Some(blind) = blind.filter(|_| with_image.view == Some(View::Image)) else {
         return Vec::new();
     };
     grid.items
         .iter()
         .enumerate()
         .filter_map(|(index, item)| {
-            let seen = usable(grid.trial(subject, index))?;
-            let unseen = usable(grid.trial(blind, index))?;
+            let seen = usable_probabilities(grid.trial(subject, index))?;
+            let unseen = usable_probabilities(grid.trial(blind, index))?;
             Some((item.cluster, distance(&seen.p, &unseen.p)))
         })
         .collect()
 }
 
-/// The Jensen–Shannon distance of two distributions.
+/// Jensen–Shannon distance of two distributions.
 fn distance(one: &[f64], other: &[f64]) -> f64 {
     let part = |p: f64, middle: f64| {
         if p > 0.0 {
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn distances_are_those_of_the_definition() {
+    fn distances_follow_the_definition() {
         assert!(distance(&[0.2, 0.8], &[0.2, 0.8]) < 1e-9);
         assert!((distance(&[1.0, 0.0], &[0.0, 1.0]) - 1.0).abs() < 1e-12);
         // The divergence is (log₂ 4⁄3 + ½ log₂ 2⁄3 + ½) ⁄ 2 = 0.311278 bits.

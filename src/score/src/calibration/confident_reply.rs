@@ -1,42 +1,42 @@
-//! One reply with the model's confidence: [`ConfidentReply`].
+//! A reply with the confidence of the model: [`ConfidentReply`].
 
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use darkqa_ground::types::{OptionProbabilities, TrialOutcome, TrialRef};
 
-/// The least probability of a true choice that is not listed and has no bound, either: probabilities are kept to six decimals.
-const LEAST: f64 = 1e-6;
+/// Probability assumed for a true choice that is neither listed nor bounded. Probabilities are stored with six decimals.
+const MIN_PROBABILITY: f64 = 1e-6;
 
 /// A reply with probabilities, and without reasoning before the answer.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ConfidentReply {
-    /// Index of its item.
+    /// Index of the item.
     pub(super) item: usize,
-    /// Index of its cluster.
+    /// Index of the cluster.
     pub(super) cluster: u32,
-    /// The greatest probability of a choice.
+    /// Highest probability of a choice.
     pub(super) confidence: f64,
-    /// Whether the strict parsing is the true choice.
+    /// True if the strict parsing finds the true choice.
     pub(super) right: bool,
-    /// Brier score: the sum over the choices of (p − truth)².
+    /// Brier score: sum of (p − truth)² over the choices.
     pub(super) brier: f64,
-    /// The Brier score of equal probabilities: 1 − 1/k with k choices.
+    /// Brier score of equal probabilities: 1 − 1/k for k choices.
     pub(super) guess: f64,
-    /// −ln p of the true choice, which is at least the bound of a choice that is not listed.
+    /// −ln p of the true choice; p is at least the bound for choices that are not listed.
     pub(super) nll: f64,
 }
 
 impl ConfidentReply {
-    /// Confidence less 1 if the reply is right, else the confidence.
+    /// Confidence minus correctness: confidence − 1 for a right reply, the confidence for a wrong one.
     pub(super) fn excess(&self) -> f64 {
         self.confidence - f64::from(u8::from(self.right))
     }
 }
 
-/// The replies of a subject, and how many are left out.
+/// Evaluated replies of a subject, and numbers of other replies.
 pub(super) struct SortedReplies {
-    /// The replies, in order of confidence.
+    /// Replies in order of increasing confidence.
     pub(super) replies: Vec<ConfidentReply>,
     /// Number of replies with reasoning before the answer.
     pub(super) reasoned: usize,
@@ -44,7 +44,7 @@ pub(super) struct SortedReplies {
     pub(super) unstated: usize,
 }
 
-/// The replies of a subject.
+/// Collects the replies of a subject.
 pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplies {
     let mut sorted = SortedReplies {
         replies: Vec::new(),
@@ -69,7 +69,7 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
     sorted
 }
 
-/// The reply of a trial; `None` if the probabilities are not those of its choices, as in a file that was edited.
+/// Returns the reply of a trial; `None` if the probabilities do not match its choices, as in an edited file.
 fn reply(
     trial: TrialRef<'_>,
     options: &OptionProbabilities,
@@ -82,7 +82,7 @@ fn reply(
         return None;
     }
     let squares: f64 = p.iter().map(|p| p * p).sum();
-    let least = (options.bound / options.mass).max(LEAST);
+    let least = (options.bound / options.mass).max(MIN_PROBABILITY);
     Some(ConfidentReply {
         item,
         cluster,
@@ -94,7 +94,7 @@ fn reply(
     })
 }
 
-/// The share of right replies, with its interval by cluster.
+/// Share of right replies, with its interval by cluster.
 pub(super) fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Estimate> {
     let mut counts = vec![ClusterCount::default(); clusters];
     for reply in replies {
@@ -105,8 +105,8 @@ pub(super) fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Es
     Estimate::clustered(&counts)
 }
 
-/// The probabilities of a trial that figures may use; `None` if there are none, or reasoning stood before the answer.
-pub(super) fn usable(trial: Option<TrialRef<'_>>) -> Option<&OptionProbabilities> {
+/// Probabilities of a trial, if they may be evaluated; `None` without probabilities, or with reasoning before the answer.
+pub(super) fn usable_probabilities(trial: Option<TrialRef<'_>>) -> Option<&OptionProbabilities> {
     let trial = trial.filter(|trial| !trial.failed())?;
     let options = trial.options()?;
     let fits = options.p.len() == trial.choices().len();

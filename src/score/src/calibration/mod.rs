@@ -1,7 +1,7 @@
-//! How far the confidence of models goes with their accuracy: [`calibrations`].
+//! Calibration of models, that is, the relation between their confidence and their accuracy: [`calibrations`].
 //!
-//! The confidence of a reply is the greatest probability of a choice. Only replies with such probabilities are in these figures, and
-//! of these only those without reasoning before the answer; the others are counted. Right is by the strict parsing.
+//! The confidence of a reply is the highest probability of a choice. Only replies with probabilities and without reasoning before the
+//! answer are evaluated; the others are only counted. Whether a reply is right follows from the strict parsing.
 
 mod blind_shift;
 mod confident_reply;
@@ -27,20 +27,20 @@ pub use reliability::ReliabilityBin;
 pub use risk::RiskCoverage;
 pub use tested::TestedConfidence;
 
-/// The least number of replies with probabilities that a sentence is about (chosen): that of a calibration error.
-pub const LEAST_CONFIDENT_REPLIES: usize = 100;
+/// Minimum number of replies with probabilities for a sentence (chosen, the same as for a calibration error).
+pub const MIN_CONFIDENT_REPLIES: usize = 100;
 
-/// The least number of replies for an expected calibration error (chosen).
-const LEAST_REPLIES: usize = 100;
+/// Minimum number of replies for an expected calibration error (chosen).
+const MIN_ERROR_REPLIES: usize = 100;
 
 /// Confidence and accuracy of a subject.
 #[derive(Debug, Clone)]
 pub struct Calibration {
-    /// The model in its condition.
+    /// Model and condition.
     pub subject: ModelInCondition,
-    /// Number of replies with probabilities, which all figures are of.
+    /// Number of evaluated replies: those with probabilities and without reasoning.
     pub replies: usize,
-    /// Number of replies with reasoning before the answer, which no figure is of.
+    /// Number of replies with reasoning before the answer; they are not evaluated.
     pub reasoned: usize,
     /// Number of replies without probabilities.
     pub unstated: usize,
@@ -48,25 +48,25 @@ pub struct Calibration {
     pub confidence: Estimate,
     /// Accuracy of the same replies.
     pub accuracy: Estimate,
-    /// Confidence less accuracy, with its test: above 0 the model is overconfident.
+    /// Confidence minus accuracy, with its test; above 0 the model is overconfident.
     pub overconfidence: TestedConfidence,
-    /// Overconfidence less that at L0, on the items of both; for raw degraded images of a model that was asked at L0.
+    /// Overconfidence minus overconfidence at L0, on the items of both; for raw degraded images of a model that was asked at L0.
     pub growth: Option<TestedConfidence>,
     /// Expected calibration error (`expected_error`); `None` below 100 replies.
     pub error: Option<Estimate>,
-    /// Mean Brier score over all choices, 0 to 2 (Brier 1950, Mon. Weather Rev. 78:1).
+    /// Mean Brier score over all choices, from 0 to 2 (Brier 1950, Mon. Weather Rev. 78:1).
     pub brier: Estimate,
-    /// 1 − Brier score / Brier score of equal probabilities for all choices; 0 is a guess, 1 is perfect.
+    /// Brier skill: 1 − Brier score / Brier score of equal probabilities for all choices; 0 for guesses, 1 if perfect.
     pub skill: Estimate,
     /// Mean negative logarithm of the probability of the true choice, in nats.
     pub nll: Estimate,
     /// Risk among the most confident replies.
     pub risk: RiskCoverage,
-    /// The share of pairs of a right and a wrong reply in which the right one is more confident.
+    /// AUROC of confidence: share of pairs of a right and a wrong reply in which the right one is more confident.
     pub auroc: Option<Auc>,
-    /// Mean distance between the probabilities with the image and those of the same model without one.
+    /// Mean distance between the probabilities with the image and those of the same model without an image.
     pub blind_shift: Option<Estimate>,
-    /// Accuracy of the choice with the greatest probability averaged over the orders of choices, if there are several.
+    /// Accuracy of the choice with the highest probability averaged over the orders of choices, if several orders were asked.
     pub over_orders: Option<Estimate>,
     /// Accuracy over confidence, in bins.
     pub bins: Vec<ReliabilityBin>,
@@ -92,7 +92,7 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
     let n = replies.len();
     let mean = |number: fn(&ConfidentReply) -> f64| ratio(draws, replies, number, |_| 1.0);
     let skill = ratio(draws, replies, |reply| reply.brier, |reply| reply.guess);
-    let error = (n >= LEAST_REPLIES).then(|| expected_error::estimate(draws, replies));
+    let error = (n >= MIN_ERROR_REPLIES).then(|| expected_error::estimate(draws, replies));
     Some(Calibration {
         subject: grid.subjects[subject].clone(),
         replies: n,
@@ -123,74 +123,77 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
     })
 }
 
-/// How much further the confidence is above the accuracy than at L0, on the items of both.
+/// Growth of the overconfidence since L0, on the items of both levels.
 fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option<TestedConfidence> {
     let dark = &grid.subjects[subject];
     if dark.enhancer.is_some() || !dark.variant.is_degraded() {
         return None;
     }
-    let clean = ModelInCondition::seeing(&dark.model, AxisLevel::L0, &dark.variant, None);
-    let clean = confident_replies(grid, grid.stand_in(&clean)?).replies;
+    let clean = ModelInCondition::with_images(&dark.model, AxisLevel::L0, &dark.variant, None);
+    let clean = confident_replies(grid, grid.find_up_to_group(&clean)?).replies;
     let clean: BTreeMap<usize, f64> = clean
         .iter()
         .map(|reply| (reply.item, reply.excess()))
         .collect();
-    let both = replies.iter().filter_map(|reply| {
+    let changes = replies.iter().filter_map(|reply| {
         let change = reply.excess() - clean.get(&reply.item)?;
         Some((reply.cluster, change))
     });
-    TestedConfidence::new(grid.clusters, both)
+    TestedConfidence::new(grid.clusters, changes)
 }
 
-/// The mean distance to the probabilities without an image; `None` if there are none of the latter.
+/// Mean distance to the probabilities without an image; `None` if the model was not asked without images.
 fn blind_shift(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Estimate> {
     let distances = blind_shift::distances(grid, subject);
-    let terms: Vec<_> = distances
+    let terms: Vec<(u32, f64, f64)> = distances
         .into_iter()
         .map(|(cluster, distance)| (cluster, distance, 1.0))
         .collect();
-    (!terms.is_empty()).then(|| ratio_of(draws, &terms))
+    (!terms.is_empty()).then(|| ratio_of_sums(draws, &terms))
 }
 
-/// The sum of a number over the sum of another one, with its interval by the cluster bootstrap.
+/// Ratio of the sums of two quantities over the replies, with its interval by the cluster bootstrap.
 fn ratio(
     draws: &Resamples,
     replies: &[ConfidentReply],
-    above: impl Fn(&ConfidentReply) -> f64,
-    below: impl Fn(&ConfidentReply) -> f64,
+    numerator: impl Fn(&ConfidentReply) -> f64,
+    denominator: impl Fn(&ConfidentReply) -> f64,
 ) -> Estimate {
-    let terms = replies
+    let terms: Vec<(u32, f64, f64)> = replies
         .iter()
-        .map(|reply| (reply.cluster, above(reply), below(reply)));
-    ratio_of(draws, &terms.collect::<Vec<_>>())
+        .map(|reply| (reply.cluster, numerator(reply), denominator(reply)))
+        .collect();
+    ratio_of_sums(draws, &terms)
 }
 
-/// Ratio of two sums. Each term has its cluster, its addend to the numerator and its addend to the denominator.
-fn ratio_of(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
+/// Ratio of two sums. Each term consists of its cluster and its contributions to the numerator and the denominator.
+fn ratio_of_sums(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
     let mut by_cluster = vec![[0.0; 2]; draws.clusters()];
-    for (cluster, above, below) in terms {
+    for (cluster, numerator, denominator) in terms {
         let sums = &mut by_cluster[*cluster as usize];
-        sums[0] += above;
-        sums[1] += below;
+        sums[0] += numerator;
+        sums[1] += denominator;
     }
-    let sums = |side: usize| {
-        let sums = by_cluster.iter().map(|sums| sums[side] as f32);
-        draws.sums(&sums.collect::<Vec<_>>())
+    let drawn_sums = |side: usize| {
+        let sums: Vec<f32> = by_cluster.iter().map(|sums| sums[side] as f32).collect();
+        draws.sums(&sums)
     };
     // Draws of clusters without a reply have no ratio.
-    let ratios = sums(0)
+    let ratios = drawn_sums(0)
         .into_iter()
-        .zip(sums(1))
-        .filter(|(_, below)| *below > 0.0)
-        .map(|(above, below)| above / below);
-    let (above, below) = terms.iter().fold((0.0, 0.0), |(above, below), term| {
-        (above + term.1, below + term.2)
-    });
-    let interval = draws.interval(ratios.collect());
-    Estimate::around(above / below, interval, terms.len())
+        .zip(drawn_sums(1))
+        .filter(|(_, denominator)| *denominator > 0.0)
+        .map(|(numerator, denominator)| numerator / denominator)
+        .collect();
+    let (numerator, denominator) = terms
+        .iter()
+        .fold((0.0, 0.0), |(numerator, denominator), term| {
+            (numerator + term.1, denominator + term.2)
+        });
+    Estimate::around(numerator / denominator, draws.interval(ratios), terms.len())
 }
 
-/// The area under the receiver operating characteristic of confidence for right against wrong replies.
+/// Area under the ROC curve of confidence for right against wrong replies.
 fn auroc(clusters: usize, replies: &[ConfidentReply]) -> Option<Auc> {
     let ranked = replies.iter().map(|reply| RankedReply {
         cluster: reply.cluster,

@@ -1,27 +1,27 @@
-//! Probabilities by the place of a choice: [`PositionShare`].
+//! Probabilities by the position of a choice: [`PositionShare`].
 
-use super::confident_reply::usable;
+use super::confident_reply::usable_probabilities;
 use crate::grid::Grid;
 
-/// Mean probability of the choices at one position, and how often the true choice is there. The difference of both is a preference for a
-/// letter.
+/// Mean probability of the choices at one position, and share of true choices at this position. The difference of both is a preference for
+/// a letter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionShare {
-    /// Index of the place: 0 is A.
+    /// Index of the position; 0 is A.
     pub position: usize,
-    /// Mean probability of the choices of this place.
+    /// Mean probability of the choices at this position.
     pub p: f64,
-    /// Share of the questions whose true choice stands there.
+    /// Share of the questions whose true choice is at this position.
     pub truth: f64,
     /// Number of replies to questions with a choice at this position.
     pub n: usize,
 }
 
-/// The shares of each place for a subject.
+/// Computes the shares of each position for a subject.
 pub(super) fn shares(grid: &Grid<'_>, subject: usize) -> Vec<PositionShare> {
     let mut shares: Vec<PositionShare> = Vec::new();
     for (index, item) in grid.items.iter().enumerate() {
-        let Some(options) = usable(grid.trial(subject, index)) else {
+        let Some(options) = usable_probabilities(grid.trial(subject, index)) else {
             continue;
         };
         for (position, p) in options.p.iter().enumerate() {

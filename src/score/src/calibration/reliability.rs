@@ -1,18 +1,18 @@
-//! Accuracy over confidence in bins: [`bins`].
+//! Accuracy by confidence, in bins: [`bins`].
 //!
 //! A reliability diagram (Murphy and Winkler 1977, Appl. Stat. 26:41; DeGroot and Fienberg 1983, The Statistician 32:12) with bins of
-//! equal count: a model is calibrated where the accuracy of a bin is its mean confidence.
+//! equal count: a model is calibrated if the accuracy of each bin equals its mean confidence.
 
 use super::confident_reply::{ConfidentReply, accuracy};
 use crate::estimate::Estimate;
 
-/// The most bins.
-const MOST_BINS: usize = 10;
+/// Maximum number of bins.
+const MAX_BINS: usize = 10;
 
-/// The least number of replies in a bin (chosen, as for the expected calibration error).
-const LEAST_IN_BIN: usize = 20;
+/// Minimum number of replies in a bin (chosen, the same as for the expected calibration error).
+const MIN_REPLIES_PER_BIN: usize = 20;
 
-/// The replies of one bin.
+/// A bin of the reliability diagram.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReliabilityBin {
     /// Mean confidence.
@@ -21,11 +21,12 @@ pub struct ReliabilityBin {
     pub accuracy: Estimate,
 }
 
-/// Bins of about as many replies each, in order of confidence; replies of equal confidence are in one. Empty below twenty replies.
+/// Divides replies into bins of about equal size, in order of confidence; replies of equal confidence share a bin. Empty with fewer than
+/// twenty replies.
 ///
-/// `replies` are in order of confidence.
+/// `replies` must be sorted by confidence.
 pub(super) fn bins(clusters: usize, replies: &[ConfidentReply]) -> Vec<ReliabilityBin> {
-    let number = (replies.len() / LEAST_IN_BIN).min(MOST_BINS);
+    let number = (replies.len() / MIN_REPLIES_PER_BIN).min(MAX_BINS);
     let mut bins = Vec::new();
     let mut start = 0;
     for bin in 1..=number {
@@ -73,7 +74,7 @@ mod tests {
     }
 
     #[test]
-    fn bins_hold_all_replies_in_order_and_ties_are_not_divided() {
+    fn bins_cover_all_replies_without_splitting_ties() {
         // 400 replies with an accuracy of half their confidence.
         let made = replies((0..400).map(|i| (f64::from(i) / 400.0, i % 8 < i / 100)));
         let bins = bins(10, &made);

@@ -1,25 +1,25 @@
-//! The share of wrong replies among the most confident ones: [`RiskCoverage`].
+//! Share of wrong replies among the most confident ones: [`RiskCoverage`].
 
 use super::confident_reply::ConfidentReply;
 
-/// Risk at some coverages, and the area under the curve (Geifman and El-Yaniv 2017, NeurIPS).
+/// Risk at some coverages, and area under the risk–coverage curve (Geifman and El-Yaniv 2017, NeurIPS).
 ///
-/// Replies are taken in order of falling confidence. Those of equal confidence are taken together: each counts as the mean of them,
-/// so that their order decides nothing.
+/// Replies are included in order of decreasing confidence. Each of several replies of equal confidence counts as their mean, so that their
+/// order does not matter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RiskCoverage {
-    /// The share of wrong replies among all.
+    /// Share of wrong replies among all replies.
     pub at_100: f64,
-    /// The same among the most confident 80 %.
+    /// Share of wrong replies among the most confident 80 %.
     pub at_80: f64,
-    /// The same among the most confident 50 %.
+    /// Share of wrong replies among the most confident 50 %.
     pub at_50: f64,
-    /// The mean risk over all coverages.
+    /// Mean risk over all coverages.
     pub area: f64,
 }
 
 impl RiskCoverage {
-    /// The risk of replies in order of rising confidence; there is at least one.
+    /// Computes the risk of replies, which must be sorted by increasing confidence and not be empty.
     pub(super) fn new(replies: &[ConfidentReply]) -> Self {
         let n = replies.len();
         let mut risks = Vec::with_capacity(n);

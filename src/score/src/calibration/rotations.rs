@@ -1,33 +1,33 @@
-//! Probabilities averaged over the orders in which choices are shown: [`accuracy`].
+//! Accuracy of probabilities averaged over the orders of the choices: [`accuracy`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::confident_reply::usable;
+use super::confident_reply::usable_probabilities;
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use darkqa_ground::types::QuestionId;
 
-/// The orders of one question in one repeat.
+/// Replies to one question in one repeat, over all orders of its choices.
 #[derive(Default)]
 struct AskedInOrders<'a> {
     cluster: u32,
     truth: &'a str,
-    /// The orders in which its choices were shown.
+    /// Orders in which the choices were shown.
     shown: BTreeSet<&'a [String]>,
-    /// The sum of the probabilities of each text.
+    /// Sum of the probabilities of each choice, by its text.
     by_text: BTreeMap<&'a str, f64>,
 }
 
-/// The share of questions whose true text has the greatest probability on average over their orders; `None` if no question was asked
-/// in several orders. What a model gives to a letter averages out.
+/// Share of questions whose true choice has the highest probability on average over the orders; `None` if no question was asked in several
+/// orders. A preference for letters averages out.
 pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
     let mut questions = BTreeMap::<(&QuestionId, u32), AskedInOrders<'_>>::new();
     for (index, item) in grid.items.iter().enumerate() {
         let Some(trial) = grid.trial(subject, index) else {
             continue;
         };
-        let Some(options) = usable(Some(trial)) else {
+        let Some(options) = usable_probabilities(Some(trial)) else {
             continue;
         };
         let asked = questions
@@ -42,9 +42,11 @@ pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
     }
     let mut counts = vec![ClusterCount::default(); grid.clusters];
     for asked in questions.values().filter(|asked| asked.shown.len() > 1) {
-        let mut likely = asked.by_text.iter();
         let truth = asked.by_text.get(asked.truth).copied().unwrap_or(0.0);
-        let is_right = likely.all(|(text, p)| *text == asked.truth || *p < truth);
+        let is_right = asked
+            .by_text
+            .iter()
+            .all(|(text, p)| *text == asked.truth || *p < truth);
         let count = &mut counts[asked.cluster as usize];
         count.replies += 1;
         count.right += u32::from(is_right);

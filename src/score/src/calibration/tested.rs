@@ -1,21 +1,21 @@
-//! Confidence less accuracy with its test: [`TestedConfidence`].
+//! Difference between confidence and accuracy, with its test: [`TestedConfidence`].
 
 use crate::comparisons::paired::tested_difference;
 use crate::estimate::Estimate;
 use crate::significance::ALPHA;
 
-/// A mean of confidence less accuracy, or of its change, with the test of 0 by Student's t that belongs to its interval.
+/// Mean of confidence minus accuracy, or of its change, with the test against 0 by Student's t that matches its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TestedConfidence {
     pub estimate: Estimate,
-    /// p-value of 0.
+    /// p-value of a mean of 0.
     pub p: f64,
-    /// p-value after the correction over all tests that sentences rest on; `None` if no sentence is about it.
+    /// p-value after the correction over all tests behind sentences; `None` if no sentence is about it.
     pub p_report: Option<f64>,
 }
 
 impl TestedConfidence {
-    /// The test of numbers, each with its cluster; `None` without any.
+    /// Tests the mean of numbers, each given with its cluster; `None` without numbers.
     pub(super) fn new(clusters: usize, numbers: impl Iterator<Item = (u32, f64)>) -> Option<Self> {
         let mut sums = vec![(0.0, 0.0); clusters];
         let (mut squares, mut n) = (0.0, 0);
@@ -37,7 +37,7 @@ impl TestedConfidence {
         })
     }
 
-    /// Whether it is shown to be above 0 after the correction over all sentences.
+    /// True if the mean is shown to be above 0 after the correction over all sentences.
     #[must_use]
     pub fn is_above(&self) -> bool {
         self.estimate.value > 0.0 && self.p_report.is_some_and(|value| value < ALPHA)

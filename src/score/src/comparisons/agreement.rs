@@ -1,4 +1,4 @@
-//! How far two models agree: [`Agreement`].
+//! Agreement of two models: [`Agreement`].
 
 use super::comparison::{ComparisonKind, pairs};
 use crate::choice::ReadingMode;
@@ -24,23 +24,24 @@ pub struct Agreement {
 pub struct AgreementCounts {
     /// Number of items to which both models replied.
     pub all: f64,
-    /// Number of them that both got right.
+    /// Number of these items that both got right.
     pub both: f64,
-    /// Number of them that the first model got right.
+    /// Number of these items that the first model got right.
     pub first: f64,
-    /// Number of them that the second model got right.
+    /// Number of these items that the second model got right.
     pub second: f64,
 }
 
-/// Agreement of each model with itself in two lights that show the same: photographed in the dark against synthetic, and with an
-/// enhancer against without, of photographs in the dark and of untouched frames.
+/// Agreement of each model with itself between two kinds of images of the same scenes: dark photographs against synthetic images, and
+/// enhanced against raw images, both for dark photographs and for untouched frames.
 #[must_use]
 pub(crate) fn light_agreements(grid: &Grid<'_>) -> Vec<Agreement> {
-    let of = |kind| pairs(grid, kind).into_iter();
-    let untouched = of(ComparisonKind::Enhancer)
+    let untouched = pairs(grid, ComparisonKind::Enhancer)
+        .into_iter()
         .filter(|(first, _)| grid.subjects[*first].variant.is_untouched());
-    of(ComparisonKind::RealSynthetic)
-        .chain(of(ComparisonKind::RealEnhanced))
+    pairs(grid, ComparisonKind::RealSynthetic)
+        .into_iter()
+        .chain(pairs(grid, ComparisonKind::RealEnhanced))
         .chain(untouched)
         .filter_map(|(first, second)| agreement(grid, first, second))
         .collect()
@@ -82,15 +83,15 @@ fn agreement(grid: &Grid<'_>, first: usize, second: usize) -> Option<Agreement> 
     })
 }
 
-/// Minimum number of clusters in which each model errs, and in which each is right (chosen). With fewer, no interval of κ holds
-/// the truth in simulation.
+/// Minimum number of clusters in which each model errs, and in which each is right (chosen). With fewer, no interval of κ had its nominal
+/// coverage in simulation.
 const MIN_CLUSTERS: usize = 8;
 
-/// κ of two models with its interval, from the counts of each cluster; `None` if one of them is right, or wrong, in fewer than
-/// [`MIN_CLUSTERS`] clusters.
+/// Estimates κ of two models from the counts of each cluster; `None` if one of them is right, or wrong, in fewer than [`MIN_CLUSTERS`]
+/// clusters.
 ///
-/// The variance is that of κ's linear form in the clusters' counts, with Student's quantile for the degrees of freedom that the
-/// clusters' residuals allow.
+/// The variance is that of the linearization of κ in the counts of the clusters, with Student's quantile for the degrees of freedom of the
+/// residuals of the clusters.
 #[must_use]
 pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
     let in_clusters = |holds: fn(&AgreementCounts) -> bool| {

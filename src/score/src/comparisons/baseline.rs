@@ -1,4 +1,4 @@
-//! New runs against an old one: [`BaselineRow`].
+//! Comparison of new runs with an old one: [`BaselineRow`].
 
 use super::comparison::MIN_PAIRS;
 use super::paired::PairedComparison;
@@ -8,21 +8,20 @@ use crate::grid::Grid;
 use crate::significance::{ALPHA, Significance, holm, least_p};
 use crate::subject::ModelInCondition;
 
-/// A model in a condition, in the new runs against the old one.
+/// Comparison of a model in a condition between the new runs and the old one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BaselineRow {
-    /// The model and condition of the new runs.
+    /// Model and condition in the new runs.
     pub subject: ModelInCondition,
-    /// New less old on the items that both answered about the same image.
+    /// New minus old, on the items that both answered about the same image.
     pub paired: PairedComparison,
     /// p-value after Holm's correction over all conditions of all models under test. Reference models (`random`, the observer) are
     /// corrected among themselves.
     pub holm: f64,
     pub significance: Significance,
-    /// The smallest difference that the test would detect in 80 % of runs like these, at the level that Bonferroni's correction leaves
-    /// it.
+    /// Smallest difference that the test would detect in 80 % of runs like these, at the level after Bonferroni's correction.
     pub detectable: f64,
-    /// Number of items that both asked about different images; they do not count.
+    /// Number of items that were asked about different images; they are not compared.
     pub other_images: usize,
     /// New and old, over all trials.
     pub sides: [BaselineSide; 2],
@@ -41,8 +40,8 @@ pub struct BaselineSide {
     pub cost: Option<f64>,
 }
 
-/// The rows of a grid. `pairs` holds the indices of a new subject and the old one; `health` belongs to the subjects of the grid;
-/// `cost` returns the cost of a subject.
+/// Compares the subjects of a grid. `pairs` lists the indices of a new subject and the old one, `health` has one entry for each subject,
+/// and `cost` returns the cost of a subject.
 #[must_use]
 pub fn baseline_rows(
     grid: &Grid<'_>,
@@ -80,15 +79,16 @@ pub fn baseline_rows(
         })
         .collect();
     for is_reference in [false, true] {
-        let own = rows
-            .iter_mut()
-            .filter(|row| row.subject.is_reference() == is_reference);
-        correct(own.collect());
+        correct(
+            rows.iter_mut()
+                .filter(|row| row.subject.is_reference() == is_reference)
+                .collect(),
+        );
     }
     rows
 }
 
-/// Corrects the tests of some rows over all of them, so that the probability of any false verdict is 5 % at most.
+/// Applies Holm's correction to the tests of these rows, so that the probability of any false verdict is at most 5 %.
 fn correct(mut rows: Vec<&mut BaselineRow>) {
     let adjusted = |of: fn(&PairedComparison) -> f64| {
         let values = rows.iter().map(|row| of(&row.paired));

@@ -15,49 +15,48 @@ use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, Variant};
 
-/// Comparison of the models by their mean accuracy over the dark levels ([`is_dark`]), each level alike, on raw images.
+/// Comparison of the models by their mean accuracy over the dark levels ([`is_dark`]) with equal weights, on raw images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BestInTheDark {
     /// Kind of degradation: the last kind that was asked (noise, if it was), in its first noise profile.
     pub variant: Variant,
-    /// The dark levels that every model was asked.
+    /// Dark levels that every model was asked.
     pub levels: Vec<AxisLevel>,
-    /// The lighter levels that every model was asked, from L0.
+    /// Lighter levels that every model was asked, from L0.
     pub lighter: Vec<AxisLevel>,
-    /// The dark levels that some model was asked.
+    /// Dark levels that at least one model was asked.
     pub asked: Vec<AxisLevel>,
     /// Models with images that are not compared, because they were not asked at L0 and at a degraded level of this variant, or answered
-    /// less than others there.
+    /// fewer items than others there.
     pub without: Vec<String>,
-    /// The models with their accuracies, the best in the dark first. The first one leads.
+    /// Models with their accuracies, the best in the dark first. The first one is the leader.
     pub models: Vec<DarkAccuracy>,
-    /// The models that the leader is not shown to be better than, in the order of `models`. If it is empty, the leader is shown
-    /// to be the best.
+    /// Models without a detected difference from the leader, in the order of `models`. If it is empty, the leader is shown to be the best.
     pub not_shown_better_than: Vec<String>,
     /// All pairs of models, in the order of `models`.
     pub pairs: Vec<DarkPair>,
-    /// The leader in the light before the leader in the dark, if they are two models whose order changes once.
+    /// Leader of the lighter levels and leader of the dark levels, if they are two models whose order changes once.
     pub crossing: Option<Crossing>,
     /// Number of items that every model answered at every level.
     pub items: usize,
-    /// Number of items that some model was asked at every level, but that are left out because a model has no reply.
+    /// Number of items that some model was asked at every level, left out because a model has no reply.
     pub dropped: usize,
     /// Number of clusters of the items.
     pub clusters: usize,
     /// Smallest p-value that this number of clusters, c, allows: 2 / 2ᶜ.
     pub least_p: f64,
-    /// p-value of the leader being the best, after the correction over all tests that sentences rest on.
+    /// p-value of the leader being the best, after the correction over all tests behind sentences.
     pub p_report: Option<f64>,
 }
 
 impl BestInTheDark {
-    /// The model with the largest mean accuracy.
+    /// Model with the highest mean accuracy.
     #[must_use]
     pub fn leader(&self) -> &DarkAccuracy {
         &self.models[0]
     }
 
-    /// Whether the clusters allow a verdict on any pair.
+    /// True if the clusters allow a verdict on at least one pair.
     #[must_use]
     pub fn is_possible(&self) -> bool {
         self.pairs
@@ -65,13 +64,13 @@ impl BestInTheDark {
             .any(|pair| pair.significance.is_possible())
     }
 
-    /// Whether the leader is shown to be better than every other model, by the correction over the pairs alone.
+    /// True if the leader is shown to be better than every other model, after the correction over the pairs only.
     #[must_use]
     pub fn is_shown(&self) -> bool {
         self.not_shown_better_than.is_empty()
     }
 
-    /// Whether the leader is shown to be the best, also after the correction over all sentences.
+    /// True if the leader is shown to be the best, also after the correction over all sentences.
     #[must_use]
     pub fn is_detected(&self) -> bool {
         self.is_shown() && self.p_report.is_some_and(|value| value < ALPHA)
@@ -100,7 +99,7 @@ pub struct DarkAccuracy {
     pub by_level: Vec<f64>,
     /// Accuracy at L0, on the same items.
     pub clean: Estimate,
-    /// The mean minus the accuracy at L0; `None` if that is not above chance, because then nothing can be lost.
+    /// `mean` minus the accuracy at L0; `None` if the latter is not above chance, because then nothing can be lost.
     pub loss: Option<Estimate>,
 }
 
@@ -109,7 +108,7 @@ pub struct DarkAccuracy {
 pub struct DarkPair {
     pub first: String,
     pub second: String,
-    /// Mean of the first minus that of the second.
+    /// Mean accuracy of the first minus that of the second.
     pub difference: Estimate,
     /// p-value of no difference.
     pub p: f64,
@@ -123,45 +122,46 @@ pub struct DarkPair {
 /// Two models whose order changes once with the level.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Crossing {
-    /// The leader of the lighter levels, and the last level at which it is ahead.
+    /// Leader of the lighter levels, and the last level at which it is ahead.
     pub before: (String, AxisLevel),
-    /// The leader of the dark levels, and the first level at which it is ahead.
+    /// Leader of the dark levels, and the first level at which it is ahead.
     pub after: (String, AxisLevel),
-    /// Mean accuracy of the first less that of the second, over the levels where the first is ahead.
+    /// Mean accuracy of the first minus that of the second, over the levels where the first is ahead.
     pub lead: Estimate,
-    /// The same over the levels where the second is ahead.
+    /// The same difference over the levels where the second is ahead.
     pub lag: Estimate,
-    /// The larger p-value of the two, times the number of places between levels where the order could change.
+    /// The larger of the two p-values, times the number of gaps between levels at which the order could change.
     pub p: f64,
-    /// p-value after the correction over all tests that sentences rest on.
+    /// p-value after the correction over all tests behind sentences.
     pub p_report: Option<f64>,
 }
 
 impl Crossing {
-    /// Whether the change of order is shown after that correction.
+    /// True if the change of order is detected after that correction.
     #[must_use]
     pub fn is_detected(&self) -> bool {
         self.p_report.is_some_and(|value| value < ALPHA)
     }
 }
 
-/// The exposure drop of L3, in EV.
+/// Exposure drop of L3, in EV.
 const DARK_EV: f64 = 6.0;
 
-/// Whether a level counts as dark: L3 (6 EV) and darker; of another kind of degradation the third step of its ladder and beyond.
+/// True if a level counts as dark: L3 (6 EV) and darker, or for another kind of degradation the third step of its ladder and beyond.
 #[must_use]
 pub(crate) fn is_dark(level: AxisLevel, kind: Kind) -> bool {
-    let third = kind.ladder().get(2);
-    let least = third.map_or(DARK_EV, |third| AxisLevel::new(kind, *third).value());
-    level.value() >= least
+    let threshold = kind
+        .ladder()
+        .get(2)
+        .map_or(DARK_EV, |third| AxisLevel::new(kind, *third).value());
+    level.value() >= threshold
 }
 
 /// A model and the levels at which it was asked.
 type Asked<'g> = (&'g str, BTreeSet<AxisLevel>);
 
-/// Compares the models in the dark, in one parsing. Returns `None` if fewer than two of them were asked at L0 and at a degraded level, if
-/// they share no item, or if there are too many models to compare. If they share no dark level, the darkest one that they share counts as
-/// dark.
+/// Compares the models in the dark, in one parsing. If they share no dark level, the darkest shared level counts as dark. `None` if fewer
+/// than two models were asked at L0 and at a degraded level, if the models share no item, or if there are too many models to compare.
 #[must_use]
 pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheDark> {
     if !compares_models(grid) {
@@ -169,13 +169,12 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheD
     }
     let variant = grid.main_variant()?;
     let kind = variant.kind?;
-    let models = pool(grid)
+    let (curves, mut without): (Vec<Asked<'_>>, Vec<Asked<'_>>) = pool(grid)
         .into_iter()
-        .map(|model| (model, levels(grid, model, &variant)));
-    let (curves, mut without): (Vec<Asked<'_>>, Vec<Asked<'_>>) =
-        models.partition(|(_, levels)| levels.len() > 1 && levels.contains(&AxisLevel::L0));
-    let (curves, apart) = with_most_answers(grid, curves, &variant);
-    without.extend(apart);
+        .map(|model| (model, levels(grid, model, &variant)))
+        .partition(|(_, levels)| levels.len() > 1 && levels.contains(&AxisLevel::L0));
+    let (curves, incomplete) = split_by_coverage(grid, curves, &variant);
+    without.extend(incomplete);
     let levels: Vec<AxisLevel> = curves
         .first()?
         .1
@@ -206,12 +205,13 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheD
     models.sort_by(|(a, _), (b, _)| b.mean.value.total_cmp(&a.mean.value));
     let pairs = scores.pairs(&models, split);
     let leader = &models.first()?.0.model;
-    let unshown = pairs
-        .iter()
-        .filter(|pair| pair.first == *leader && pair.significance != Significance::Better);
     let clusters = scores.clusters();
     Some(BestInTheDark {
-        not_shown_better_than: unshown.map(|pair| pair.second.clone()).collect(),
+        not_shown_better_than: pairs
+            .iter()
+            .filter(|pair| pair.first == *leader && pair.significance != Significance::Better)
+            .map(|pair| pair.second.clone())
+            .collect(),
         crossing: scores.crossing(&models, &levels),
         variant,
         levels: dark.to_vec(),
@@ -231,9 +231,9 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ReadingMode) -> Option<BestInTheD
     })
 }
 
-/// The levels at which a model was asked about raw images of a variant, with L0 if its clean frames are those of the same runs.
+/// Levels at which a model was asked about raw images of a variant; L0 is included if the clean frames are from the same runs.
 fn levels(grid: &Grid<'_>, model: &str, variant: &Variant) -> BTreeSet<AxisLevel> {
-    let clean = ModelInCondition::seeing(model, AxisLevel::L0, variant, None);
+    let clean = ModelInCondition::with_images(model, AxisLevel::L0, variant, None);
     grid.subjects
         .iter()
         .filter(|subject| {
@@ -245,9 +245,9 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &Variant) -> BTreeSet<AxisLevel
         .collect()
 }
 
-/// Splits the models into those that answered most and those that answered less. The latter are compared separately, so that they do not
-/// reduce the items of the others.
-fn with_most_answers<'g>(
+/// Splits the models into those with enough answered items and those with fewer. The latter are left out, so that they do not reduce the
+/// items of the others.
+fn split_by_coverage<'g>(
     grid: &Grid<'_>,
     models: Vec<Asked<'g>>,
     variant: &Variant,
@@ -256,8 +256,9 @@ fn with_most_answers<'g>(
         .iter()
         .map(|(model, levels)| {
             let sides = levels.iter().filter_map(|level| {
-                let subject =
-                    grid.stand_in(&ModelInCondition::seeing(model, *level, variant, None))?;
+                let subject = grid.find_up_to_group(&ModelInCondition::with_images(
+                    model, *level, variant, None,
+                ))?;
                 Some((*level, vec![subject]))
             });
             Coverage::new(grid, sides, |_| true)
@@ -266,42 +267,45 @@ fn with_most_answers<'g>(
     let Some(most) = shared(&coverages) else {
         return (models, Vec::new());
     };
-    let is_complete: Vec<bool> = coverages
-        .iter()
-        .map(|coverage| coverage.lacking(most).is_empty())
-        .collect();
-    let mut is_complete = is_complete.into_iter();
-    models
-        .into_iter()
-        .partition(|_| is_complete.next() == Some(true))
+    let (mut complete, mut incomplete) = (Vec::new(), Vec::new());
+    for (model, coverage) in models.into_iter().zip(&coverages) {
+        if coverage.lacking(most).is_empty() {
+            complete.push(model);
+        } else {
+            incomplete.push(model);
+        }
+    }
+    (complete, incomplete)
 }
 
 /// Right replies of all models to an item that every model answered at every level.
 struct ItemScores {
     /// Index of the cluster.
     cluster: usize,
-    /// Whether each model is right at each level.
+    /// True if a model is right at a level; by model, then by level.
     right: Vec<Vec<bool>>,
-    /// Chance of a right guess.
+    /// Probability of a right guess.
     guess: f64,
 }
 
 impl ItemScores {
-    /// Number of some levels at which a model is right.
+    /// Number of levels in a range at which a model is right.
     fn right(&self, model: usize, levels: &Range<usize>) -> i64 {
-        let right = self.right[model][levels.clone()].iter();
-        right.map(|right| i64::from(*right)).sum()
+        self.right[model][levels.clone()]
+            .iter()
+            .map(|right| i64::from(*right))
+            .sum()
     }
 }
 
-/// Right replies of all models to their shared items.
+/// Right replies of all models to the items that every model answered at every level.
 struct Scores {
     items: Vec<ItemScores>,
     /// Number of levels.
     levels: usize,
     /// Number of items that are left out because a model has no reply.
     dropped: usize,
-    /// Number of clusters of all items of the grid.
+    /// Number of clusters of the whole grid.
     all_clusters: usize,
 }
 
@@ -314,7 +318,7 @@ impl Scores {
         mode: ReadingMode,
     ) -> Self {
         let subject = |model: &str, level| {
-            grid.stand_in(&ModelInCondition::seeing(model, level, variant, None))
+            grid.find_up_to_group(&ModelInCondition::with_images(model, level, variant, None))
         };
         let subjects: Vec<Vec<usize>> = models
             .iter()
@@ -359,37 +363,41 @@ impl Scores {
         scores
     }
 
-    /// Number of clusters that have an item.
+    /// Number of clusters with at least one item.
     fn clusters(&self) -> usize {
-        self.sums(|_| 0).len()
+        self.cluster_sums(|_| 0).len()
     }
 
-    /// Sum of a number over the items of each cluster that has an item.
-    fn sums(&self, of: impl Fn(&ItemScores) -> i64) -> Vec<ClusterNet> {
+    /// Sums of a value over the items, for each cluster with at least one item.
+    fn cluster_sums(&self, value: impl Fn(&ItemScores) -> i64) -> Vec<ClusterNet> {
         let mut sums = vec![ClusterNet { net: 0, items: 0 }; self.all_clusters];
         for item in &self.items {
             let sum = &mut sums[item.cluster];
-            sum.net += of(item);
+            sum.net += value(item);
             sum.items += 1;
         }
         sums.retain(|sum| sum.items > 0);
         sums
     }
 
-    /// The test of a difference that each item has; it is `scale` at most.
-    fn tested(&self, scale: usize, of: impl Fn(&ItemScores) -> i64) -> PairedTest {
-        let squares: i64 = self.items.iter().map(|item| of(item) * of(item)).sum();
-        PairedTest::new(&self.sums(&of), scale as f64, squares as f64)
+    /// Tests a difference of each item, whose maximum is `scale`.
+    fn test(&self, scale: usize, difference: impl Fn(&ItemScores) -> i64) -> PairedTest {
+        let squares: i64 = self.items.iter().map(|item| difference(item).pow(2)).sum();
+        PairedTest::new(
+            &self.cluster_sums(&difference),
+            scale as f64,
+            squares as f64,
+        )
     }
 
-    /// The mean of the first model less that of the second over some levels.
-    fn less(&self, [first, second]: [usize; 2], levels: Range<usize>) -> PairedTest {
-        self.tested(levels.len(), |item| {
+    /// Tests the mean accuracy of the first model minus that of the second over a range of levels.
+    fn test_pair(&self, [first, second]: [usize; 2], levels: Range<usize>) -> PairedTest {
+        self.test(levels.len(), |item| {
             item.right(first, &levels) - item.right(second, &levels)
         })
     }
 
-    /// The accuracies of a model, given by its index; the levels from `split` on are dark.
+    /// Computes the accuracies of a model, given by its index; the levels from `split` on are dark.
     fn accuracy(&self, model: usize, name: &str, split: usize) -> Option<DarkAccuracy> {
         let (n, dark) = (self.items.len(), split..self.levels);
         let by_level: Vec<f64> = (0..self.levels)
@@ -402,38 +410,40 @@ impl Scores {
             })
             .collect();
         let count = dark.len() as f64;
-        let sums = self
-            .sums(|item| item.right(model, &dark))
+        let sums: Vec<(f64, f64)> = self
+            .cluster_sums(|item| item.right(model, &dark))
             .into_iter()
-            .map(|sum| (sum.net as f64 / count, f64::from(sum.items)));
-        let clean = self
-            .sums(|item| item.right(model, &(0..1)))
+            .map(|sum| (sum.net as f64 / count, f64::from(sum.items)))
+            .collect();
+        let clean_counts: Vec<ClusterCount> = self
+            .cluster_sums(|item| item.right(model, &(0..1)))
             .into_iter()
             .map(|sum| ClusterCount {
                 right: sum.net as u32,
                 replies: sum.items,
-            });
-        let clean = Estimate::clustered(&clean.collect::<Vec<_>>())?;
+            })
+            .collect();
+        let clean = Estimate::clustered(&clean_counts)?;
         let chance = self.items.iter().map(|item| item.guess).sum::<f64>() / n as f64;
         let lost = |item: &ItemScores| {
             item.right(model, &dark) - item.right(model, &(0..1)) * dark.len() as i64
         };
         Some(DarkAccuracy {
             model: name.to_owned(),
-            mean: Estimate::scored(&sums.collect::<Vec<_>>(), count, n)?,
+            mean: Estimate::scored(&sums, count, n)?,
             lighter: by_level[..split].iter().sum::<f64>() / split as f64,
             by_level,
             clean,
-            loss: (clean.low > chance).then(|| self.tested(dark.len(), lost).difference),
+            loss: (clean.low > chance).then(|| self.test(dark.len(), lost).difference),
         })
     }
 
-    /// All pairs of models, given with their indices, with their verdicts.
+    /// Tests all pairs of models, given with their indices.
     fn pairs(&self, models: &[(DarkAccuracy, usize)], split: usize) -> Vec<DarkPair> {
         let mut pairs = Vec::new();
         for (index, (first, a)) in models.iter().enumerate() {
             for (second, b) in &models[index + 1..] {
-                let tested = self.less([*a, *b], split..self.levels);
+                let tested = self.test_pair([*a, *b], split..self.levels);
                 pairs.push(DarkPair {
                     first: first.model.clone(),
                     second: second.model.clone(),
@@ -454,8 +464,8 @@ impl Scores {
         pairs
     }
 
-    /// The change of order of the leader of the lighter levels and the leader of the dark ones; `None` if they are one model, or if
-    /// their order changes more than once.
+    /// Tests the change of order between the leader of the lighter levels and the leader of the dark ones; `None` if both are the same
+    /// model, or if their order changes more than once.
     fn crossing(&self, models: &[(DarkAccuracy, usize)], levels: &[AxisLevel]) -> Option<Crossing> {
         let (dark, dark_index) = models.first()?;
         let by_lighter = |a: &&(DarkAccuracy, usize), b: &&(DarkAccuracy, usize)| {
@@ -472,16 +482,16 @@ impl Scores {
         }
         let pair = [*light_index, *dark_index];
         let (lead, lag) = (
-            self.less(pair, 0..split),
-            self.less(pair, split..self.levels),
+            self.test_pair(pair, 0..split),
+            self.test_pair(pair, split..self.levels),
         );
-        let places = (self.levels - 1) as f64;
+        let gaps = (self.levels - 1) as f64;
         Some(Crossing {
             before: (light.model.clone(), levels[split - 1]),
             after: (dark.model.clone(), levels[split]),
             lead: lead.difference,
             lag: lag.difference,
-            p: (places * lead.p.max(lag.p)).min(1.0),
+            p: (gaps * lead.p.max(lag.p)).min(1.0),
             p_report: None,
         })
     }

@@ -1,10 +1,10 @@
 //! Findings about noise, tested under each noise profile: [`FindingByReading`].
 //!
-//! The paper's noise model can be interpreted in several ways; each interpretation is a noise profile. A conclusion that holds under
-//! only one reading is a conclusion about that reading. Each finding is therefore computed under every reading, on the same items and by
-//! the same formula, and the results are reported side by side. Only the paper's levels, L1–L5, are tested. Holm's correction covers all
-//! claims of all models under all readings (Holm 1979, Scand. J. Stat. 6:65): if there is no effect at all, the report names none with
-//! 95 % probability.
+//! The paper's noise model can be interpreted in several ways; each interpretation is a noise profile. A conclusion that holds under only
+//! one profile is a conclusion about that profile. Each finding is therefore computed under every profile, on the same items and by the
+//! same formula, and the results are reported side by side. Only the paper's levels, L1–L5, are tested. Holm's correction covers all claims
+//! of all models under all profiles (Holm 1979, Scand. J. Stat. 6:65): without any effect, the report names none with a probability of 95
+//! %.
 
 use std::collections::BTreeSet;
 
@@ -47,12 +47,12 @@ impl NoiseHypothesis {
         }
     }
 
-    /// True if the claim is that the first side is better than the second, false if it is that it is worse.
+    /// True if the claim is that the first side is better than the second; false if the claim is that it is worse.
     fn expects_gain(&self) -> bool {
         matches!(self, Self::NoiseCompounds(_) | Self::EnhancerHelps(_))
     }
 
-    /// The family that the claim is about; `None` for all families.
+    /// Family of the claim; `None` for all families.
     #[must_use]
     pub fn family(&self) -> Option<&Family> {
         match self {
@@ -61,7 +61,7 @@ impl NoiseHypothesis {
         }
     }
 
-    /// The enhancer that the claim is about, if any.
+    /// Enhancer of the claim, if it is about one.
     #[must_use]
     pub fn enhancer(&self) -> Option<&EnhancerName> {
         match self {
@@ -70,7 +70,7 @@ impl NoiseHypothesis {
         }
     }
 
-    /// The levels that the claim covers, whether they were asked or not.
+    /// Levels that the claim covers, asked or not.
     fn levels(&self) -> Vec<AxisLevel> {
         let levels = paper_levels();
         match self {
@@ -92,7 +92,7 @@ fn paper_levels() -> Vec<AxisLevel> {
         .collect()
 }
 
-/// Test result of a claim, after Holm's correction over all claims and readings.
+/// Test result of a claim, after Holm's correction over all claims and profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
     /// An effect in the direction of the claim is detected.
@@ -104,7 +104,7 @@ pub enum Support {
 }
 
 impl Support {
-    /// The word in tables and files.
+    /// Word in tables and files.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -115,23 +115,23 @@ impl Support {
     }
 }
 
-/// Summary of the test results of a claim under all readings.
+/// Summary of the test results of a claim under all profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Robustness {
-    /// The claim holds under every reading of the report.
+    /// The claim holds under every profile of the report.
     All,
-    /// The claim holds under some readings, and the opposite is detected under none.
+    /// The claim holds under some profiles, and the opposite is detected under none.
     Some,
-    /// The claim holds under at least one reading, and the opposite is detected under another.
+    /// The claim holds under at least one profile, and the opposite is detected under another.
     Reversed,
-    /// The claim holds under no reading, and the opposite is detected under at least one.
+    /// The claim holds under no profile, and the opposite is detected under at least one.
     None,
-    /// Neither the claim nor its opposite is detected under any reading.
+    /// Neither the claim nor its opposite is detected under any profile.
     Open,
 }
 
 impl Robustness {
-    /// The words in tables and files.
+    /// Words in tables and files.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -144,10 +144,10 @@ impl Robustness {
     }
 }
 
-/// The effect of a claim under one reading.
+/// Effect of a claim under one noise profile.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectInReading {
-    /// The noise profile.
+    /// Noise profile.
     pub reading: ReadingName,
     /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items. `None` if a side was
     /// not asked.
@@ -157,38 +157,38 @@ pub struct EffectInReading {
 /// An effect and its significance test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TestedEffect {
-    /// The difference in accuracy with its clustered 95 % interval.
+    /// Difference in accuracy with its clustered 95 % interval.
     pub difference: Estimate,
     /// Test result of the claim.
-    pub standing: Support,
-    /// The p-value of the null hypothesis of no difference.
+    pub support: Support,
+    /// p-value of no difference.
     pub p: f64,
-    /// The p-value after Holm's correction over all claims and readings.
+    /// p-value after Holm's correction over all claims and profiles.
     pub holm: f64,
 }
 
 /// Test results of a claim about one model under every noise profile, on the same items.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FindingByReading {
-    /// The model.
+    /// Model.
     pub model: String,
-    /// The runs that showed these images, if the runs of the report showed different ones.
+    /// Runs that showed these images, if the runs of the report showed different ones.
     pub group: Option<RunGroup>,
-    /// The claim that was tested.
+    /// Tested claim.
     pub claim: NoiseHypothesis,
-    /// The levels asked under every reading; a reading under which none was asked does not count.
+    /// Levels asked under every profile, except profiles without any asked level.
     pub levels: Vec<AxisLevel>,
     /// The model asked without images that [`NoiseHypothesis::BelowBlind`] compares with, if it is not `model` itself.
     pub blind: Option<String>,
-    /// The effect under each reading of the report, `paper` first.
+    /// Effect under each profile of the report, `paper` first.
     pub effects: Vec<EffectInReading>,
-    /// Summary over all readings.
+    /// Summary over all profiles.
     pub robustness: Robustness,
-    /// Number of items left out because they were asked, but not answered on every side, level and reading.
+    /// Number of items left out because they were asked, but not answered on every side, level and profile.
     pub dropped: usize,
 }
 
-/// Tests all claims of each model under every noise profile; empty if the grid has fewer than two readings.
+/// Tests all claims of each model under every noise profile; empty if the grid has fewer than two profiles.
 #[must_use]
 pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
     let readings: BTreeSet<&ReadingName> = noisy_subjects(grid)
@@ -203,7 +203,7 @@ pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
         .collect();
     let mut models: Vec<(&str, Option<&RunGroup>)> = models.into_iter().collect();
     models.sort_by_cached_key(|(model, _)| grid.listing.place(model));
-    let jobs: Vec<(&str, Option<&RunGroup>, NoiseHypothesis)> = models
+    let tests: Vec<(&str, Option<&RunGroup>, NoiseHypothesis)> = models
         .into_iter()
         .flat_map(|(model, group)| {
             claims(grid, model)
@@ -211,7 +211,7 @@ pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
                 .map(move |claim| (model, group, claim))
         })
         .collect();
-    let findings: Vec<FindingByReading> = jobs
+    let findings: Vec<FindingByReading> = tests
         .into_par_iter()
         .filter_map(|(model, group, claim)| {
             let lookup = SideLookup { grid, model, group };
@@ -221,14 +221,14 @@ pub(crate) fn by_reading(grid: &Grid<'_>) -> Vec<FindingByReading> {
     with_holm_correction(findings)
 }
 
-/// The subjects that see noisy images.
+/// Subjects with noisy images.
 fn noisy_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g ModelInCondition> {
     grid.subjects.iter().filter(|subject| {
         subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_readings)
     })
 }
 
-/// The claims to test for a model, in the order of the table.
+/// Claims to test for a model, in the order of the table.
 fn claims(grid: &Grid<'_>, model: &str) -> Vec<NoiseHypothesis> {
     let enhancers: BTreeSet<&EnhancerName> = noisy_subjects(grid)
         .filter(|subject| subject.model == model)
@@ -257,7 +257,7 @@ fn claims(grid: &Grid<'_>, model: &str) -> Vec<NoiseHypothesis> {
     claims
 }
 
-/// Lookup of the two subjects that a claim about one model compares, its sides.
+/// Finds the two sides of a claim about one model: the subjects that it compares.
 struct SideLookup<'g, 'a> {
     grid: &'g Grid<'a>,
     model: &'g str,
@@ -265,7 +265,7 @@ struct SideLookup<'g, 'a> {
 }
 
 impl SideLookup<'_, '_> {
-    /// Indices of the first and second subject of a claim at a level under a reading; `None` if the grid lacks one of them.
+    /// Indices of the first and second subject of a claim at a level under a profile; `None` if the grid lacks one of them.
     fn find(
         &self,
         claim: &NoiseHypothesis,
@@ -280,8 +280,8 @@ impl SideLookup<'_, '_> {
         };
         let noisy = variant(Some(Kind::Sensor), Some(reading));
         let subject_index = |level, variant: &Variant, enhancer| {
-            let subject = ModelInCondition::seeing(self.model, level, variant, enhancer);
-            self.grid.stand_in(&subject)
+            let subject = ModelInCondition::with_images(self.model, level, variant, enhancer);
+            self.grid.find_up_to_group(&subject)
         };
         let unenhanced = subject_index(level, &noisy, None);
         Some(match claim {
@@ -299,7 +299,7 @@ impl SideLookup<'_, '_> {
         })
     }
 
-    /// Index of the same model asked without images, or else of the only model asked without images.
+    /// Index of the same model without images, or else of the only model without images.
     fn blind(&self) -> Option<usize> {
         let blind: Vec<(usize, &ModelInCondition)> = self
             .grid
@@ -316,7 +316,7 @@ impl SideLookup<'_, '_> {
     }
 }
 
-/// Tests a claim under every reading; `None` if no reading has replies to compare.
+/// Tests a claim under every profile; `None` if no profile has replies to compare.
 fn finding(
     lookup: &SideLookup<'_, '_>,
     claim: NoiseHypothesis,
@@ -370,7 +370,7 @@ fn finding(
     })
 }
 
-/// The levels of a claim at which both sides were asked under a reading.
+/// Levels of a claim at which both sides were asked under a profile.
 fn asked_levels(
     lookup: &SideLookup<'_, '_>,
     claim: &NoiseHypothesis,
@@ -398,7 +398,7 @@ fn shared_items(
         .items
         .iter()
         .enumerate()
-        .filter(|(_, item)| item.is_of(family))
+        .filter(|(_, item)| item.is_in_family(family))
         .map(|(index, _)| index)
         .filter(|item| {
             subjects
@@ -439,14 +439,14 @@ fn effect(grid: &Grid<'_>, pairs: &[(usize, usize)], kept: &[usize]) -> Option<T
     clusters.retain(|cluster| cluster.items > 0);
     let tested = PairedTest::new(&clusters, pairs.len() as f64, sum_of_squares as f64);
     Some(TestedEffect {
-        standing: Support::Open,
+        support: Support::Open,
         difference: tested.difference,
         p: tested.p,
         holm: tested.p,
     })
 }
 
-/// Fills in the corrected p-values, test results and summaries, with Holm's correction over all findings and readings.
+/// Fills in the corrected p-values, test results and summaries, with Holm's correction over all findings and profiles.
 fn with_holm_correction(mut findings: Vec<FindingByReading>) -> Vec<FindingByReading> {
     let p_values: Vec<f64> = findings
         .iter()
@@ -464,7 +464,7 @@ fn with_holm_correction(mut findings: Vec<FindingByReading>) -> Vec<FindingByRea
             .zip(&mut corrected)
         {
             effect.holm = holm;
-            effect.standing = support(effect, expects_gain);
+            effect.support = support(effect, expects_gain);
         }
         finding.robustness = robustness(&finding.effects);
     }
@@ -482,13 +482,13 @@ fn support(effect: &TestedEffect, expects_gain: bool) -> Support {
     }
 }
 
-/// Summarizes a claim over the readings. A reading that was not asked has no effect, so the claim then cannot hold under all.
+/// Summarizes a claim over the profiles. A profile that was not asked has no effect, so the claim then cannot hold under all.
 fn robustness(effects: &[EffectInReading]) -> Robustness {
-    let count = |standing: Support| {
+    let count = |support: Support| {
         effects
             .iter()
             .filter_map(|effect| effect.effect)
-            .filter(|effect| effect.standing == standing)
+            .filter(|effect| effect.support == support)
             .count()
     };
     match (count(Support::Holds), count(Support::Opposite)) {

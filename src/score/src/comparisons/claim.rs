@@ -1,15 +1,15 @@
-//! [`Claim`]: the statement that a finding supports.
+//! Statement that a finding supports: [`Claim`].
 
 use crate::significance::{ALPHA, Significance};
 
-/// Statement that a report's sentences may make about a finding tested in both parsings.
+/// Statement that the sentences of a report may make about a finding that was tested in both parsings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Claim {
     /// Detected after the correction over all sentences, in both parsings and in the same direction.
     Detected(Significance),
-    /// Detected after that correction in the strict parsing alone, with this direction.
+    /// Detected after that correction in the strict parsing only, with this direction.
     StrictOnly(Significance),
-    /// Detected within its own set of tests alone.
+    /// Detected only by the correction within its own set of tests.
     InOwnSet,
     /// Not detected.
     Open,
@@ -20,9 +20,9 @@ pub enum Claim {
 /// A finding in one parsing of the replies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ParsedFinding {
-    /// How much better the first side is.
+    /// Gain of the first side over the second.
     pub(super) gain: f64,
-    /// The verdict within its own set of tests.
+    /// Verdict within its own set of tests.
     pub(super) verdict: Significance,
     /// p-value after the correction over all sentences; `None` if no sentence is about the finding.
     pub(super) p_report: Option<f64>,
@@ -43,12 +43,12 @@ impl ParsedFinding {
 }
 
 impl Claim {
-    /// The claim from both parsings of a finding.
+    /// Derives the claim from both parsings of a finding.
     pub(super) fn new(strict: ParsedFinding, lenient: ParsedFinding) -> Self {
-        let is_same_way = strict.gain * lenient.gain > 0.0;
+        let is_same_direction = strict.gain * lenient.gain > 0.0;
         if !strict.verdict.is_possible() {
             Self::Impossible
-        } else if strict.is_detected() && lenient.is_detected() && is_same_way {
+        } else if strict.is_detected() && lenient.is_detected() && is_same_direction {
             Self::Detected(strict.direction())
         } else if strict.is_detected() {
             Self::StrictOnly(strict.direction())
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_both_parsings_show_in_one_direction_is_detected() {
+    fn detection_needs_both_parsings_in_one_direction() {
         let finding = |gain: f64, p: f64| ParsedFinding {
             gain,
             verdict: Significance::Worse,

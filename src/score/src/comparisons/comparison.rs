@@ -9,7 +9,7 @@ use super::paired::PairedComparison;
 use crate::choice::ReadingMode;
 use crate::grid::Grid;
 use crate::significance::{Significance, holm, least_p};
-use crate::subject::{ModelInCondition, judged};
+use crate::subject::{ModelInCondition, models_under_test};
 use darkqa_ground::types::{AxisLevel, Family, PairDark, Variant, View};
 use rayon::prelude::*;
 
@@ -26,11 +26,11 @@ pub enum ComparisonKind {
     Model,
     /// A model with images against a model without.
     Blind,
-    /// A model in one light against the same model in another: other images of the same frames at the same level.
+    /// A model against itself with other images of the same frames at the same level.
     Light,
-    /// A photograph in the dark against synthetic images that are as dark, raw or with the same enhancer.
+    /// A dark photograph against synthetic images of the same darkness, raw or with the same enhancer.
     RealSynthetic,
-    /// A photograph in the dark, enhanced against raw.
+    /// A dark photograph, enhanced against raw.
     RealEnhanced,
 }
 
@@ -47,7 +47,7 @@ impl ComparisonKind {
         Self::RealEnhanced,
     ];
 
-    /// The name of the kind in CSV files.
+    /// Name of the kind in CSV files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -63,25 +63,25 @@ impl ComparisonKind {
     }
 }
 
-/// Minimum number of items that two models, or a model in two lights, must share for a verdict; chosen. The two sides of the other
-/// kinds were asked the same items by one run.
+/// Minimum number of shared items for a verdict in comparisons that may be across runs: two models, or two kinds of images (chosen). In all
+/// other kinds, one run asked both sides the same items.
 pub const MIN_PAIRS: usize = 30;
 
 /// One subject against another on the items to which both replied, in both parsings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     pub kind: ComparisonKind,
-    /// The first side: the degraded, the noisy, the enhanced, or the one with images.
+    /// First side: the degraded, noisy or enhanced one, or the one with images.
     pub first: ModelInCondition,
-    /// The second side, to which the first is compared.
+    /// Second side, to which the first is compared.
     pub second: ModelInCondition,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// The comparison in the strict parsing, which is the headline.
+    /// Comparison in the strict parsing, which is the main result.
     pub strict: TestedComparison,
-    /// The comparison in the lenient parsing.
+    /// Comparison in the lenient parsing.
     pub lenient: TestedComparison,
-    /// The smallest p-value after correction that the clusters of this comparison allow, however large the difference is.
+    /// Smallest corrected p-value that the clusters of this comparison allow, however large the difference is.
     pub least_holm: f64,
 }
 
@@ -89,11 +89,11 @@ pub struct Comparison {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestedComparison {
     pub paired: PairedComparison,
-    /// p-value after Holm's correction over all comparisons of this kind and these models. Another model in the report
-    /// therefore changes no result. Comparisons by family are corrected separately.
+    /// p-value after Holm's correction over all comparisons of this kind and these models, so that another model in the report changes no
+    /// result. Comparisons by family are corrected separately.
     pub holm: f64,
     pub significance: Significance,
-    /// p-value after the correction over all tests that sentences rest on; `None` if no sentence is about the comparison.
+    /// p-value after the correction over all tests behind sentences; `None` if no sentence is about the comparison.
     pub p_report: Option<f64>,
 }
 
@@ -109,14 +109,14 @@ impl TestedComparison {
 }
 
 impl Comparison {
-    /// Whether the sides share too few items for a verdict.
+    /// True if the sides share too few items for a verdict.
     #[must_use]
     pub fn is_too_small(&self) -> bool {
-        let is_across = matches!(self.kind, ComparisonKind::Model | ComparisonKind::Light);
-        is_across && self.strict.paired.difference.n < MIN_PAIRS
+        let may_cross_runs = matches!(self.kind, ComparisonKind::Model | ComparisonKind::Light);
+        may_cross_runs && self.strict.paired.difference.n < MIN_PAIRS
     }
 
-    /// The statement that sentences may make.
+    /// Statement that sentences may make.
     #[must_use]
     pub fn claim(&self) -> Claim {
         let parsed = |tested: &TestedComparison| ParsedFinding {
@@ -127,7 +127,7 @@ impl Comparison {
         Claim::new(parsed(&self.strict), parsed(&self.lenient))
     }
 
-    /// The comparison in a parsing.
+    /// Comparison in a parsing.
     #[must_use]
     pub fn parsed(&self, mode: ReadingMode) -> &TestedComparison {
         match mode {
@@ -137,15 +137,15 @@ impl Comparison {
     }
 }
 
-/// The maximum number of comparisons between models; chosen: they take at most a gigabyte.
-const MOST_BETWEEN_MODELS: usize = 500_000;
+/// Maximum number of comparisons between models (chosen); they take at most a gigabyte.
+const MAX_MODEL_COMPARISONS: usize = 500_000;
 
-/// Whether models are compared with each other: their pairs grow with the square of their number.
+/// True if models are compared with each other. The number of pairs grows with the square of the number of models, so it is limited.
 #[must_use]
 pub fn compares_models(grid: &Grid<'_>) -> bool {
     let models: BTreeSet<&str> = grid.subjects.iter().map(|s| &*s.model).collect();
     let pairs = grid.subjects.len() * models.len().saturating_sub(1) / 2;
-    pairs.saturating_mul(grid.groups().len()) <= MOST_BETWEEN_MODELS
+    pairs.saturating_mul(grid.groups().len()) <= MAX_MODEL_COMPARISONS
 }
 
 /// All comparisons of a grid, ordered by kind, family and subjects.
@@ -159,14 +159,14 @@ pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
             jobs.extend(pairs.iter().map(|(a, b)| (kind, *family, *a, *b)));
         }
     }
-    corrected(paired(grid, jobs))
+    corrected(uncorrected(grid, jobs))
 }
 
 /// A kind, a family, and the indices of the two sides.
 type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
 
-/// The comparisons that have items, not yet corrected.
-fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
+/// Computes the comparisons that have items, before correction.
+fn uncorrected(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
     jobs.into_par_iter()
         .filter_map(|(kind, family, first, second)| {
             let paired = |mode| PairedComparison::new(grid, first, second, family, mode);
@@ -191,7 +191,7 @@ fn paired(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
 }
 
 /// Comparisons of the kind [`Light`](ComparisonKind::Light) between different names of one model, which was asked in the same way under
-/// each of them.
+/// each name.
 #[must_use]
 pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Comparison> {
     let named: Vec<(usize, &ModelInCondition)> = grid
@@ -201,8 +201,8 @@ pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Compariso
         .filter(|(_, subject)| names.contains(&subject.model))
         .collect();
     let mut pairs = Vec::new();
-    for (place, (index, subject)) in named.iter().enumerate() {
-        let others = named[place + 1..]
+    for (position, (index, subject)) in named.iter().enumerate() {
+        let others = named[position + 1..]
             .iter()
             .filter(|(_, other)| other.model != subject.model && is_other_light(subject, other));
         pairs.extend(others.map(|(other, _)| (*index, *other)));
@@ -213,10 +213,10 @@ pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Compariso
             .iter()
             .map(|(first, second)| (ComparisonKind::Light, *family, *first, *second))
     });
-    corrected(paired(grid, jobs.collect()))
+    corrected(uncorrected(grid, jobs.collect()))
 }
 
-/// The comparisons with their significance, after Holm's correction within each set.
+/// Fills in the significance of the comparisons, after Holm's correction within each set.
 fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     let mut sets = BTreeMap::<_, Vec<usize>>::new();
     for (index, comparison) in all.iter().enumerate() {
@@ -235,20 +235,20 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
         let strict = values(|found| found.strict.paired.p);
         let lenient = values(|found| found.lenient.paired.p);
         let least = values(|found| least_p(found.strict.paired.clusters));
-        for (place, index) in set.into_iter().enumerate() {
+        for (position, index) in set.into_iter().enumerate() {
             let comparison = &mut all[index];
             let is_too_small = comparison.is_too_small();
-            comparison.least_holm = least[place];
+            comparison.least_holm = least[position];
             for (tested, holm) in [
-                (&mut comparison.strict, strict[place]),
-                (&mut comparison.lenient, lenient[place]),
+                (&mut comparison.strict, strict[position]),
+                (&mut comparison.lenient, lenient[position]),
             ] {
                 let difference = tested.paired.difference.value;
                 tested.holm = holm;
                 tested.significance = if is_too_small {
                     Significance::TooFew
                 } else {
-                    Significance::new(difference, holm, least[place])
+                    Significance::new(difference, holm, least[position])
                 };
             }
         }
@@ -256,20 +256,24 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     all
 }
 
-/// The indices of the subjects that a kind compares.
+/// Indices of the subjects that a kind compares.
 pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
-    let compared = compares_models(grid);
-    let judged = judged(grid.subjects.iter().map(|subject| &*subject.model));
+    let compares_models = compares_models(grid);
+    let under_test = models_under_test(grid.subjects.iter().map(|subject| &*subject.model));
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
-            // Only raw images show what darkness costs. The curves show how much of it an enhancer recovers.
+            // Only raw images show the cost of darkness. The curves show how much of it an enhancer recovers.
             ComparisonKind::Level
                 if subject.variant.is_degraded() && subject.enhancer.is_none() =>
             {
-                let clean =
-                    ModelInCondition::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
-                grid.stand_in(&clean).into_iter().collect()
+                let clean = ModelInCondition::with_images(
+                    &subject.model,
+                    AxisLevel::L0,
+                    &subject.variant,
+                    None,
+                );
+                grid.find_up_to_group(&clean).into_iter().collect()
             }
             ComparisonKind::Variant => match subject
                 .variant
@@ -278,7 +282,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
             {
                 None => Vec::new(),
                 // The same level of the base kind, which has no noise profiles.
-                base => changed(grid, subject, |other| {
+                base => find_changed(grid, subject, |other| {
                     other.variant = Variant {
                         kind: base,
                         reading: None,
@@ -292,12 +296,12 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
                     && subject.variant.photograph().is_some()
                         == (kind == ComparisonKind::RealEnhanced) =>
             {
-                changed(grid, subject, |other| other.enhancer = None)
+                find_changed(grid, subject, |other| other.enhancer = None)
             }
             ComparisonKind::RealSynthetic if subject.variant.photograph().is_some() => {
-                real_synthetic::as_dark(grid, index)
+                real_synthetic::equally_dark(grid, index)
             }
-            ComparisonKind::Model if compared => later_models(grid, index, &judged),
+            ComparisonKind::Model if compares_models => later_models(grid, index, &under_test),
             ComparisonKind::Light => later_lights(grid, index),
             ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
             _ => Vec::new(),
@@ -307,35 +311,37 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
     pairs
 }
 
-/// The subject that differs from `subject` by a change only, if the grid has it.
-fn changed(
+/// Finds the subject that differs from `subject` only by a change, if the grid contains it.
+fn find_changed(
     grid: &Grid<'_>,
     subject: &ModelInCondition,
     change: impl FnOnce(&mut ModelInCondition),
 ) -> Vec<usize> {
     let mut other = subject.clone();
     change(&mut other);
-    grid.stand_in(&other).into_iter().collect()
+    grid.find_up_to_group(&other).into_iter().collect()
 }
 
-/// Later models of the grid in the same condition, so that each pair occurs once. Only those of `judged` are compared.
-fn later_models(grid: &Grid<'_>, index: usize, judged: &BTreeSet<&str>) -> Vec<usize> {
+/// Later models of the grid in the same condition, so that each pair occurs once. Only models in `under_test` are compared.
+fn later_models(grid: &Grid<'_>, index: usize, under_test: &BTreeSet<&str>) -> Vec<usize> {
     let subject = &grid.subjects[index];
-    if !judged.contains(&*subject.model) {
+    if !under_test.contains(&*subject.model) {
         return Vec::new();
     }
-    let later = grid.subjects.iter().enumerate().skip(index + 1);
     let condition =
         |of: &ModelInCondition| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
-    later
+    grid.subjects
+        .iter()
+        .enumerate()
+        .skip(index + 1)
         .filter(|(_, other)| other.model != subject.model && condition(other) == condition(subject))
-        .filter(|(_, other)| judged.contains(&*other.model))
+        .filter(|(_, other)| under_test.contains(&*other.model))
         .map(|(other, _)| other)
         .collect()
 }
 
-/// Later subjects of the grid with the same model at the same level, raw or with the same enhancer, in another noise profile or
-/// with the images of other runs.
+/// Later subjects of the grid with the same model at the same level, raw or with the same enhancer, but in another noise profile or with
+/// images of other runs.
 fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
     grid.subjects
@@ -347,7 +353,7 @@ fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
         .collect()
 }
 
-/// Whether two subjects show the same level, raw or with the same enhancer, in another noise profile or with the images of other runs.
+/// True if two subjects have the same level, raw or with the same enhancer, but another noise profile or images of other runs.
 fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
     (one.view, one.level) == (other.view, other.level)
         && (one.variant.kind, &one.enhancer) == (other.variant.kind, &other.enhancer)
@@ -356,7 +362,7 @@ fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
         && one.variant != other.variant
 }
 
-/// The same model without images; if it was never asked so, all models without images.
+/// Indices of the same model without images; if it was never asked without images, of all models without images.
 fn blind(grid: &Grid<'_>, subject: &ModelInCondition) -> Vec<usize> {
     let all = || {
         grid.subjects

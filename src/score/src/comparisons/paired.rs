@@ -8,7 +8,7 @@ use darkqa_ground::types::Family;
 use darkqa_statistics::quantiles::{beyond, degrees_of_freedom, quantile};
 use darkqa_statistics::residuals::{residuals, unknown_design_effect};
 
-/// Accuracy of one subject against another on the items to which both replied.
+/// Comparison of two subjects on the items to which both replied.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairedComparison {
     /// Accuracy of the first subject.
@@ -21,7 +21,7 @@ pub struct PairedComparison {
     pub gained: usize,
     /// Number of items that only the second subject got right.
     pub lost: usize,
-    /// Number of clusters that have a pair.
+    /// Number of clusters with a pair.
     pub clusters: usize,
     /// McNemar's exact p-value, which treats items as independent.
     pub mcnemar: f64,
@@ -31,7 +31,7 @@ pub struct PairedComparison {
     pub spread: Spread,
 }
 
-/// Counts of the pairs of a cluster.
+/// Numbers of pairs in a cluster: all, right only for the first subject, and right only for the second.
 #[derive(Debug, Clone, Copy, Default)]
 struct ClusterPairs {
     all: u32,
@@ -40,7 +40,7 @@ struct ClusterPairs {
 }
 
 impl PairedComparison {
-    /// Comparison of two subjects, by their indices in the grid; `None` if no item has a reply of both.
+    /// Compares two subjects, given by their indices in the grid; `None` if no item has a reply of both.
     #[must_use]
     pub fn new(
         grid: &Grid<'_>,
@@ -49,10 +49,12 @@ impl PairedComparison {
         family: Option<&Family>,
         mode: ReadingMode,
     ) -> Option<Self> {
-        Self::on_items(grid, first, second, mode, |_, item| item.is_of(family))
+        Self::on_items(grid, first, second, mode, |_, item| {
+            item.is_in_family(family)
+        })
     }
 
-    /// The same on the items for which `has` is true; it takes the index of an item and the item.
+    /// Compares two subjects on the items for which `has` is true; it takes the index of an item and the item.
     pub fn on_items(
         grid: &Grid<'_>,
         first: usize,
@@ -64,7 +66,7 @@ impl PairedComparison {
         Self::counting(grid, [first, second], mode, has, is_right)
     }
 
-    /// The same for replies that `counts` counts in place of right ones; it takes an item and a reading of a reply to it.
+    /// Compares two subjects by the replies for which `counts` is true, instead of right replies; it takes an item and a parsed reply.
     pub(crate) fn counting(
         grid: &Grid<'_>,
         [first, second]: [usize; 2],
@@ -99,11 +101,14 @@ impl PairedComparison {
             return None;
         }
         let (gained, lost) = (sum(|pairs| pairs.gained), sum(|pairs| pairs.lost));
-        let nets = clusters.iter().map(|cluster| ClusterNet {
-            net: i64::from(cluster.gained) - i64::from(cluster.lost),
-            items: cluster.all,
-        });
-        let tested = PairedTest::new(&nets.collect::<Vec<_>>(), 1.0, (gained + lost) as f64);
+        let nets: Vec<ClusterNet> = clusters
+            .iter()
+            .map(|cluster| ClusterNet {
+                net: i64::from(cluster.gained) - i64::from(cluster.lost),
+                items: cluster.all,
+            })
+            .collect();
+        let tested = PairedTest::new(&nets, 1.0, (gained + lost) as f64);
         Some(Self {
             first: counted[0] as f64 / n as f64,
             second: counted[1] as f64 / n as f64,
@@ -118,21 +123,20 @@ impl PairedComparison {
     }
 }
 
-/// The difference of the items of a cluster.
+/// Summed difference of the items of a cluster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ClusterNet {
-    /// Sum of the items' differences, each a whole number.
+    /// Sum of the differences of the items, each an integer.
     pub(crate) net: i64,
     /// Number of items.
     pub(crate) items: u32,
 }
 
-/// A paired difference with its interval and its test, which agree: p is below 0.05 if and only if the interval leaves out 0.
+/// Paired difference with its interval and its test, which agree: p is below 0.05 if and only if the interval excludes 0.
 ///
-/// p is the larger of two p-values of no difference: that of Student's t, by which the interval of [`difference`] is made, and the
-/// exact one of swapping the two sides in whole clusters ([`swap_test`]). So it is never below the exact size, however few clusters
-/// there are. The interval holds all differences that the test does not reject: where the swaps alone do not reject 0, it is
-/// extended to 0.
+/// p is the larger of two p-values of no difference: that of Student's t, from which the interval of [`difference`] is computed, and the
+/// exact one of swapping the two sides in whole clusters ([`swap_test`]). The test is therefore valid for any number of clusters. The
+/// interval contains all differences that the test does not reject: if only the swap test does not reject 0, it is extended to 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PairedTest {
     pub(super) difference: Estimate,
@@ -143,16 +147,17 @@ pub(crate) struct PairedTest {
 }
 
 impl PairedTest {
-    /// The test of clusters that have items. `scale` is the number of pairs that an item's difference adds up; `squares` is the sum of
-    /// the squared differences of all items.
+    /// Tests clusters with at least one item each. `scale` is the number of pairs summed in the difference of an item; `squares` is the sum
+    /// of the squared differences of all items.
     pub(crate) fn new(clusters: &[ClusterNet], scale: f64, squares: f64) -> Self {
         let n = clusters.iter().map(|cluster| cluster.items as usize).sum();
-        let sums = clusters
+        let sums: Vec<(f64, f64)> = clusters
             .iter()
-            .map(|cluster| (cluster.net as f64 / scale, f64::from(cluster.items)));
-        let (estimate, spread) = interval(&sums.collect::<Vec<_>>(), squares / scale / scale, n);
-        let nets = clusters.iter().map(|cluster| cluster.net);
-        let swapped = swap_test(&nets.collect::<Vec<_>>());
+            .map(|cluster| (cluster.net as f64 / scale, f64::from(cluster.items)))
+            .collect();
+        let (estimate, spread) = interval(&sums, squares / scale / scale, n);
+        let nets: Vec<i64> = clusters.iter().map(|cluster| cluster.net).collect();
+        let swapped = swap_test(&nets);
         let p = spread
             .p(estimate.value * n as f64 / (n as f64 + ADDED))
             .max(swapped.p);
@@ -160,7 +165,7 @@ impl PairedTest {
             difference: if p < ALPHA {
                 estimate
             } else {
-                with_zero(estimate)
+                extended_to_zero(estimate)
             },
             p,
             by: swapped.by,
@@ -169,8 +174,8 @@ impl PairedTest {
     }
 }
 
-/// The estimate with its interval extended to 0.
-fn with_zero(estimate: Estimate) -> Estimate {
+/// Returns the estimate with its interval extended to 0.
+fn extended_to_zero(estimate: Estimate) -> Estimate {
     Estimate {
         low: estimate.low.min(0.0),
         high: estimate.high.max(0.0),
@@ -178,7 +183,7 @@ fn with_zero(estimate: Estimate) -> Estimate {
     }
 }
 
-/// Number of pairs that Bonett and Price add.
+/// Number of pairs that Bonett and Price add to the sample.
 const ADDED: f64 = 2.0;
 
 /// Standard error of a difference, and the degrees of freedom of Student's t.
@@ -186,12 +191,12 @@ const ADDED: f64 = 2.0;
 pub struct Spread {
     /// Standard error; infinite with one cluster.
     pub error: f64,
-    /// Degrees of freedom, which need not be whole.
+    /// Degrees of freedom; not necessarily an integer.
     pub degrees: f64,
 }
 
 impl Spread {
-    /// Two-sided p-value of a centre of the interval.
+    /// Two-sided p-value of no difference, for an interval with this center.
     pub(super) fn p(&self, center: f64) -> f64 {
         if self.error.is_finite() {
             beyond(center.abs() / self.error, self.degrees)
@@ -200,8 +205,8 @@ impl Spread {
         }
     }
 
-    /// The smallest difference that a two-sided test at `level` detects in 80 % of samples of this spread: the error times the sum of
-    /// the two quantiles (Bloom 1995, Eval. Rev. 19:547).
+    /// Smallest difference that a two-sided test at `level` detects in 80 % of samples of this spread: the error times the sum of the two
+    /// quantiles (Bloom 1995, Eval. Rev. 19:547).
     #[must_use]
     pub fn detectable(&self, level: f64) -> f64 {
         let [test, power] = [1.0 - level / 2.0, POWER].map(|share| quantile(share, self.degrees));
@@ -209,25 +214,25 @@ impl Spread {
     }
 }
 
-/// Share of samples in which a detectable difference is detected (chosen, as usual).
+/// Power: share of samples in which a detectable difference is detected (chosen, the usual value).
 pub const POWER: f64 = 0.8;
 
-/// The difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
+/// Estimates a difference with the interval of Bonett and Price (2012, J. Educ. Behav. Stat. 37:479).
 ///
-/// It adds one pair in each direction, so that few or no discordant pairs do not look like certainty. Here the variance
-/// between clusters, which is the sum of their squared [`residuals`], replaces that of independent pairs, and Student's quantile the
-/// normal one. Where clusters vary more than independent pairs would, it has the degrees of freedom that their residuals allow
-/// ([`degrees_of_freedom`]), else one less than clusters. If all pairs have the same difference, which is mostly none, the variance of
-/// the two added pairs is multiplied by [`unknown_design_effect`]: differences that come in few clusters may all have been missed.
+/// One pair is added in each direction, so that few or no discordant pairs do not look like certainty. Here the variance between clusters,
+/// which is the sum of their squared [`residuals`], replaces that of independent pairs, and Student's quantile replaces the normal one. If
+/// clusters vary more than independent pairs would, the degrees of freedom are those of their residuals ([`degrees_of_freedom`]), otherwise
+/// the number of clusters minus 1. If all pairs have the same difference, usually 0, the variance of the two added pairs is multiplied by
+/// [`unknown_design_effect`], because differences that are concentrated in few clusters may all have been missed.
 ///
-/// `clusters` holds, for each cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number;
-/// `squares` is the sum of the squared differences of all pairs, and `n` the number of all pairs.
+/// `clusters` lists, for each cluster, the sum of the differences of its pairs (of scores between 0 and 1) and their number; `squares` is
+/// the sum of the squared differences of all pairs, and `n` the number of all pairs.
 #[must_use]
 pub fn difference(clusters: &[(f64, f64)], squares: f64, n: usize) -> Estimate {
     interval(clusters, squares, n).0
 }
 
-/// The same with its p-value of no difference by Student's t: below 0.05 if and only if the interval leaves out 0.
+/// Estimates a difference like [`difference`], with its p-value by Student's t: below 0.05 if and only if the interval excludes 0.
 #[must_use]
 pub(crate) fn tested_difference(
     clusters: &[(f64, f64)],
@@ -244,7 +249,7 @@ fn interval(clusters: &[(f64, f64)], squares: f64, n: usize) -> (Estimate, Sprea
     let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
     let value = sum / all;
     let residuals = residuals(clusters, value);
-    // One cluster shows no spread between clusters: its residual is infinite and the interval is the whole range.
+    // A single cluster has an infinite residual, so that the interval is the whole range.
     let variance: f64 = residuals.iter().map(|residual| residual * residual).sum();
     let independent = squares - all * value * value;
     let added = if independent > all * ROUNDING {
@@ -272,7 +277,7 @@ fn interval(clusters: &[(f64, f64)], squares: f64, n: usize) -> (Estimate, Sprea
     (estimate, spread)
 }
 
-/// Relative error of sums that are equal but for rounding (chosen).
+/// Maximum relative rounding error of equal sums (chosen).
 const ROUNDING: f64 = 1e-9;
 
 #[cfg(test)]
@@ -331,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_detectable_difference_is_the_usual_sum_of_quantiles() {
+    fn detectable_difference_matches_scipy() {
         // 1.962339 + 0.841998 standard errors (scipy 1.17.1, t.ppf).
         let spread = Spread {
             error: 0.01,

@@ -1,6 +1,6 @@
-//! Differences of all models together: [`PooledFinding`].
+//! Differences pooled over models: [`PooledFinding`].
 //!
-//! The models are fixed: a finding is about these models, not about models in general. Items, grouped in clusters, are the sample.
+//! The models are fixed: a finding is about these models, not about models in general. The sample consists of items, grouped in clusters.
 
 mod finding;
 mod left_out;
@@ -24,14 +24,14 @@ pub use finding::{PooledDifference, PooledFinding};
 pub use left_out::ModelsLeftOut;
 pub(crate) use left_out::models_left_out;
 
-/// The models that findings are about, sorted: those with images, without people, and without reference models if there are others; else
-/// one reference alone.
+/// Models that findings are about, sorted: models with images, without people and without reference models. If only reference models ran,
+/// one of them.
 #[must_use]
 pub fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
     models(grid, View::Image)
 }
 
-/// The [`pooled_models`] with images or without.
+/// [`pooled_models`] with or without images.
 fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
     let asked = grid
         .subjects
@@ -43,7 +43,7 @@ fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
     pooled_models(models).into_iter().collect()
 }
 
-/// A kind, variant and enhancer: one set of Holm's correction for each family.
+/// A kind, variant and enhancer; Holm's correction is applied to each family of such a set.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct PooledSet {
     kind: PooledKind,
@@ -52,16 +52,15 @@ struct PooledSet {
 }
 
 impl PooledSet {
-    /// All sets for which the grid may have both sides.
+    /// All sets for which the grid may contain both sides.
     fn all(grid: &Grid<'_>) -> BTreeSet<Self> {
-        let seeing = grid.subjects.iter();
-        // Findings are about levels, and the darkness of pairs is none: it has comparisons of its own.
-        seeing
+        // Findings are about levels. Image pairs have no level; other comparisons cover them.
+        grid.subjects
+            .iter()
             .filter(|subject| subject.view == Some(View::Image) && subject.variant.pair.is_none())
             .flat_map(|subject| {
-                let raw = PooledKind::for_raw(subject.variant.kind);
                 let kinds = match subject.enhancer {
-                    None => raw,
+                    None => PooledKind::for_raw(subject.variant.kind),
                     Some(_) => vec![PooledKind::Enhancer],
                 };
                 kinds.into_iter().map(|kind| Self {
@@ -73,7 +72,7 @@ impl PooledSet {
             .collect()
     }
 
-    /// The two subjects of a model at a level, by their indices; `other` is the model of the second side.
+    /// Indices of the two subjects that are compared at a level; `model` is the model of the first side, `other` that of the second.
     fn sides(
         &self,
         grid: &Grid<'_>,
@@ -81,12 +80,13 @@ impl PooledSet {
         other: &str,
         level: AxisLevel,
     ) -> Option<(usize, usize)> {
-        let seeing =
-            |level, variant, enhancer| ModelInCondition::seeing(model, level, variant, enhancer);
-        let first = seeing(level, &self.variant, self.enhancer.as_ref());
+        let with_images = |level, variant, enhancer| {
+            ModelInCondition::with_images(model, level, variant, enhancer)
+        };
+        let first = with_images(level, &self.variant, self.enhancer.as_ref());
         let second = match self.kind {
             PooledKind::Darkness | PooledKind::Hallucination(_) => {
-                seeing(AxisLevel::L0, &self.variant, None)
+                with_images(AxisLevel::L0, &self.variant, None)
             }
             PooledKind::Noise => {
                 let base = Variant {
@@ -95,15 +95,15 @@ impl PooledSet {
                     pair: None,
                     group: self.variant.group.clone(),
                 };
-                seeing(level, &base, None)
+                with_images(level, &base, None)
             }
-            PooledKind::Enhancer => seeing(level, &self.variant, None),
+            PooledKind::Enhancer => with_images(level, &self.variant, None),
             PooledKind::Blind => ModelInCondition::new(other, None),
         };
-        Some((grid.find(&first)?, grid.stand_in(&second)?))
+        Some((grid.find(&first)?, grid.find_up_to_group(&second)?))
     }
 
-    /// The levels of the first side, sorted.
+    /// Levels of the first side, sorted.
     fn levels(&self, grid: &Grid<'_>) -> BTreeSet<AxisLevel> {
         grid.subjects
             .iter()
@@ -116,8 +116,7 @@ impl PooledSet {
             .collect()
     }
 
-    /// The models of each pair, first and second side, among those of the pool that have both sides at some level. Those that answered
-    /// less than others stand apart.
+    /// Models of the set, as pairs of first and second side. Models that answered fewer items than others are listed separately.
     fn models<'g>(&self, grid: &'g Grid<'_>, levels: &BTreeSet<AxisLevel>) -> SetModels<'g> {
         let all = self.asked_models(grid, levels);
         let coverages: Vec<Coverage> = all
@@ -137,58 +136,61 @@ impl PooledSet {
         for (pair, coverage) in all.into_iter().zip(&coverages) {
             let lacking = coverage.lacking(most);
             if lacking.is_empty() {
-                let levels = coverage.levels();
-                let more: Vec<AxisLevel> = levels
+                let more: Vec<AxisLevel> = coverage
+                    .levels()
                     .filter(|level| !most.levels().any(|known| known == *level))
                     .collect();
                 if !more.is_empty() {
-                    models.more.push((pair[0], more));
+                    models.extra_levels.push((pair[0], more));
                 }
                 models.pooled.push(pair);
             } else {
-                models.apart.push((pair[0], lacking));
+                models.left_out.push((pair[0], lacking));
             }
         }
         models
     }
 
-    /// The models of each pair that were asked on both sides at some level.
+    /// Models that were asked on both sides at some level, as pairs of first and second side.
     ///
-    /// Without images, models are compared with their own replies; only if none of them was asked so, each is compared with
-    /// every model without images.
+    /// A model is compared with its own replies without images. Only if no model was asked without images, each is compared with every
+    /// blind model.
     fn asked_models<'g>(
         &self,
         grid: &'g Grid<'_>,
         levels: &BTreeSet<AxisLevel>,
     ) -> Vec<[&'g str; 2]> {
         let pool = pool(grid);
-        let own = pool.iter().map(|model| [*model, *model]);
-        let asked = |pair: &[&str; 2]| {
+        let is_asked = |pair: &[&str; 2]| {
             levels
                 .iter()
                 .any(|level| self.sides(grid, pair[0], pair[1], *level).is_some())
         };
-        let own: Vec<[&str; 2]> = own.filter(asked).collect();
+        let own: Vec<[&str; 2]> = pool
+            .iter()
+            .map(|model| [*model, *model])
+            .filter(is_asked)
+            .collect();
         if self.kind != PooledKind::Blind || !own.is_empty() {
             return own;
         }
         let blind = models(grid, View::Blind);
         pool.iter()
             .flat_map(|model| blind.iter().map(|other| [*model, *other]))
-            .filter(asked)
+            .filter(is_asked)
             .collect()
     }
 }
 
-/// The models of a set.
+/// Models of a set.
 #[derive(Debug, Default)]
 struct SetModels<'g> {
-    /// The models of each pair, first and second side.
+    /// Pooled models, as pairs of first and second side.
     pooled: Vec<[&'g str; 2]>,
-    /// The models that answered too little, with the levels and the numbers of items of [`Coverage::lacking`].
-    apart: Vec<(&'g str, Lacking)>,
-    /// The pooled models that were asked at more levels than the others, with these levels.
-    more: Vec<(&'g str, Vec<AxisLevel>)>,
+    /// Models that answered too few items, with the levels and the numbers of items of [`Coverage::lacking`].
+    left_out: Vec<(&'g str, Lacking)>,
+    /// Pooled models that were asked at more levels than the others, with these levels.
+    extra_levels: Vec<(&'g str, Vec<AxisLevel>)>,
 }
 
 /// Replies of all models to one item on both sides.
@@ -203,16 +205,16 @@ struct PooledItem {
 /// Numbers of replies of all models to one item on one side.
 #[derive(Debug, Clone, Copy, Default)]
 struct SideCounts {
-    /// Replies that are counted in the strict parsing: right ones, or false answers.
+    /// Counted replies in the strict parsing: right replies, or false answers.
     strict: u32,
-    /// The same in the lenient parsing.
+    /// Counted replies in the lenient parsing.
     lenient: u32,
-    /// Replies that the strict parsing reads.
+    /// Replies in which the strict parsing finds a choice.
     read: u32,
 }
 
 impl SideCounts {
-    fn plus(self, other: Self) -> Self {
+    fn add(self, other: Self) -> Self {
         Self {
             strict: self.strict + other.strict,
             lenient: self.lenient + other.lenient,
@@ -221,7 +223,7 @@ impl SideCounts {
     }
 }
 
-/// All pooled findings, ordered by kind, variant, enhancer, family and level; those over several levels stand behind.
+/// Returns all pooled findings of single levels, and those averaged over levels, both ordered by kind, variant, enhancer, family and level.
 #[must_use]
 pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
     let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
@@ -234,8 +236,8 @@ pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
         .partition(|finding| finding.mean_over.is_empty())
 }
 
-/// The findings of a set over its darker levels together, and over its lighter ones, if it has several of them. What grows with the
-/// level has no mean over the lighter ones.
+/// Computes the findings of a set averaged over its darker levels, and over its lighter levels, if it has several of them. An effect that
+/// grows with the level is not averaged over the lighter levels.
 fn averaged(
     grid: &Grid<'_>,
     set: &PooledSet,
@@ -246,41 +248,41 @@ fn averaged(
         return Vec::new();
     }
     let halves = [true, false].map(|severe| {
-        let own: Vec<&(AxisLevel, Vec<PooledItem>)> = levels
+        let half: Vec<&(AxisLevel, Vec<PooledItem>)> = levels
             .iter()
             .filter(|(level, _)| is_severe(*level, set.variant.kind) == severe)
             .collect();
         let is_tested = severe || !set.kind.grows_with_the_level();
-        if own.len() < 2 || !is_tested {
+        if half.len() < 2 || !is_tested {
             return None;
         }
-        let mean_over: Vec<AxisLevel> = own.iter().map(|(level, _)| *level).collect();
+        let mean_over: Vec<AxisLevel> = half.iter().map(|(level, _)| *level).collect();
         let mut sums = BTreeMap::<usize, Option<[SideCounts; 2]>>::new();
-        for item in own.iter().flat_map(|(_, items)| items) {
+        for item in half.iter().flat_map(|(_, items)| items) {
             let sum = sums
                 .entry(item.index)
                 .or_insert_with(|| Some([SideCounts::default(); 2]));
             *sum = sum.zip(item.sides).map(|(sum, sides)| {
                 let [first, second] = sum;
-                [first.plus(sides[0]), second.plus(sides[1])]
+                [first.add(sides[0]), second.add(sides[1])]
             });
         }
-        // An item counts if it was answered at every level.
+        // Only items answered at every level count.
         let mut asked = BTreeMap::<usize, usize>::new();
-        for item in own.iter().flat_map(|(_, items)| items) {
+        for item in half.iter().flat_map(|(_, items)| items) {
             *asked.entry(item.index).or_default() += 1;
         }
         let items: Vec<PooledItem> = sums
             .into_iter()
             .map(|(index, sides)| PooledItem {
                 index,
-                sides: sides.filter(|_| asked[&index] == own.len()),
+                sides: sides.filter(|_| asked[&index] == half.len()),
             })
             .collect();
         let level = *mean_over.last()?;
         let pool = PoolOfLevels {
             models,
-            levels: own.len(),
+            levels: half.len(),
         };
         let found = finding(grid, set, pool, level, &items, None)?;
         Some(PooledFinding { mean_over, ..found })
@@ -292,14 +294,14 @@ fn averaged(
         .collect()
 }
 
-/// The models of a finding, and the number of levels over which it is a mean.
+/// Models of a finding, and the number of levels that it averages over.
 #[derive(Debug, Clone, Copy)]
 struct PoolOfLevels<'m> {
     models: &'m [[&'m str; 2]],
     levels: usize,
 }
 
-/// The findings of a set, with all families together and with each family.
+/// Computes the findings of a set, for all families together and for each family.
 fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
     let levels = set.levels(grid);
     let models = set.models(grid, &levels).pooled;
@@ -321,17 +323,19 @@ fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
     let mut findings: Vec<PooledFinding> = groups
         .into_iter()
         .flat_map(|family| {
-            let of_family = levels
-                .iter()
-                .filter_map(|(level, items)| finding(grid, set, pool, *level, items, family));
-            corrected(of_family.collect())
+            corrected(
+                levels
+                    .iter()
+                    .filter_map(|(level, items)| finding(grid, set, pool, *level, items, family))
+                    .collect(),
+            )
         })
         .collect();
     findings.extend(averaged(grid, set, &models, &levels));
     findings
 }
 
-/// The items that some model was asked on both sides; `None` if a model lacks a side.
+/// Items that some model was asked on both sides; `None` if a model lacks a side.
 fn items(
     grid: &Grid<'_>,
     set: &PooledSet,
@@ -369,7 +373,7 @@ fn items(
     Some(items.collect())
 }
 
-/// The finding of a level and a family, before correction; `None` if no item was answered by all models.
+/// Computes the finding of a level and a family, before correction; `None` if no item was answered by all models.
 fn finding(
     grid: &Grid<'_>,
     set: &PooledSet,
@@ -384,7 +388,7 @@ fn finding(
     for (item, sides) in items
         .iter()
         .map(|item| (&grid.items[item.index], item.sides))
-        .filter(|(item, _)| item.is_of(family))
+        .filter(|(item, _)| item.is_in_family(family))
     {
         match sides {
             Some(sides) => answered.push((item.cluster, sides)),
@@ -395,11 +399,11 @@ fn finding(
         return None;
     }
     let replies = (each * answered.len()) as f64;
-    let strict = parsed(grid, &answered, each, |side| side.strict);
+    let strict = difference(grid, &answered, each, |side| side.strict);
     let differ =
         |(_, sides): &(u32, [SideCounts; 2])| sides.iter().any(|side| side.strict != side.lenient);
     let lenient = if answered.iter().any(differ) {
-        parsed(grid, &answered, each, |side| side.lenient)
+        difference(grid, &answered, each, |side| side.lenient)
     } else {
         strict
     };
@@ -440,8 +444,9 @@ fn finding(
     })
 }
 
-/// The difference of the replies that `counted` counts, before correction; `each` is the number of replies to an item on each side.
-fn parsed(
+/// Computes the difference of the counted replies, before correction; `counted` gives their number, `each` is the number of replies to an
+/// item on each side.
+fn difference(
     grid: &Grid<'_>,
     answered: &[(u32, [SideCounts; 2])],
     each: usize,
@@ -474,7 +479,7 @@ fn parsed(
     }
 }
 
-/// The findings of one set with their verdicts, after Holm's correction.
+/// Fills in the verdicts of the findings of one set, after Holm's correction.
 fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
     let adjusted = |of: fn(&PooledFinding) -> f64| holm(&set.iter().map(of).collect::<Vec<_>>());
     let least = adjusted(|finding| finding.least_p);

@@ -1,11 +1,11 @@
-//! [`PooledKind`]: the comparison of a pooled finding, and the replies that it counts.
+//! Kinds of pooled findings: the compared sides and the counted replies, [`PooledKind`].
 
 use crate::answers::confusion::FalseAnswer;
 use crate::grid::GridItem;
 use darkqa_ground::types::Family;
 use darkqa_ground::types::degradations::Kind;
 
-/// The two sides of a pooled finding. On each, right replies count, unless a variant defines others.
+/// The two sides of a pooled finding. Right replies are counted unless a variant defines others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PooledKind {
     /// A degraded level against L0, without an enhancer.
@@ -21,7 +21,7 @@ pub enum PooledKind {
 }
 
 impl PooledKind {
-    /// The kinds for raw images of a kind of degradation; `None` is L0.
+    /// Kinds for raw images of a kind of degradation; `None` is L0.
     pub(super) fn for_raw(degradation: Option<Kind>) -> Vec<Self> {
         let Some(degradation) = degradation else {
             return vec![Self::Blind];
@@ -36,7 +36,7 @@ impl PooledKind {
         others.into_iter().chain(noise).collect()
     }
 
-    /// The name of the kind in CSV files.
+    /// Name of the kind in CSV files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -49,7 +49,7 @@ impl PooledKind {
         }
     }
 
-    /// The name of the kind for images of a kind of degradation: what costs accuracy there, if the kind is about that.
+    /// Name of the kind for images of a kind of degradation; for [`Self::Darkness`], the cause of the loss there.
     #[must_use]
     pub fn name_on(self, degradation: Option<Kind>) -> &'static str {
         match (self, degradation) {
@@ -58,7 +58,7 @@ impl PooledKind {
         }
     }
 
-    /// The only family that findings of this kind are about; `None` if they are about each and about all together.
+    /// The only family that findings of this kind are about; `None` if they are about each family and all together.
     #[must_use]
     pub fn only_family(self) -> Option<&'static Family> {
         match self {
@@ -67,8 +67,8 @@ impl PooledKind {
         }
     }
 
-    /// True if the effect is taken to grow with the level, so that the levels are tested from the darkest on: a loss in the dark, a fall
-    /// below the words alone, objects overlooked. Noise, enhancers and objects reported may do most at any level.
+    /// True if the effect is assumed to grow with the level, so that the darkest level is tested first: loss in the dark, accuracy below
+    /// the blind baseline, missed objects. The effects of noise and enhancers and false objects may be largest at any level.
     pub(crate) fn grows_with_the_level(self) -> bool {
         matches!(
             self,
@@ -76,12 +76,12 @@ impl PooledKind {
         )
     }
 
-    /// True if levels are also tested together: what darkness and noise cost, and what enhancers do.
+    /// True if levels are also tested together: for the costs of darkness and noise, and the effect of enhancers.
     pub(super) fn is_averaged(self) -> bool {
         matches!(self, Self::Darkness | Self::Noise | Self::Enhancer)
     }
 
-    /// Whether findings of this kind have this item.
+    /// True if findings of this kind include an item.
     pub(super) fn is_about(self, item: &GridItem<'_>) -> bool {
         match self {
             Self::Hallucination(answer) => answer.is_false_for(item),
@@ -89,7 +89,7 @@ impl PooledKind {
         }
     }
 
-    /// Whether a reading of a reply to an item is counted.
+    /// True if a parsed reply to an item is counted.
     pub(super) fn counts(self, item: &GridItem<'_>, chosen: Option<u8>) -> bool {
         match self {
             Self::Hallucination(answer) => answer.is_given(item, chosen),
@@ -97,7 +97,7 @@ impl PooledKind {
         }
     }
 
-    /// How much better the first side is, if it counts `difference` more replies than the second.
+    /// Gain of the first side over the second, given the difference of their counted replies.
     pub(super) fn gain(self, difference: f64) -> f64 {
         match self {
             Self::Hallucination(_) => -difference,

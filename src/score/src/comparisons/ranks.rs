@@ -1,18 +1,18 @@
-//! The rank of each model as a range: [`RankRange`].
+//! Ranks of models as ranges: [`RankRange`].
 
 use super::best::BestInTheDark;
 use crate::significance::Significance;
 
-/// The places that a model may have among all that were compared, first and last included.
+/// Possible ranks of a model among all compared models, from `first` to `last` inclusive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RankRange {
-    /// One more than the number of models that are shown to be better.
+    /// Number of models that are shown to be better, plus 1.
     pub first: usize,
-    /// The number of models less those that are shown to be worse.
+    /// Number of models that are not shown to be worse.
     pub last: usize,
 }
 
-/// Ranks of the models of a comparison by area, in its order. Models without a detected difference share places.
+/// Ranks of the models of a comparison, in its order. Models without a detected difference share ranks.
 pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
     best.models
         .iter()
@@ -96,7 +96,7 @@ mod tests {
                 .map(|rank| (rank.first, rank.last))
                 .collect::<Vec<_>>()
         };
-        // Nothing is shown, whether it could be or not.
+        // No difference is detected, whether or not the clusters allow it.
         let unshown = [("a", "b", NotShown), ("a", "c", TooFewClusters)];
         assert_eq!(ranges(&unshown), [(1, 4); 4]);
         // The first is shown to be better than all others, the last worse than the first alone.

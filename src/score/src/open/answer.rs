@@ -1,4 +1,4 @@
-//! One open answer and its outcome: [`ScoredAnswer`], [`AnswerOutcome`].
+//! Open answers and their outcomes: [`ScoredAnswer`], [`AnswerOutcome`].
 
 use crate::choice::llm_match::points;
 use crate::subject::ModelInCondition;
@@ -6,13 +6,13 @@ use crate::subject::ModelInCondition;
 /// Outcome of an open answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AnswerOutcome {
-    /// There is no answer yet, or the trial failed. Not scored.
+    /// The answer is missing so far, or the trial failed. Not scored.
     Missing,
     /// The answer is not judged yet. Not scored.
     Unjudged,
     /// The judge's reply has no mark. Not scored.
     Unmarked,
-    /// A null answer. It has 0 points without a judge.
+    /// A null answer, which gets 0 points without a judge.
     Null,
     /// The mark from the judge's reply, before it is clipped to 1 to 5.
     Marked(i64),
@@ -39,6 +39,6 @@ pub struct ScoredAnswer {
     pub question: usize,
     /// Outcome of the answer.
     pub outcome: AnswerOutcome,
-    /// Whether the protocol shortened the answer before it was judged.
+    /// True if the protocol shortened the answer before it was judged.
     pub cut: bool,
 }

@@ -1,4 +1,4 @@
-//! The score of a subject on a group of questions: [`OpenCell`].
+//! Score of a subject on a group of questions: [`OpenCell`].
 
 use std::collections::BTreeMap;
 
@@ -7,8 +7,8 @@ use super::group::Group;
 use crate::estimate::Estimate;
 use crate::subject::ModelInCondition;
 
-/// Maximum number of independent right-or-wrong replies that one mark may count for. A mark on a scale of five steps varies
-/// less than such a reply with the same mean, unless all marks are 1 or 5.
+/// Maximum number of independent binary replies that one mark may count as. A mark on a five-step scale varies less than a binary reply
+/// with the same mean, unless all marks are 1 or 5.
 const MAX_WEIGHT: f64 = 4.0;
 
 /// Score of a subject on a group of questions, with the counts behind it.
@@ -18,7 +18,7 @@ pub struct OpenCell {
     pub group: Group,
     /// Number of answers that the run asks for.
     pub planned: usize,
-    /// Number of answers that are not there yet or failed.
+    /// Number of missing answers and failed trials.
     pub missing: usize,
     /// Number of answers that are not judged yet.
     pub unjudged: usize,
@@ -40,7 +40,7 @@ impl OpenCell {
     }
 }
 
-/// The cell of a subject and a group; `cluster` returns the cluster of a question.
+/// Computes the cell of a subject and a group; `cluster` returns the cluster of a question.
 pub(super) fn cell(
     subject: &ModelInCondition,
     group: &Group,

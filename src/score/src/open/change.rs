@@ -1,4 +1,4 @@
-//! The difference of two scores: [`ScoreChange`].
+//! Difference of two scores: [`ScoreChange`].
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::estimate::Estimate;
 use crate::subject::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, View};
 
-/// The subject to which a score is compared.
+/// Subject that a score is compared with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Baseline {
     /// The same model on the clean frames.
@@ -28,25 +28,25 @@ pub struct ScoreChange {
     pub difference: Estimate,
 }
 
-/// The baselines of a subject; none for a subject without images.
+/// Baselines of a subject; empty for a subject without images.
 pub(super) fn baselines(subject: &ModelInCondition) -> Vec<(Baseline, ModelInCondition)> {
     let Some(level) = subject.level.filter(|_| subject.view == Some(View::Image)) else {
         return Vec::new();
     };
-    let seeing = |level, enhancer| {
-        ModelInCondition::seeing(&subject.model, level, &subject.variant, enhancer)
+    let with_images = |level, enhancer| {
+        ModelInCondition::with_images(&subject.model, level, &subject.variant, enhancer)
     };
     let is_clean = level == AxisLevel::L0 && subject.enhancer.is_none();
-    let clean = (!is_clean).then(|| (Baseline::Clean, seeing(AxisLevel::L0, None)));
+    let clean = (!is_clean).then(|| (Baseline::Clean, with_images(AxisLevel::L0, None)));
     let raw = subject
         .enhancer
         .is_some()
-        .then(|| (Baseline::Raw, seeing(level, None)));
+        .then(|| (Baseline::Raw, with_images(level, None)));
     clean.into_iter().chain(raw).collect()
 }
 
-/// Mean of the first answers minus mean of the second, on the questions for which both have a score. Several people's answers
-/// to one question count as their mean.
+/// Mean of the first answers minus mean of the second, on the questions for which both have a score. Several answers to one question, by
+/// different people, count as their mean.
 pub(super) fn change(
     first: &[&ScoredAnswer],
     second: &[&ScoredAnswer],

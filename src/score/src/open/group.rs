@@ -1,15 +1,15 @@
-//! Groups of questions that are scored together: [`Group`]. [`QuestionGroups`] holds the groups of one question.
+//! Groups of questions that are scored together ([`Group`]), and the groups of one question ([`QuestionGroups`]).
 
 use std::collections::BTreeSet;
 
-/// The walk, category and split of a question.
+/// Walk, category and split of a question.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct QuestionGroups {
-    /// Name of its walk.
+    /// Name of the walk.
     pub episode: String,
-    /// Name of its category.
+    /// Name of the category.
     pub category: String,
-    /// Name of its split.
+    /// Name of the split.
     pub split: String,
 }
 
@@ -25,8 +25,8 @@ pub enum Group {
 }
 
 impl Group {
-    /// Whether a question belongs to the group.
-    pub(super) fn has(&self, question: &QuestionGroups) -> bool {
+    /// True if a question belongs to the group.
+    pub(super) fn contains(&self, question: &QuestionGroups) -> bool {
         match self {
             Self::All => true,
             Self::Split(split) => *split == question.split,
@@ -54,7 +54,7 @@ impl Group {
     }
 }
 
-/// The groups to score: all questions, then splits and categories if there are several.
+/// Groups to score: all questions, then each split and each category if there are several.
 pub(super) fn groups(questions: &[QuestionGroups]) -> Vec<Group> {
     let splits: BTreeSet<&String> = questions.iter().map(|question| &question.split).collect();
     let categories: BTreeSet<&String> = questions

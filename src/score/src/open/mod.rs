@@ -1,7 +1,7 @@
 //! Scores of open answers from the marks of a judge: [`OpenSummary`].
 //!
 //! A score is 100 · mean((clip(mark, 1, 5) − 1) / 4) (Majumdar et al. 2024, CVPR, section 4.2). Questions about one walk share
-//! its frames, so the walks are the clusters. If there is only one walk, the questions are.
+//! its frames, so the walks are the clusters. With a single walk, the questions are the clusters.
 
 mod answer;
 mod cell;
@@ -68,13 +68,13 @@ impl OpenSummary {
     }
 }
 
-/// Scores of the answers; `questions` holds the groups of each question.
+/// Computes the scores of the answers; `questions` lists the groups of each question.
 #[must_use]
 pub fn open_summary(answers: &[ScoredAnswer], questions: &[QuestionGroups]) -> OpenSummary {
     open_summary_listed(answers, questions, &ModelListing::default())
 }
 
-/// The same scores with the models as listed.
+/// Computes the scores like [`open_summary`], with the models in the order of `listing`.
 #[must_use]
 pub fn open_summary_listed(
     answers: &[ScoredAnswer],
@@ -109,7 +109,7 @@ pub fn open_summary_listed(
         for group in &groups {
             let in_group: Vec<&ScoredAnswer> = answers
                 .iter()
-                .filter(|answer| group.has(&questions[answer.question]))
+                .filter(|answer| group.contains(&questions[answer.question]))
                 .copied()
                 .collect();
             cells.push(cell(subject, group, &in_group, cluster));
@@ -122,7 +122,7 @@ pub fn open_summary_listed(
                 continue;
             };
             for group in &groups {
-                let in_group = |question: usize| group.has(&questions[question]);
+                let in_group = |question: usize| group.contains(&questions[question]);
                 let difference = change(answers, baseline_answers, in_group, cluster);
                 changes.extend(difference.map(|difference| ScoreChange {
                     subject: (*subject).clone(),

@@ -1,4 +1,4 @@
-//! Whether images that are closer to their clean frames get more right answers: [`FidelityFindings`].
+//! Relation between the fidelity of images and right answers: [`FidelityFindings`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -13,20 +13,20 @@ use darkqa_statistics::auc::{Auc, PairCounts, RankedReply};
 
 /// Relation between the similarity of images to their clean frames and the answers.
 ///
-/// Within a condition, replies are compared of the same model and family alone: pairs over conditions would only show that
-/// darker is worse. Models are pooled; built-in reference models are left out if there are others, and never mixed.
+/// Within a condition, only replies of the same model and family are compared: pairs across conditions would only show that darkness costs
+/// accuracy. Models are pooled; built-in reference models are left out if there are others, and never pooled with each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FidelityFindings {
-    /// The models whose replies are counted.
+    /// Models whose replies are counted.
     pub models: Vec<String>,
     /// One row for each condition with measured images.
     pub conditions: Vec<ConditionFidelity>,
-    /// How well PSNR and SSIM tell right from wrong answers within conditions, over all of these.
+    /// AUC of PSNR and of SSIM for right against wrong answers within conditions, over all conditions.
     pub within: [Option<Auc>; 2],
-    /// p-value of the first of these after the correction over all tests that sentences rest on.
+    /// p-value of the AUC of PSNR after the correction over all tests behind sentences.
     pub p_report: Option<f64>,
-    /// Spearman's rank correlation of mean accuracy with mean PSNR and with mean SSIM, over the conditions. A description without
-    /// a test; `None` with fewer than three conditions.
+    /// Spearman's rank correlation of mean accuracy with mean PSNR and with mean SSIM, over the conditions; descriptive, without a test.
+    /// `None` with fewer than three conditions.
     pub between: [Option<f64>; 2],
 }
 
@@ -39,13 +39,13 @@ pub struct ConditionFidelity {
     pub enhancer: Option<EnhancerName>,
     /// Number of different images.
     pub images: usize,
-    /// Mean PSNR in dB and mean SSIM over the images; `None` if no image has a finite one.
+    /// Mean PSNR in dB and mean SSIM over the images; `None` if no image has a finite value.
     pub means: [Option<f64>; 2],
     /// Share of right replies.
     pub accuracy: f64,
     /// Number of replies.
     pub replies: usize,
-    /// How well PSNR and SSIM tell right from wrong answers; `None` if that cannot be known from so few replies.
+    /// AUC of PSNR and of SSIM for right against wrong answers; `None` with too few replies.
     pub predicts: [Option<Prediction>; 2],
 }
 
@@ -55,22 +55,22 @@ pub struct Prediction {
     pub auc: Auc,
     /// p-value after Holm's correction over all conditions.
     pub holm: f64,
-    /// `Better` if a higher fidelity goes with right answers, `Worse` if with wrong ones.
+    /// `Better` if higher fidelity is associated with right answers, `Worse` if with wrong answers.
     pub significance: Significance,
 }
 
 /// PSNR and SSIM of images.
 type Measured<'a> = HashMap<ImageKey<'a>, [Option<f64>; 2]>;
 
-/// A frame and the digest of an image of it: two frames may have the same image, for example a black one, but not the same clean
-/// frame.
+/// A frame and the digest of an image of it. Both are needed, because two frames may have the same image, for example a black one, but
+/// different clean frames.
 type ImageKey<'a> = (&'a FrameId, Digest);
 
 /// A condition of the trials with its subjects, one for each model.
 type ConditionKey<'a> = (AxisLevel, &'a Variant, Option<&'a EnhancerName>);
 
 impl FidelityFindings {
-    /// The findings for the images that were measured; `None` if no reply is about one of these.
+    /// Computes the findings for the measured images; `None` if no reply is about a measured image.
     #[must_use]
     pub fn new<'a>(grid: &Grid<'a>, measured: &'a [ImageFidelity]) -> Option<Self> {
         let measured: Measured<'_> = measured
@@ -85,14 +85,14 @@ impl FidelityFindings {
         if measured.is_empty() {
             return None;
         }
-        let seeing = grid
-            .subjects
-            .iter()
-            .filter(|subject| subject.view == Some(View::Image));
-        let models = grid
-            .listing
-            .without_people(seeing.map(|subject| &*subject.model));
-        let pool = pooled_models(models);
+        let pool = pooled_models(
+            grid.listing.without_people(
+                grid.subjects
+                    .iter()
+                    .filter(|subject| subject.view == Some(View::Image))
+                    .map(|subject| &*subject.model),
+            ),
+        );
         let mut conditions = BTreeMap::<ConditionKey<'_>, Vec<usize>>::new();
         let mut models = BTreeSet::new();
         for (index, subject) in grid.subjects.iter().enumerate() {
@@ -128,7 +128,7 @@ impl FidelityFindings {
         })
     }
 
-    /// The row of a condition.
+    /// Row of a condition.
     #[must_use]
     pub fn condition(&self, subject: &ModelInCondition) -> Option<&ConditionFidelity> {
         self.conditions.iter().find(|row| {
@@ -192,7 +192,7 @@ impl<'a> ConditionSums<'a> {
         sums
     }
 
-    /// The row of the condition, before correction; `None` without replies.
+    /// Computes the row of the condition, before correction; `None` without replies.
     fn row(&self, (level, variant, enhancer): ConditionKey<'_>) -> Option<ConditionFidelity> {
         if self.replies == 0 {
             return None;
@@ -218,7 +218,7 @@ impl<'a> ConditionSums<'a> {
     }
 }
 
-/// Mean of the finite numbers, summed in increasing order, so that it does not depend on theirs; `None` without any.
+/// Mean of the finite numbers, summed in increasing order, so that it does not depend on their order; `None` without finite numbers.
 fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     let mut finite: Vec<f64> = numbers.filter(|number| number.is_finite()).collect();
     finite.sort_by(f64::total_cmp);
@@ -244,8 +244,8 @@ fn correct(rows: &mut [ConditionFidelity]) {
     }
 }
 
-/// Spearman's rank correlation of mean accuracy and mean fidelity over the conditions; `None` with fewer than three, or if one of
-/// these is the same everywhere.
+/// Spearman's rank correlation of mean accuracy and mean fidelity over the conditions; `None` with fewer than three conditions, or if one
+/// of the two is constant.
 fn rank_correlation(rows: &[ConditionFidelity], index: usize) -> Option<f64> {
     let (fidelity, accuracy): (Vec<f64>, Vec<f64>) = rows
         .iter()

@@ -1,4 +1,4 @@
-//! Photographs in the dark and the fidelity of images.
+//! Dark photographs, and the fidelity of images.
 
 mod fidelity;
 pub mod pair_darkness;

@@ -1,4 +1,4 @@
-//! How dark the photographs of a set are beside its frames: [`PairDarkness`].
+//! Exposure drop of dark photographs relative to their frames: [`PairDarkness`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,10 +6,10 @@ use super::realism::quantile::quantile;
 use crate::grid::Grid;
 use darkqa_ground::types::{FrameId, PairFacts, PhotoName};
 
-/// Difference in EV between the ratio of means and that of medians above which a pair is not one exposure apart; chosen.
-const ONE_EXPOSURE: f64 = 0.5;
+/// Maximum difference in EV between the drops by mean and by median for a pair that differs in exposure only (chosen).
+const MAX_MEAN_MEDIAN_GAP: f64 = 0.5;
 
-/// How dark the photographs of the frames are that a subject was shown, or that its images were made as dark as.
+/// Darkness of the photographs that a subject was shown, or that its synthetic images were matched to, by frame.
 #[must_use]
 pub fn pair_facts<'g>(grid: &Grid<'g>, subject: usize) -> BTreeMap<&'g FrameId, PairFacts> {
     (0..grid.items.len())
@@ -21,7 +21,7 @@ pub fn pair_facts<'g>(grid: &Grid<'g>, subject: usize) -> BTreeMap<&'g FrameId, 
         .collect()
 }
 
-/// How dark all photographs of a grid are, by name.
+/// Darkness of all photographs of a grid, by name.
 #[must_use]
 pub fn from_grid(grid: &Grid<'_>) -> Vec<PairDarkness> {
     let named: Vec<(&PhotoName, usize)> = grid
@@ -34,39 +34,41 @@ pub fn from_grid(grid: &Grid<'_>) -> Vec<PairDarkness> {
     names
         .into_iter()
         .filter_map(|name| {
-            let of_name = named.iter().filter(|(of, _)| *of == name);
-            let mut facts = BTreeMap::new();
-            of_name.for_each(|(_, subject)| facts.extend(pair_facts(grid, *subject)));
+            let facts: BTreeMap<_, _> = named
+                .iter()
+                .filter(|(other, _)| *other == name)
+                .flat_map(|(_, subject)| pair_facts(grid, *subject))
+                .collect();
             PairDarkness::new(name, &facts.into_values().collect::<Vec<_>>())
         })
         .collect()
 }
 
-/// How dark the photographs of one name are beside their frames.
+/// Exposure drop of the photographs of one name relative to their frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairDarkness {
-    /// The name of the photographs.
+    /// Name of the photographs.
     pub name: PhotoName,
-    /// Number of frames whose photograph is known to be so much darker.
+    /// Number of frames with a known drop.
     pub frames: usize,
-    /// Number of frames whose photograph, or which themselves, are black, so that nothing is known.
+    /// Number of frames with an unknown drop, because the frame or its photograph is black.
     pub unknown: usize,
     /// Lower quartile, median and upper quartile of the drop in EV.
     pub ev: [f64; 3],
-    /// Median drop by which synthesis is as dark: the number to hold against levels.
+    /// Median of the drops that make synthetic images equally dark, in EV; comparable with levels.
     pub synthesis: f64,
-    /// Number of frames whose drop the data state.
+    /// Number of frames whose drop is stated by the data set.
     pub stated: usize,
-    /// Whether the median is measured above what can be: it may be larger.
+    /// True if the median is measured beyond the measurable range, so that the true drop may be larger.
     pub is_lower_bound: bool,
     /// Number of frames that are not brighter than their photograph.
     pub brighter: usize,
-    /// Medians over the frames of the drop by means and of that by the median of pixels; `None` if too few are above black.
+    /// Medians over the frames of the drop by the mean and of the drop by the median of pixels; `None` if they cannot be measured.
     pub mean_and_median: Option<[f64; 2]>,
 }
 
 impl PairDarkness {
-    /// Summary of the photographs of one name, one of each frame; `None` if the darkness of none is known.
+    /// Summarizes the photographs of one name, one for each frame; `None` if no drop is known.
     #[must_use]
     pub fn new(name: &PhotoName, facts: &[PairFacts]) -> Option<Self> {
         let sorted = |of: fn(&PairFacts) -> Option<f64>| {
@@ -94,14 +96,14 @@ impl PairDarkness {
         })
     }
 
-    /// The median drop, as `3.6 EV` or `≥ 6.8 EV`.
+    /// Median drop, such as `3.6 EV` or `≥ 6.8 EV`.
     #[must_use]
     pub fn short(&self) -> String {
         let least = if self.is_lower_bound { "≥ " } else { "" };
         format!("{least}{:.1} EV", self.ev[1])
     }
 
-    /// The drop with its quartiles, as `3.6 EV (quartiles 3.5–3.7), as measured`.
+    /// Drop with its quartiles, such as `3.6 EV (quartiles 3.5–3.7), as measured`.
     #[must_use]
     pub fn long(&self) -> String {
         let source = match self.stated {
@@ -113,9 +115,9 @@ impl PairDarkness {
         format!("{} (quartiles {low:.2}–{high:.2}), {source}", self.short())
     }
 
-    /// Warnings about unusual pairs, as full sentences; empty if there are none.
+    /// Warnings about unusual pairs, as full sentences.
     #[must_use]
-    pub fn oddities(&self) -> Vec<String> {
+    pub fn warnings(&self) -> Vec<String> {
         let name = &self.name;
         let mut all = Vec::new();
         if self.ev[1] < 0.0 {
@@ -130,7 +132,7 @@ impl PairDarkness {
             ));
         }
         if let Some([mean, median]) = self.mean_and_median
-            && (mean - median).abs() > ONE_EXPOSURE
+            && (mean - median).abs() > MAX_MEAN_MEDIAN_GAP
         {
             all.push(format!(
                 "The photographs {name} are {mean:.2} EV darker than their frames by the mean and {median:.2} EV by the median of \
@@ -174,7 +176,7 @@ mod tests {
         let pairs = pair(&[(None, 3.5, 3.6), (None, 3.6, 3.6), (None, 3.7, 3.7)]);
         assert_eq!(pairs.short(), "3.6 EV");
         assert_eq!(pairs.long(), "3.6 EV (quartiles 3.55–3.65), as measured");
-        assert!(pairs.oddities().is_empty(), "{:?}", pairs.oddities());
+        assert!(pairs.warnings().is_empty(), "{:?}", pairs.warnings());
     }
 
     #[test]
@@ -184,24 +186,24 @@ mod tests {
             pairs.long(),
             "8.0 EV (quartiles 8.00–8.00), as the data state"
         );
-        assert!(pairs.oddities().is_empty());
+        assert!(pairs.warnings().is_empty());
         let measured = pair(&[(None, 6.9, 6.9)]);
         assert_eq!(measured.short(), "≥ 6.9 EV");
-        assert!(measured.oddities()[0].contains("lower bound"));
+        assert!(measured.warnings()[0].contains("lower bound"));
     }
 
     #[test]
     fn swapped_pairs_and_other_tones_are_told() {
         let swapped = pair(&[(None, -3.0, -3.1)]);
         assert!(
-            swapped.oddities()[0].contains("swapped"),
+            swapped.warnings()[0].contains("swapped"),
             "{:?}",
-            swapped.oddities()
+            swapped.warnings()
         );
         let some = pair(&[(None, 3.0, 3.0), (None, 3.0, 3.1), (None, 0.0, 0.0)]);
-        assert!(some.oddities()[0].starts_with("1 of 3 photographs dark are not darker"));
+        assert!(some.warnings()[0].starts_with("1 of 3 photographs dark are not darker"));
         let tone = pair(&[(None, 2.17, 3.33)]);
-        assert!(tone.oddities()[0].contains("not one exposure apart"));
+        assert!(tone.warnings()[0].contains("not one exposure apart"));
     }
 
     #[test]
@@ -215,7 +217,7 @@ mod tests {
         ];
         let pairs = PairDarkness::new(&PhotoName::numbered(0), &facts).unwrap();
         assert_eq!((pairs.frames, pairs.unknown), (1, 1));
-        assert!(pairs.oddities()[0].contains("are black"));
+        assert!(pairs.warnings()[0].contains("are black"));
         assert_eq!(
             PairDarkness::new(&PhotoName::numbered(0), &facts[..1]),
             None

@@ -1,22 +1,22 @@
-//! The light in which the photographs of a set were taken, for a report: [`PhotographedSet`].
+//! Light in which the photographs of a data set were taken, for reports: [`PhotographedSet`].
 
 use darkqa_ground::types::SetLight;
 
-/// Mean linear brightness from which photographs are as bright as those in the light. Chosen: a well-lit room has about 0.15, and is at
-/// 0.04 two stops darker.
+/// Minimum mean linear brightness of photographs of well-lit scenes (chosen: a well-lit room has about 0.15, and 0.04 when two stops
+/// darker).
 const BRIGHT: f64 = 0.08;
 
-/// The light in which the photographs of a set were taken.
+/// Light in which the photographs of a data set were taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PhotographedSet {
-    /// Whether they were taken in the dark.
+    /// Whether the photographs were taken in the dark.
     pub light: SetLight,
-    /// Mean linear luminance of a sample of the photographs, from 0 to 1, and the size of the sample; `None` if it was not measured.
+    /// Mean linear luminance of a sample of the photographs, from 0 to 1, and size of the sample; `None` if it was not measured.
     pub brightness: Option<(f64, usize)>,
 }
 
 impl PhotographedSet {
-    /// Notice to readers about a set in the dark; `None` for one in the light.
+    /// Notice to readers about a data set taken in the dark; `None` for other data sets.
     pub fn notice(self) -> Option<String> {
         if self.light == SetLight::Lit {
             return None;

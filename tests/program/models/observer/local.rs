@@ -149,7 +149,7 @@ impl Elsewhere {
             .map(|(place, asked)| {
                 let changed = change.apply(&asked.image, place as u64);
                 let untouched = untouched(asked, &changed);
-                let looks = [&asked.image, &changed].map(|image| asked.known.look(image));
+                let looks = [&asked.image, &changed].map(|image| asked.known.observe(image));
                 let about: Vec<&Question> = asked
                     .questions
                     .iter()
@@ -160,7 +160,10 @@ impl Elsewhere {
                     [scores.sum(), about.len() as f64]
                 });
                 let seen = looks.map(|seen: Observation| {
-                    untouched.iter().filter(|thing| seen.sees(**thing)).count()
+                    untouched
+                        .iter()
+                        .filter(|thing| seen.is_seen(**thing))
+                        .count()
                 });
                 (sums, seen)
             })

@@ -124,7 +124,7 @@ impl Set {
         answer: impl Fn(&Asked, &Observation, &Question) -> Option<usize> + Sync,
     ) -> Outcome {
         self.judged_by(
-            |place, asked| asked.known.look(&image(place, asked)),
+            |place, asked| asked.known.observe(&image(place, asked)),
             answer,
         )
     }
@@ -163,14 +163,17 @@ impl Set {
             })
             .collect();
         let count = |of: fn(&Observation) -> usize| looks.iter().map(|(_, seen)| of(seen)).sum();
-        let explained: f64 = looks.iter().map(|(_, seen)| seen.explained()).sum();
+        let explained: f64 = looks
+            .iter()
+            .map(|(_, seen)| seen.explained_variance())
+            .sum();
         Outcome {
             score: interval(&sums, n),
             chance: all().map(|(_, guess, _)| guess).sum::<f64>() / n as f64,
             evidence: all().map(|(.., evidence)| evidence).sum(),
-            things: count(Observation::things),
-            seen: count(Observation::seen),
-            detected: count(Observation::detected),
+            things: count(Observation::thing_count),
+            seen: count(Observation::seen_count),
+            detected: count(Observation::detected_count),
             explained: explained / looks.len() as f64,
         }
     }
@@ -182,7 +185,7 @@ impl Set {
         image: impl Fn(usize, &Asked) -> Rgb + Sync,
     ) -> Outcome {
         self.judged_by(
-            |place, asked| asked.known.look_with(&image(place, asked), share),
+            |place, asked| asked.known.observe_with(&image(place, asked), share),
             |_, seen, question| seen.answer(question, &self.rules, &self.palette),
         )
     }
@@ -207,7 +210,7 @@ impl Set {
             .enumerate()
             .map(|(place, asked)| {
                 let looks = [before(place, asked), after(place, asked)];
-                let [before, after] = looks.map(|image| asked.known.look(&image));
+                let [before, after] = looks.map(|image| asked.known.observe(&image));
                 let questions = asked.questions.iter();
                 let differences = questions
                     .map(|question| self.score(&after, question) - self.score(&before, question));

@@ -37,9 +37,12 @@ fn spoiled(set: &Set, place: usize, asked: &Asked, control: Control) -> Rgb {
     let key = Digest::from_bytes(asked.id.0.as_bytes());
     match control {
         Control::OtherRoom => set.other(place).image.clone(),
-        control => {
-            darkqa_questions::observer::controls::spoiled(control, &asked.image, &asked.known, &key)
-        }
+        control => darkqa_questions::observer::controls::control_image(
+            control,
+            &asked.image,
+            &asked.known,
+            &key,
+        ),
     }
 }
 
@@ -68,7 +71,7 @@ fn an_observer_that_trusts_the_labels_is_found_out() {
             |place, asked| spoiled(set, place, asked, control),
             |asked, _, question| {
                 // Any contrast at all: the untouched frame answers.
-                let seen = asked.known.look(&asked.image);
+                let seen = asked.known.observe(&asked.image);
                 seen.answer(question, &set.rules, &set.palette)
             },
         )
@@ -191,7 +194,7 @@ fn a_repainted_thing_loses_its_colour() {
         let answer = |image: &Rgb| {
             asked
                 .known
-                .look(image)
+                .observe(image)
                 .answer(colored, &set.rules, &set.palette)
         };
         Some([&asked.image, &image].map(|image| answer(image) == colored.choices.truth()))
@@ -207,8 +210,12 @@ fn a_repainted_thing_loses_its_colour() {
 fn an_image_of_any_size_is_looked_at() {
     let asked = &SMALL.frames[0];
     for [height, width] in [[1, 1], [3, 2], [120, 160], [240, 320], [50, 350]] {
-        let seen = asked.known.look(&Rgb::black(height, width));
-        assert_eq!((seen.seen(), seen.detected()), (0, 0), "{height} × {width}");
+        let seen = asked.known.observe(&Rgb::black(height, width));
+        assert_eq!(
+            (seen.seen_count(), seen.detected_count()),
+            (0, 0),
+            "{height} × {width}"
+        );
     }
     // A frame of twice the size, by repeated pixels, is the same frame.
     let mut large = Rgb::black(240, 320);
@@ -216,9 +223,12 @@ fn an_image_of_any_size_is_looked_at() {
         let from = (i / 320 / 2 * 160 + i % 320 / 2) * 3;
         pixel.copy_from_slice(&asked.image.samples()[from..from + 3]);
     }
-    let (own, twice) = (asked.known.look(&asked.image), asked.known.look(&large));
+    let (own, twice) = (
+        asked.known.observe(&asked.image),
+        asked.known.observe(&large),
+    );
     assert_eq!(
-        (own.seen(), own.explained()),
-        (twice.seen(), twice.explained())
+        (own.seen_count(), own.explained_variance()),
+        (twice.seen_count(), twice.explained_variance())
     );
 }

@@ -15,7 +15,7 @@ fn standings(finding: &FindingByReading) -> Vec<Option<Support>> {
     finding
         .effects
         .iter()
-        .map(|one| one.effect.map(|effect| effect.standing))
+        .map(|one| one.effect.map(|effect| effect.support))
         .collect()
 }
 

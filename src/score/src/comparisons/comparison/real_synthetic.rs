@@ -1,4 +1,4 @@
-//! The synthetic images with which photographs in the dark are compared: [`as_dark`].
+//! Synthetic images that dark photographs are compared with: [`equally_dark`].
 
 use std::collections::BTreeMap;
 
@@ -8,14 +8,13 @@ use crate::subject::ModelInCondition;
 use darkqa_ground::types::degradations::Axis;
 use darkqa_ground::types::{Variant, View};
 
-/// Distance in EV between a photograph and a level within which the two are compared; chosen: half the largest step of the paper's
-/// levels.
-const NEAR: f64 = 1.0;
+/// Maximum distance in EV between a photograph and a level that it is compared with (chosen: half of the largest step of the paper's
+/// levels).
+const MAX_DISTANCE_EV: f64 = 1.0;
 
-/// The subjects of the same model, raw or with the same enhancer, whose synthetic images are as dark as the photographs of a subject:
-/// those that are as dark frame by frame; without any, of each variant the level that is nearest to the median drop of the photographs,
-/// if one is near.
-pub(super) fn as_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
+/// Finds the subjects of the same model, raw or with the same enhancer, whose synthetic images are as dark as the photographs of a subject,
+/// preferably frame by frame; otherwise, for each variant, the level nearest to the median drop of the photographs, if one is near.
+pub(super) fn equally_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
     let subject = &grid.subjects[photographed];
     let facts = pair_facts(grid, photographed);
     let others: Vec<(usize, &ModelInCondition)> = grid
@@ -31,13 +30,13 @@ pub(super) fn as_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
         .collect();
     let is_match = |(index, other): &&(usize, &ModelInCondition)| {
         other.variant.pair.is_some() && other.variant.synthetic_kind().is_some() && {
-            // Images that are as dark as another photograph of the frames are not as dark as these.
-            let of = pair_facts(grid, *index);
-            let mut shared = of
+            // Images may be made as dark as another photograph of the same frames; these do not match.
+            let other_facts = pair_facts(grid, *index);
+            let shared: Vec<_> = other_facts
                 .iter()
-                .filter_map(|(frame, of)| Some((of, facts.get(frame)?)))
-                .peekable();
-            shared.peek().is_some() && shared.all(|(one, other)| one == other)
+                .filter_map(|(frame, other)| Some((other, facts.get(frame)?)))
+                .collect();
+            !shared.is_empty() && shared.iter().all(|(one, other)| one == other)
         }
     };
     let matches: Vec<usize> = others
@@ -62,7 +61,7 @@ pub(super) fn as_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
     };
     let mut nearest = BTreeMap::<&Variant, (f64, usize)>::new();
     for (index, other) in others {
-        if let Some(distance) = distance(other).filter(|distance| *distance <= NEAR) {
+        if let Some(distance) = distance(other).filter(|distance| *distance <= MAX_DISTANCE_EV) {
             let best = nearest.entry(&other.variant).or_insert((distance, index));
             if distance < best.0 {
                 *best = (distance, index);

@@ -8,69 +8,69 @@ use crate::significance::{Significance, SwapMethod};
 use darkqa_ground::types::degradations::Kind;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant};
 
-/// Difference of two conditions at one level, for all models of the pool together, in the strict parsing and the lenient one.
+/// Difference of two conditions at one level, pooled over models, in both parsings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PooledFinding {
-    /// The two sides, and the replies that count.
+    /// The two sides of the comparison, and the counted replies.
     pub kind: PooledKind,
-    /// Question family; `None` for all families together. Findings about false answers have [`Family::Presence`] alone.
+    /// Question family; `None` for all families together. Findings about false answers are only about [`Family::Presence`].
     pub family: Option<Family>,
     /// Kind of degradation of the first side, with its noise profile; [`Variant::NONE`] for L0 against no image.
     pub variant: Variant,
     /// Enhancer of the first side; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
-    /// Level of the first side; of a mean over several, the darkest one.
+    /// Level of the first side; the darkest level for a mean over several.
     pub level: AxisLevel,
     /// All levels of a mean over several, sorted; empty for one level.
     pub mean_over: Vec<AxisLevel>,
-    /// The models, sorted. All findings of one set (kind, variant and enhancer) have the same ones.
+    /// Models, sorted; the same for all findings of one set (kind, variant and enhancer).
     pub models: Vec<String>,
-    /// The models without images on the second side, sorted; empty if the finding is not about them. They are the same models
-    /// as `models` if these were asked without images too.
+    /// Models without images on the second side, sorted; empty for other kinds of findings. The same as `models` if these were also asked
+    /// without images.
     pub blind_models: Vec<String>,
-    /// The difference in the strict parsing, which is the headline.
+    /// Difference in the strict parsing, which is the main result.
     pub strict: PooledDifference,
-    /// The difference in the lenient parsing.
+    /// Difference in the lenient parsing.
     pub lenient: PooledDifference,
-    /// Share of the replies of each side that keep to the answer format: those that the strict parsing reads.
+    /// Share of the replies of each side that follow the answer format, so that the strict parsing finds a choice.
     pub format: [f64; 2],
-    /// Number of findings in its set.
+    /// Number of findings in the set.
     pub levels: usize,
     /// Number of items that every model answered on both sides.
     pub items: usize,
-    /// Number of items that some model was asked on both sides, but that are left out because a model has no reply.
+    /// Number of items that some model was asked on both sides, left out because a model has no reply.
     pub dropped: usize,
     /// Number of clusters of the items.
     pub clusters: usize,
     /// Smallest p-value that this number of clusters, c, allows: 2 / 2ᶜ.
     pub least_p: f64,
-    /// The smallest p-value after correction that the clusters allow; no verdict is possible if it is 0.05 or more.
+    /// Smallest corrected p-value that the clusters allow; no verdict is possible if it is 0.05 or more.
     pub least_holm: f64,
 }
 
 /// A pooled difference in one parsing of the replies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PooledDifference {
-    /// Share of the first side that is counted, accuracy or rate of false answers: mean over the items of the mean over the models.
+    /// Accuracy or rate of false answers of the first side: mean over the items of the mean over the models.
     pub first: f64,
-    /// The same share of the second side.
+    /// Accuracy or rate of false answers of the second side.
     pub second: f64,
-    /// The first share minus the second. Its `n` is the number of items.
+    /// `first` minus `second`. Its `n` is the number of items.
     pub difference: Estimate,
-    /// p-value of no difference, of all models at once: the larger one of Student's t and of swapping the two sides in whole clusters.
+    /// p-value of no difference, for all models at once: the larger one of Student's t and of swapping the two sides in whole clusters.
     pub p: f64,
     /// How the swaps were counted.
     pub p_by: SwapMethod,
     /// p-value after Holm's correction over the levels of its set: the same kind, variant, enhancer and family.
     pub holm: f64,
-    /// Result of the test after Holm's correction. A rate of false answers that is shown to grow is worse.
+    /// Result of the test after Holm's correction. A detected increase of false answers is `Worse`.
     pub verdict: Significance,
-    /// p-value after the correction over all tests that sentences rest on; `None` if no sentence is about the finding.
+    /// p-value after the correction over all tests behind sentences; `None` if no sentence is about the finding.
     pub p_report: Option<f64>,
 }
 
 impl PooledFinding {
-    /// The finding with the largest difference in either direction; of several, the first. `None` of none.
+    /// Returns the finding with the largest difference in either direction, the first of several; `None` without findings.
     #[must_use]
     pub fn largest<'f>(levels: &[&'f Self]) -> Option<&'f Self> {
         largest(levels, |finding| finding.strict.difference)
@@ -87,8 +87,8 @@ impl PooledFinding {
         Claim::new(parsed(&self.strict), parsed(&self.lenient))
     }
 
-    /// True if its level, or all levels of a mean, are in the darker part of the ladder: L4 (7.5 EV) and darker, of another kind of
-    /// degradation its fourth step and beyond. The paper's claims about enhancers divide L1–L3 and L4–L5 in the same way.
+    /// True if the level, or every level of a mean, is in the darker part of the ladder: L4 (7.5 EV) and darker, or for another kind of
+    /// degradation the fourth step and beyond. The paper's claims about enhancers divide L1–L3 and L4–L5 in the same way.
     #[must_use]
     pub fn is_severe(&self) -> bool {
         is_severe(self.level, self.variant.kind)
@@ -101,7 +101,7 @@ impl PooledFinding {
         }
     }
 
-    /// The difference in a parsing.
+    /// Difference in a parsing.
     #[must_use]
     pub fn parsed(&self, mode: ReadingMode) -> &PooledDifference {
         match mode {

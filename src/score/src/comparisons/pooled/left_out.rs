@@ -7,26 +7,26 @@ use crate::comparisons::pooled_kind::PooledKind;
 use crate::grid::Grid;
 use darkqa_ground::types::{AxisLevel, EnhancerName, Variant};
 
-/// Models that a set of findings leaves out, because they answered less than others at some levels; or levels that it leaves out, because
-/// only these models were asked there.
+/// Models that a set of findings leaves out because they answered fewer items than others at some levels, or levels that it leaves out
+/// because only these models were asked there.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ModelsLeftOut {
     pub kind: PooledKind,
     pub variant: Variant,
     pub enhancer: Option<EnhancerName>,
-    /// The models, sorted.
+    /// Models, sorted.
     pub models: Vec<String>,
-    /// The levels at which they answered less, sorted.
+    /// Levels at which the models answered fewer items than others, or the levels left out; sorted.
     pub levels: Vec<AxisLevel>,
     /// All levels of the findings, sorted.
     pub asked: Vec<AxisLevel>,
     /// Number of items of the findings at `levels`, and of those that each of the models answered.
     pub items: [usize; 2],
-    /// True if the models are in the findings, which leave out these levels of theirs.
+    /// True if the findings include the models, but leave out these levels.
     pub is_more: bool,
 }
 
-/// The models that the findings leave out, by set and by the levels that they lack.
+/// Returns the models that the findings leave out, by set and by the levels that they lack.
 #[must_use]
 pub(crate) fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
     let mut all = Vec::new();
@@ -44,11 +44,13 @@ pub(crate) fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
             })
             .collect();
         let mut groups = BTreeMap::<(Vec<AxisLevel>, [usize; 2]), BTreeSet<&str>>::new();
-        for (model, lacking) in models.apart {
+        for (model, lacking) in models.left_out {
             let sum = |side: usize| lacking.iter().map(|(_, items)| items[side]).sum();
             let levels = lacking.iter().map(|(level, _)| *level).collect();
-            let group = groups.entry((levels, [sum(0), sum(1)])).or_default();
-            group.insert(model);
+            groups
+                .entry((levels, [sum(0), sum(1)]))
+                .or_default()
+                .insert(model);
         }
         all.extend(
             groups
@@ -65,7 +67,7 @@ pub(crate) fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
                 }),
         );
         let mut more = BTreeMap::<Vec<AxisLevel>, BTreeSet<&str>>::new();
-        for (model, levels) in models.more {
+        for (model, levels) in models.extra_levels {
             more.entry(levels).or_default().insert(model);
         }
         all.extend(more.into_iter().map(|(levels, models)| ModelsLeftOut {

@@ -1,18 +1,18 @@
-//! [`BankIndex`]: the bank's question behind each question about an image.
+//! Mapping from questions about images to questions of the bank: [`BankIndex`].
 
 use std::collections::{BTreeSet, HashMap};
 
 use darkqa_ground::types::{QuestionId, RunQuestion};
 
-/// The questions of a bank by the questions about single images: two with the same text and the same choices are one.
+/// Questions of a bank. Questions about images with the same text and the same choices are the same question of the bank.
 pub(super) struct BankIndex<'a> {
     by_id: HashMap<&'a QuestionId, usize>,
-    /// A question about an image for each question of the bank.
+    /// One question about an image for each question of the bank.
     pub(super) examples: Vec<&'a RunQuestion>,
 }
 
 impl<'a> BankIndex<'a> {
-    /// The index of the questions of a run.
+    /// Indexes the questions of a run.
     pub(super) fn new(questions: &'a [RunQuestion]) -> Self {
         let mut numbers = HashMap::<(&str, BTreeSet<&str>), usize>::new();
         let (mut by_id, mut examples) = (HashMap::new(), Vec::new());
@@ -27,7 +27,7 @@ impl<'a> BankIndex<'a> {
         Self { by_id, examples }
     }
 
-    /// The number of the bank's question that a question about an image asks; `None` if the run does not store it.
+    /// Index of the question of the bank for a question about an image; `None` if the run does not store it.
     pub(super) fn position(&self, question: &QuestionId) -> Option<usize> {
         self.by_id.get(question).copied()
     }

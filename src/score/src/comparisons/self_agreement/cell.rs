@@ -1,4 +1,4 @@
-//! The agreement of one subject with its model's answers in the light: [`AgreementCell`].
+//! Agreement of one subject with the answers of its model at L0: [`AgreementCell`].
 
 use std::collections::BTreeSet;
 
@@ -6,7 +6,7 @@ use super::bank_index::BankIndex;
 use super::counts::BankCounts;
 use super::evidence::{Bounds, NoEvidence, evidence};
 use super::kappa::kappa;
-use super::light::{is_refused, is_way_out};
+use super::light::{is_cannot_tell, is_refused};
 use super::question_in_light::QuestionInLight;
 use crate::bootstrap::Resamples;
 use crate::choice::ReadingMode;
@@ -16,28 +16,28 @@ use crate::grid::{Grid, TrialResult};
 use crate::subject::ModelInCondition;
 use darkqa_ground::types::{AxisLevel, Family, View};
 
-/// Agreement of one subject on one family in one reading, and what keeps it honest.
+/// Agreement of one subject on one family in one parsing, with the numbers needed to interpret it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AgreementCell {
     pub subject: ModelInCondition,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// How the replies were read.
+    /// Parsing of the replies.
     pub mode: ReadingMode,
-    /// Share of the replies with the same answer as in the light, of the questions that have one there. A reply that cannot be read
-    /// does not agree. `None` without a reply.
+    /// Share of the replies with the same answer as at L0, over questions with an answer at L0. An unreadable reply counts as a
+    /// disagreement. `None` without a reply.
     pub agreement: Option<Estimate>,
-    /// The same without the questions that can tell nothing.
+    /// Agreement on the informative questions only.
     pub informative: Option<Estimate>,
     /// κ with the expected agreement by question; `None` if it is not defined.
     pub kappa: Option<Estimate>,
-    /// Mean entropy of the answers by question, 0 to 1: in the light, and in this condition.
+    /// Mean entropy of the answers by question, from 0 to 1: at L0, and in this condition.
     pub entropies: [Option<f64>; 2],
-    /// Share of the evidence that is left, or why it is not given; for conditions other than the floor and the ceiling.
+    /// Share of the evidence that is left, or the reason why it is not given; for conditions other than the floor and the ceiling.
     pub evidence: Option<Result<Estimate, NoEvidence>>,
-    /// Share of the replies in which no answer could be read.
+    /// Share of unreadable replies.
     pub unread: Option<Estimate>,
-    /// Number of replies that refuse.
+    /// Number of refusals.
     pub refused: usize,
     /// Number of trials without a reply. They are not counted.
     pub failed: usize,
@@ -48,9 +48,9 @@ pub struct AgreementCell {
 /// Role of a cell among those of its model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellRole {
-    /// The floor: no image was shown.
+    /// Floor: no image was shown.
     Floor,
-    /// The ceiling: the same images were shown again.
+    /// Ceiling: the same images were shown again.
     Ceiling,
     /// Other images were shown: darker, or enhanced.
     Other,
@@ -75,7 +75,7 @@ impl AgreementCell {
     }
 }
 
-/// The cells of a model's grid, whose truths are its answers in the light: by subject, then by family.
+/// Computes the cells of the grid of a model, scored against its answers at L0; ordered by subject, then by family.
 pub(super) fn cells(
     grid: &Grid<'_>,
     draws: &Resamples,
@@ -88,11 +88,15 @@ pub(super) fn cells(
         .filter(|question| question.is_informative())
         .map(|question| question.index)
         .collect();
-    let kept = grid.items.iter().map(|item| {
-        let question = bank.position(&item.asked.question);
-        question.is_some_and(|question| informative.contains(&question))
-    });
-    let restricted = grid.restricted(&kept.collect::<Vec<_>>());
+    let is_informative: Vec<bool> = grid
+        .items
+        .iter()
+        .map(|item| {
+            bank.position(&item.asked.question)
+                .is_some_and(|question| informative.contains(&question))
+        })
+        .collect();
+    let informative_grid = grid.select_items(&is_informative);
     let mut cells = Vec::new();
     for subject in 0..grid.subjects.len() {
         for family in grid.groups() {
@@ -104,8 +108,7 @@ pub(super) fn cells(
                 mode,
             };
             let mut cell = part.cell(bank, &counts);
-            let few = restricted.counts(subject, family, mode);
-            cell.informative = Estimate::clustered(&few);
+            cell.informative = Estimate::clustered(&informative_grid.counts(subject, family, mode));
             if cell.role() == CellRole::Other {
                 let bounds = Bounds::new(grid, &cell.subject, family, mode, draws);
                 let share = bounds.map(|bounds| evidence(&counts, &bounds, draws));
@@ -128,7 +131,7 @@ struct CellItems<'g, 'r> {
 }
 
 impl CellItems<'_, '_> {
-    /// The cell without what follows from other cells.
+    /// Computes the cell, except the fields that depend on other cells.
     fn cell(&self, bank: &BankIndex<'_>, counts: &[ClusterCount]) -> AgreementCell {
         let (grid, subject, mode) = (self.grid, self.subject, self.mode);
         let agreement = Estimate::clustered(counts);
@@ -151,8 +154,8 @@ impl CellItems<'_, '_> {
         }
     }
 
-    /// Share of the replies for which `holds` is true. It takes the answer, if one could be parsed, and the choices.
-    fn share(&self, holds: impl Fn(Option<&str>, &[String]) -> bool) -> Option<Estimate> {
+    /// Share of the replies for which `counts_reply` is true; it takes the parsed answer, if there is one, and the choices.
+    fn share(&self, counts_reply: impl Fn(Option<&str>, &[String]) -> bool) -> Option<Estimate> {
         let mut counts = vec![ClusterCount::default(); self.grid.clusters];
         for (item, result) in self.grid.family_items(self.subject, self.family) {
             let Some(reading) = result.reading(self.mode) else {
@@ -162,18 +165,23 @@ impl CellItems<'_, '_> {
             let answer = reading.and_then(|index| choices.get(usize::from(index)));
             let count = &mut counts[item.cluster as usize];
             count.replies += 1;
-            count.right += u32::from(holds(answer.map(String::as_str), choices));
+            count.right += u32::from(counts_reply(answer.map(String::as_str), choices));
         }
         Estimate::clustered(&counts)
     }
 
+    /// Share of the replies “cannot tell from the image”; `None` if the questions have no such choice.
     fn cannot_tell(&self) -> Option<Estimate> {
-        let mut items = self.grid.family_items(self.subject, self.family);
-        let has_way_out =
-            items.any(|(item, _)| item.asked.choices.iter().any(|choice| is_way_out(choice)));
-        has_way_out
-            .then(|| self.share(|answer, _| answer.is_some_and(is_way_out)))
-            .flatten()
+        let offers_cannot_tell = self
+            .grid
+            .family_items(self.subject, self.family)
+            .flat_map(|(item, _)| item.asked.choices.iter())
+            .any(|choice| is_cannot_tell(choice));
+        if offers_cannot_tell {
+            self.share(|answer, _| answer.is_some_and(is_cannot_tell))
+        } else {
+            None
+        }
     }
 
     fn refused(&self) -> usize {
@@ -181,7 +189,7 @@ impl CellItems<'_, '_> {
             .items
             .iter()
             .enumerate()
-            .filter(|(_, item)| item.is_of(self.family))
+            .filter(|(_, item)| item.is_in_family(self.family))
             .filter_map(|(index, _)| self.grid.trial(self.subject, index))
             .filter(|trial| is_refused(*trial))
             .count()

@@ -1,4 +1,4 @@
-//! Answers in the light and in a condition, by question of the bank: [`BankCounts`].
+//! Counts of answers at L0 and in a condition, by question of the bank: [`BankCounts`].
 
 use std::collections::BTreeMap;
 
@@ -8,26 +8,26 @@ use crate::choice::ReadingMode;
 use crate::grid::Grid;
 use darkqa_ground::types::Family;
 
-/// Numbers of answers to one question of the bank, over the items that have an answer in the light and a reply in the condition.
+/// Counts of answers to one question of the bank, over the items with an answer at L0 and a reply in the condition.
 #[derive(Debug, Clone, Default)]
 pub(super) struct AnswerCounts<'g> {
     /// Number of items.
     pub(super) items: usize,
-    /// Number of items by the answer in the light, and by the answer in the condition. A reply that cannot be read is in neither.
+    /// Number of items with an answer at L0 and in the condition, by answer. Unreadable replies are not counted.
     pub(super) answers: BTreeMap<&'g str, [usize; 2]>,
     /// Number of choices of the question.
     choices: usize,
 }
 
-/// The answers of a subject, for all clusters together and for each.
+/// Counts of the answers of a subject, for all clusters together and for each cluster.
 pub(super) struct BankCounts<'g> {
     pub(super) whole: BTreeMap<usize, AnswerCounts<'g>>,
-    /// The same for each cluster, by question and cluster.
+    /// Counts by cluster and question.
     pub(super) by_cluster: BTreeMap<(u32, usize), AnswerCounts<'g>>,
 }
 
 impl<'g> BankCounts<'g> {
-    /// The answers of a subject to questions of a family.
+    /// Counts the answers of a subject to questions of a family.
     pub(super) fn new(
         grid: &'g Grid<'_>,
         subject: usize,
@@ -46,7 +46,7 @@ impl<'g> BankCounts<'g> {
             else {
                 continue;
             };
-            if !item.is_of(family) {
+            if !item.is_in_family(family) {
                 continue;
             }
             let asked = item.asked;
@@ -59,9 +59,9 @@ impl<'g> BankCounts<'g> {
             for counts in [whole, of_cluster] {
                 counts.items += 1;
                 counts.choices = asked.choices.len();
-                for (place, answer) in [light, here].into_iter().enumerate() {
+                for (side, answer) in [light, here].into_iter().enumerate() {
                     if let Some(answer) = answer {
-                        counts.answers.entry(answer).or_default()[place] += 1;
+                        counts.answers.entry(answer).or_default()[side] += 1;
                     }
                 }
             }
@@ -74,15 +74,14 @@ impl<'g> BankCounts<'g> {
         self.whole.values().map(|counts| counts.items).sum()
     }
 
-    /// The mean over the questions of the entropy of the answers, 0 to 1: in the light, and in the condition. `None` without an
-    /// answer.
+    /// Entropy of the answers, averaged over the questions, from 0 to 1: at L0, and in the condition. `None` without an answer.
     pub(super) fn entropies(&self) -> [Option<f64>; 2] {
-        [0, 1].map(|place| {
+        [0, 1].map(|side| {
             let entropies: Vec<f64> = self
                 .whole
                 .values()
                 .filter_map(|counts| {
-                    let answers = counts.answers.values().map(|answers| answers[place]);
+                    let answers = counts.answers.values().map(|answers| answers[side]);
                     entropy(answers, counts.choices)
                 })
                 .collect();

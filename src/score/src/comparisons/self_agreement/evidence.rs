@@ -1,5 +1,5 @@
-//! How much of what a model takes from the image is left in a condition: [`evidence`], and the exposure drop at which half of it is
-//! lost: [`EvidenceCurve`].
+//! Share of the image's influence on a model that is left in a condition ([`evidence`]), and the exposure drop at which half of it is lost
+//! ([`EvidenceCurve`]).
 
 use crate::accuracies::CurvePoints;
 use crate::bootstrap::Resamples;
@@ -11,39 +11,39 @@ use crate::subject::ModelInCondition;
 use crate::threshold::{LevelCounts, NoThreshold, Threshold};
 use darkqa_ground::types::{AxisLevel, EnhancerName, Family, Variant};
 
-/// Smallest distance between the floor and the ceiling for which a share of it is given; chosen.
+/// Minimum distance between floor and ceiling for reporting a share of evidence (chosen).
 pub const MIN_DISTANCE: f64 = 0.1;
 
-/// Why no share of evidence is given.
+/// Reason why no share of evidence is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoEvidence {
-    /// No question was asked again at L0, so that the ceiling is not known.
+    /// No question was asked again at L0, so the ceiling is unknown.
     NotAgain,
-    /// The model was not asked without images, so that the floor is not known.
+    /// The model was not asked without images, so the floor is unknown.
     NotBlind,
     /// The ceiling is less than [`MIN_DISTANCE`] above the floor: this distance.
     Close(f64),
-    /// The 95 % interval of this distance begins at or below 0: here. A share of a distance that may be 0 has no bounded interval (Fieller
-    /// 1954, J. R. Stat. Soc. B 16:175).
+    /// The lower bound of the 95 % interval of the distance is at or below 0: this bound. The share of a distance that may be 0 has no
+    /// bounded interval (Fieller 1954, J. R. Stat. Soc. B 16:175).
     Unsure(f64),
 }
 
-/// Agreement with the answers in the light of the same model: without an image, and asked again in the light.
+/// Agreement of a model with its answers at L0: without an image (floor), and asked again at L0 (ceiling).
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Bounds {
-    /// The floor, by cluster.
+    /// Counts of the floor, by cluster.
     blind: Vec<ClusterCount>,
-    /// The ceiling, by cluster.
+    /// Counts of the ceiling, by cluster.
     again: Vec<ClusterCount>,
-    /// Floor and ceiling in each draw of the bootstrap; not a number in a draw without a reply.
+    /// Floor and ceiling in each draw of the bootstrap; NaN in a draw without replies.
     drawn: Vec<[f64; 2]>,
 }
 
 impl Bounds {
-    /// The bounds of a subject on the items of a family.
+    /// Computes the bounds of a subject on the items of a family.
     ///
     /// # Errors
-    /// If one of them was not asked, or they are too close, or may be.
+    /// If one of them was not asked, or if they are or may be too close.
     pub(super) fn new(
         grid: &Grid<'_>,
         subject: &ModelInCondition,
@@ -51,10 +51,11 @@ impl Bounds {
         mode: ReadingMode,
         draws: &Resamples,
     ) -> Result<Self, NoEvidence> {
-        let light = ModelInCondition::seeing(&subject.model, AxisLevel::L0, &subject.variant, None);
-        let again = grid.stand_in(&light).ok_or(NoEvidence::NotAgain)?;
+        let light =
+            ModelInCondition::with_images(&subject.model, AxisLevel::L0, &subject.variant, None);
+        let again = grid.find_up_to_group(&light).ok_or(NoEvidence::NotAgain)?;
         let blind = ModelInCondition::new(&subject.model, None);
-        let blind = grid.stand_in(&blind).ok_or(NoEvidence::NotBlind)?;
+        let blind = grid.find_up_to_group(&blind).ok_or(NoEvidence::NotBlind)?;
         let [blind, again] = [blind, again].map(|subject| grid.counts(subject, family, mode));
         let ceiling = share(&again).ok_or(NoEvidence::NotAgain)?;
         let floor = share(&blind).ok_or(NoEvidence::NotBlind)?;
@@ -66,8 +67,12 @@ impl Bounds {
             .zip(drawn_shares(&again, draws))
             .map(|(floor, ceiling)| [floor, ceiling])
             .collect();
-        let distances = drawn.iter().map(|[floor, ceiling]| ceiling - floor);
-        let [low, _] = draws.interval(distances.filter(|distance| !distance.is_nan()).collect());
+        let distances = drawn
+            .iter()
+            .map(|[floor, ceiling]| ceiling - floor)
+            .filter(|distance| !distance.is_nan())
+            .collect();
+        let [low, _] = draws.interval(distances);
         if low <= 0.0 {
             return Err(NoEvidence::Unsure(low));
         }
@@ -86,7 +91,7 @@ fn share(counts: &[ClusterCount]) -> Option<f64> {
     (replies > 0).then(|| f64::from(right) / f64::from(replies))
 }
 
-/// The share of the items that agree in each draw; not a number in one without a reply.
+/// Share of the items that agree in each draw; NaN in a draw without replies.
 fn drawn_shares(counts: &[ClusterCount], draws: &Resamples) -> Vec<f64> {
     let sums = |number: fn(&ClusterCount) -> u32| {
         let numbers: Vec<f32> = counts.iter().map(|count| number(count) as f32).collect();
@@ -100,49 +105,49 @@ fn drawn_shares(counts: &[ClusterCount], draws: &Resamples) -> Vec<f64> {
         .collect()
 }
 
-/// Share of the way from the floor B to the ceiling C that the agreement G of a condition has: (G − B) / (C − B), with the interval of the
-/// cluster bootstrap. It may lie outside 0 to 1. `None` without a reply in the condition.
+/// Estimates the position of the agreement G of a condition between the floor B and the ceiling C: (G − B) / (C − B), with the interval of
+/// the cluster bootstrap. It may be outside 0 to 1. `None` without replies in the condition.
 pub(super) fn evidence(
     counts: &[ClusterCount],
     bounds: &Bounds,
     draws: &Resamples,
 ) -> Option<Estimate> {
-    let of = |here: f64, floor: f64, ceiling: f64| (here - floor) / (ceiling - floor);
-    let value = of(share(counts)?, share(&bounds.blind)?, share(&bounds.again)?);
-    let drawn = drawn_shares(counts, draws)
+    let position = |here: f64, floor: f64, ceiling: f64| (here - floor) / (ceiling - floor);
+    let value = position(share(counts)?, share(&bounds.blind)?, share(&bounds.again)?);
+    // Draws without replies are dropped. Floor and ceiling coincide in fewer draws than the interval excludes, so its ends are finite.
+    let drawn: Vec<f64> = drawn_shares(counts, draws)
         .into_iter()
         .zip(&bounds.drawn)
-        .map(|(here, [floor, ceiling])| of(here, *floor, *ceiling));
-    // Draws without a reply are dropped. Floor and ceiling coincide in fewer draws than lie outside the interval, so no end of the interval
-    // is infinite.
-    let drawn: Vec<f64> = drawn.filter(|value| !value.is_nan()).collect();
+        .map(|(here, [floor, ceiling])| position(here, *floor, *ceiling))
+        .filter(|value| !value.is_nan())
+        .collect();
     let replies = counts.iter().map(|count| count.replies as usize).sum();
     Some(Estimate::around(value, draws.interval(drawn), replies))
 }
 
-/// Why the exposure drop at which half is lost is not known.
+/// Reason why the exposure drop at which half of the evidence is lost is unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoHalf {
-    /// There is no share of evidence.
+    /// No share of evidence is given.
     NoEvidence(NoEvidence),
-    /// The levels do not carry a threshold.
+    /// The levels do not determine a threshold.
     Curve(NoThreshold),
 }
 
-/// The exposure drop at which a model keeps half of its evidence, in one variant, raw or with one enhancer.
+/// Exposure drop at which a model loses half of its evidence, in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvidenceCurve {
     pub model: String,
     pub variant: Variant,
     /// Enhancer; `None` for raw images.
     pub enhancer: Option<EnhancerName>,
-    /// The darkest level of the curve.
+    /// Darkest level of the curve.
     pub darkest: AxisLevel,
     pub threshold: Result<Threshold, NoHalf>,
 }
 
-/// The curves of a model, over all families, in the strict parsing. The agreement falls from the ceiling at L0, and half of the evidence
-/// is lost half-way between ceiling and floor: the crossing of other reports, with the floor in the place of chance.
+/// Computes the curves of a model over all families, in the strict parsing. The agreement falls from the ceiling at L0; half of the
+/// evidence is lost half-way between ceiling and floor. The threshold is computed as in other reports, with the floor in place of chance.
 pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
     let mode = ReadingMode::Strict;
     CurvePoints::all(grid)
@@ -177,7 +182,7 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
         .collect()
 }
 
-/// The number of agreeing items without an image by cluster, scaled to the number of replies in the light.
+/// Number of agreeing items without an image by cluster, scaled to the number of replies at L0.
 fn floor(bounds: &Bounds) -> Vec<f32> {
     let replies = |counts: &[ClusterCount]| -> f64 {
         counts.iter().map(|count| f64::from(count.replies)).sum()

@@ -1,20 +1,20 @@
-//! Agreement beyond what equal habits give: [`kappa`].
+//! Agreement beyond the agreement expected from answer frequencies: [`kappa`].
 
 use super::counts::{AnswerCounts, BankCounts};
 use crate::estimate::ClusterCount;
 use crate::estimate::Estimate;
 use darkqa_statistics::quantiles::{degrees_of_freedom, student};
 
-/// Expected agreement above which κ is not defined: everything agrees by habit alone.
-const CERTAIN: f64 = 1.0 - 1e-9;
+/// Expected agreement above which κ is undefined, because all answers agree by their frequencies alone.
+const MAX_EXPECTED: f64 = 1.0 - 1e-9;
 
-/// Cohen's κ (Cohen 1960, Educ. Psychol. Meas. 20:37) of the answers in a condition with those in the light, with the expected
-/// agreement by question: e = (1/N) Σ_q Σ_k a_qk b_qk / n_q, for n_q items of question q, of which a_qk have the answer k in the light and
-/// b_qk in the condition. Shares of answers over different questions would make e too small, and κ too large.
+/// Estimates Cohen's κ (Cohen 1960, Educ. Psychol. Meas. 20:37) between the answers in a condition and those at L0. The expected agreement
+/// is computed by question: e = (1/N) Σ_q Σ_k a_qk b_qk / n_q, for n_q items of question q, a_qk of them with answer k at L0 and b_qk in
+/// the condition. Answer frequencies pooled over different questions would make e too small and κ too large.
 ///
-/// `None` if e is 1, so that nothing but agreement is possible. The interval is that of κ's linear form in the clusters' counts, with
-/// Student's quantile, as for two models ([`clustered_kappa`](crate::comparisons::clustered_kappa)). `agreement` is the share of
-/// items that agree; where clusters show no spread, its interval gives that of κ.
+/// `None` if e is 1, so that only agreement is possible. The interval is that of the linearization of κ in the counts of the clusters, with
+/// Student's quantile, as for two models ([`clustered_kappa`](crate::comparisons::clustered_kappa)). `agreement` is the share of items that
+/// agree; without any spread between clusters, the interval of κ follows from its interval.
 pub(super) fn kappa(
     counts: &BankCounts<'_>,
     by_cluster: &[ClusterCount],
@@ -22,7 +22,7 @@ pub(super) fn kappa(
 ) -> Option<Estimate> {
     let all = counts.items() as f64;
     let expected = counts.whole.values().map(expected).sum::<f64>() / all;
-    if all == 0.0 || expected > CERTAIN {
+    if all == 0.0 || expected > MAX_EXPECTED {
         return None;
     }
     let observed = agreement.value;
@@ -52,7 +52,7 @@ pub(super) fn kappa(
     } else {
         (scaled(agreement.low), scaled(agreement.high))
     };
-    // One cluster shows no spread: nothing is known.
+    // A single cluster gives no information about the spread.
     let (low, high) = if low.is_finite() && high.is_finite() {
         (low, high)
     } else {
@@ -66,7 +66,7 @@ pub(super) fn kappa(
     })
 }
 
-/// The number of items of a question that are expected to agree by habit.
+/// Number of items of a question that are expected to agree by the answer frequencies.
 fn expected(counts: &AnswerCounts<'_>) -> f64 {
     counts
         .answers
@@ -76,7 +76,7 @@ fn expected(counts: &AnswerCounts<'_>) -> f64 {
         / counts.items as f64
 }
 
-/// The derivative of the expected number of a question in the direction of a cluster's counts.
+/// Derivative of the expected number of agreeing items of a question in the direction of the counts of a cluster.
 fn expected_change(whole: &AnswerCounts<'_>, own: &AnswerCounts<'_>) -> f64 {
     let items = whole.items as f64;
     own.answers

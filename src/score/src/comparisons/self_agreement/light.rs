@@ -1,4 +1,4 @@
-//! A model's own answers in the light ([`LightAnswers`]), and trials held against them.
+//! A model's own answers at L0 ([`LightAnswers`]), and trials scored against them.
 
 use std::collections::{HashMap, HashSet};
 
@@ -9,35 +9,35 @@ use darkqa_ground::types::{
     ChoiceDetail, Condition, QuestionId, RunGroup, Treatment, TrialRef, Trials, UnreadReason, View,
 };
 
-/// Identity of a question for a model: its name, and the order of its choices.
+/// Identity of a question for a model: its id and the order of its choices.
 type QuestionKey<'a> = (&'a QuestionId, &'a [String]);
 
-/// The replies of one model at L0, each question once: the reference for its other replies.
+/// The first reply of one model to each question at L0: the reference for its other replies.
 pub(super) struct LightAnswers<'a> {
     model: &'a str,
     by_question: HashMap<QuestionKey<'a>, Vec<TrialRef<'a>>>,
 }
 
-/// Counts of a model's replies in the light.
+/// Counts of a model's replies at L0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LightReplies {
     pub model: String,
-    /// How the replies were read.
+    /// Parsing of the replies.
     pub mode: ReadingMode,
     /// Number of questions about images that were asked at L0.
     pub asked: usize,
-    /// Share of the replies in which an answer could be read; `None` without a reply. Its `n` is the number of replies.
+    /// Share of readable replies; `None` without a reply. Its `n` is the number of replies.
     pub read: Option<Estimate>,
-    /// Number of replies that refuse.
+    /// Number of refusals.
     pub refused: usize,
     /// Number of replies “cannot tell from the image”.
     pub cannot_tell: usize,
-    /// Whether the questions have such a choice.
-    pub has_way_out: bool,
+    /// True if the questions have this choice.
+    pub offers_cannot_tell: bool,
 }
 
 impl LightReplies {
-    /// Whether no answer could be read in any reply.
+    /// True if no reply is readable.
     pub fn is_unread(&self) -> bool {
         self.read.is_none_or(|read| read.value <= 0.0)
     }
@@ -48,7 +48,7 @@ impl LightReplies {
     }
 }
 
-/// Whether a trial is about an untouched image, without an enhancer.
+/// True if a trial is about an untouched image without an enhancer.
 pub(super) fn is_light(trial: TrialRef<'_>) -> bool {
     let condition = trial.condition();
     trial.view() == View::Image && condition.is_some_and(is_untouched)
@@ -58,7 +58,7 @@ fn is_untouched(condition: &Condition) -> bool {
     condition.treatment == Treatment::Untouched && condition.enhancer.is_none()
 }
 
-/// The index of the choice that a reading of a trial names; `None` if it names none.
+/// Index of the choice parsed from the reply of a trial; `None` if no choice could be parsed.
 pub(super) fn chosen(trial: TrialRef<'_>, mode: ReadingMode) -> Option<usize> {
     let reading = match mode {
         ReadingMode::Strict => trial.strict(),
@@ -67,19 +67,19 @@ pub(super) fn chosen(trial: TrialRef<'_>, mode: ReadingMode) -> Option<usize> {
     reading?.chosen
 }
 
-/// Whether a choice is the way out of its question.
-pub(super) fn is_way_out(choice: &str) -> bool {
+/// True if a choice is “cannot tell from the image”.
+pub(super) fn is_cannot_tell(choice: &str) -> bool {
     choice.trim().eq_ignore_ascii_case(CANNOT_TELL)
 }
 
-/// Whether a reply refuses, or was withheld.
+/// True if a reply is a refusal or was filtered.
 pub(super) fn is_refused(trial: TrialRef<'_>) -> bool {
     let why = trial.strict().and_then(|reading| reading.why);
     matches!(why, Some(UnreadReason::Refused | UnreadReason::Filtered))
 }
 
 impl<'a> LightAnswers<'a> {
-    /// The first reply of a model to each question at L0.
+    /// Collects the replies of a model at L0.
     pub(super) fn new(trials: &'a Trials<ChoiceDetail>, model: &'a str) -> Self {
         let mut by_question = HashMap::<QuestionKey<'a>, Vec<TrialRef<'a>>>::new();
         for trial in trials
@@ -93,33 +93,36 @@ impl<'a> LightAnswers<'a> {
         Self { model, by_question }
     }
 
-    /// The first replies, in no order.
+    /// First reply to each question, in arbitrary order.
     pub(super) fn first(&self) -> impl Iterator<Item = TrialRef<'a>> + '_ {
         self.by_question
             .values()
             .filter_map(|trials| trials.first().copied())
     }
 
-    /// The choice that the model named at L0; `None` if no choice could be read there.
+    /// Choice of the model at L0 for the question of a trial; `None` if it is unreadable or missing.
     fn reference(&self, trial: TrialRef<'_>, mode: ReadingMode) -> Option<usize> {
         let key = (trial.question(), trial.choices());
         let group = |trial: TrialRef<'_>| trial.condition().and_then(|at| at.group.clone());
         let own = group(trial);
-        let mut light = self.by_question.get(&key)?.iter();
-        let met = light.find(|light| RunGroup::meet(group(**light).as_ref(), own.as_ref()));
-        chosen(*met?, mode)
+        let light = self
+            .by_question
+            .get(&key)?
+            .iter()
+            .find(|light| RunGroup::meet(group(**light).as_ref(), own.as_ref()))?;
+        chosen(*light, mode)
     }
 
-    /// The trials of the model with its own answer at L0 in the place of the truth. A question without such an answer is left out.
+    /// Returns the trials of the model with its own answer at L0 as the truth. Questions without such an answer are left out.
     ///
-    /// The first trial at L0 is the reference itself and left out; the one after it, where the question was asked again, takes its
-    /// place, so that it is paired with the first trial of every other condition.
-    pub(super) fn held_against(
+    /// The first trial at L0 is the reference itself and is left out. If the question was asked again, the second trial takes its place, so
+    /// that it is paired with the first trial of every other condition.
+    pub(super) fn scored_against_light(
         &self,
         trials: &'a Trials<ChoiceDetail>,
         mode: ReadingMode,
     ) -> Trials<ChoiceDetail> {
-        let held = trials
+        let scored = trials
             .iter()
             .filter(|trial| trial.model() == self.model)
             .filter_map(|trial| {
@@ -130,34 +133,34 @@ impl<'a> LightAnswers<'a> {
                 };
                 Some((trial, repeat, self.reference(trial, mode)?))
             });
-        all_held(held)
+        with_references(scored)
     }
 
-    /// The first readable trials of another model at L0, with the answers of this one in the place of the truth.
-    pub(super) fn held_against_other(
+    /// Returns the first readable trials of another model at L0, with the answers of this model as the truth.
+    pub(super) fn scored_against_other(
         &self,
         trials: &'a Trials<ChoiceDetail>,
         other: &str,
         mode: ReadingMode,
     ) -> Trials<ChoiceDetail> {
-        let held = trials
+        let scored = trials
             .iter()
             .filter(|trial| trial.model() == other && is_light(*trial))
             .filter(|trial| trial.repeat() == 0)
             .filter(|trial| chosen(*trial, mode).is_some())
             .filter_map(|trial| Some((trial, 0, self.reference(trial, mode)?)));
-        all_held(held)
+        with_references(scored)
     }
 
-    /// Counts the replies in the light, in a reading.
+    /// Counts the replies at L0, in one parsing.
     pub(super) fn replies(&self, mode: ReadingMode) -> LightReplies {
         let replied: Vec<TrialRef<'_>> = self.first().filter(|trial| !trial.failed()).collect();
         let read = replied
             .iter()
             .filter(|trial| chosen(**trial, mode).is_some());
-        let way_out = |trial: &&TrialRef<'_>| {
+        let is_cannot_tell_reply = |trial: &&TrialRef<'_>| {
             let choice = chosen(**trial, mode).and_then(|index| trial.choices().get(index));
-            choice.is_some_and(|choice| is_way_out(choice))
+            choice.is_some_and(|choice| is_cannot_tell(choice))
         };
         LightReplies {
             model: self.model.to_owned(),
@@ -165,12 +168,12 @@ impl<'a> LightAnswers<'a> {
             asked: self.by_question.len(),
             read: Estimate::share(read.count(), replied.len()),
             refused: replied.iter().filter(|trial| is_refused(**trial)).count(),
-            cannot_tell: replied.iter().filter(way_out).count(),
-            has_way_out: self.has_way_out(),
+            cannot_tell: replied.iter().filter(is_cannot_tell_reply).count(),
+            offers_cannot_tell: self.offers_cannot_tell(),
         }
     }
 
-    fn has_way_out(&self) -> bool {
+    fn offers_cannot_tell(&self) -> bool {
         let lists: HashSet<&[String]> = self
             .by_question
             .keys()
@@ -178,14 +181,16 @@ impl<'a> LightAnswers<'a> {
             .collect();
         lists
             .iter()
-            .any(|choices| choices.iter().any(|choice| is_way_out(choice)))
+            .any(|choices| choices.iter().any(|choice| is_cannot_tell(choice)))
     }
 }
 
-/// Trials of other numbers of repeats, each with an answer in the light in the place of the truth.
-fn all_held<'t>(held: impl Iterator<Item = (TrialRef<'t>, u32, usize)>) -> Trials<ChoiceDetail> {
+/// Copies trials, each with a new repeat number and a reference answer as the truth.
+fn with_references<'t>(
+    scored: impl Iterator<Item = (TrialRef<'t>, u32, usize)>,
+) -> Trials<ChoiceDetail> {
     let mut trials = Trials::default();
-    for (trial, repeat, reference) in held {
+    for (trial, repeat, reference) in scored {
         trials.hold(trial, repeat, reference);
     }
     trials

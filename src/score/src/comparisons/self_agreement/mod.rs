@@ -1,15 +1,15 @@
-//! Agreement of each model with its own answers in the light, for questions without known true answers: [`SelfAgreement`].
+//! Agreement of each model with its own answers at L0, for questions without known true answers: [`SelfAgreement`].
 //!
-//! The reference of a model is its own answer at L0, for each question and order of choices. A trial is scored against it as another trial
-//! is scored against the truth, so that the counts by cluster, the paired tests, Holm's correction and the crossing of a curve are those of
-//! the other reports; nothing here is an accuracy. By the triangle inequality the accuracy that is lost in a condition is at most one minus
-//! the agreement there, whatever the true answers are.
+//! The reference of a model is its own answer at L0, for each question and order of choices. Trials are scored against it as they are
+//! scored against the truth elsewhere, so that the counts by cluster, the paired tests, Holm's correction and the thresholds of curves are
+//! computed as in the other reports. The results are agreements, not accuracies. By the triangle inequality, the accuracy that is lost in a
+//! condition is at most 1 minus the agreement there, whatever the true answers are.
 //!
-//! Agreement alone is weak evidence: a model that answers no to everything agrees with itself. It is therefore reported with κ with the
-//! expected agreement by question, the entropy of the answers, the agreement of the model without an image (the floor) and of the same
-//! question asked again at L0 (the ceiling), and the share of the way from the floor to the ceiling ([`evidence`]).
+//! Agreement alone is weak evidence: a model that answers no to everything agrees with itself. It is therefore reported together with κ,
+//! whose expected agreement is computed by question, the entropy of the answers, the agreement of the model without an image (the floor)
+//! and of the same question asked again at L0 (the ceiling), and the position of the agreement between floor and ceiling ([`evidence`]).
 //!
-//! Sources: metamorphic testing for want of an oracle (Spieker and Gotlieb 2019, arXiv:1910.00262); flips of predictions under
+//! Sources: metamorphic testing without an oracle (Spieker and Gotlieb 2019, arXiv:1910.00262); flips of predictions under
 //! corruption (Hendrycks and Dietterich 2019, arXiv:1903.12261, ImageNet-P); consistency of vision-language models under corruption
 //! (Bench-C, arXiv:2511.19032).
 
@@ -40,36 +40,36 @@ use crate::bootstrap::Resamples;
 use crate::choice::ReadingMode;
 use crate::cluster::{ClusterUnit, Clusters, FrameTies};
 use crate::grid::Grid;
-use crate::head::{TestTree, adjusted};
 use crate::photographs::PhotographedSet;
+use crate::test_tree::{TestTree, adjust_p_values};
 use darkqa_ground::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
 
 /// All results of a run without true answers.
 #[derive(Debug)]
 pub struct SelfAgreement<'a> {
-    /// The answers, by subject and item.
+    /// Answers by subject and item.
     pub grid: Grid<'a>,
-    /// The unit that is treated as independent.
+    /// Unit that is treated as independent.
     pub unit: ClusterUnit,
-    /// Counts of each model's replies in the light, in each reading.
+    /// Counts of the replies of each model at L0, in each parsing.
     pub light: Vec<LightReplies>,
-    /// The agreement of each subject with its model's answers in the light. The cell of L0 is that of the questions asked again.
+    /// Agreement of each subject with the answers of its model at L0. The cell of L0 is about questions asked again.
     pub cells: Vec<AgreementCell>,
-    /// Every question of the bank, for each model, in the strict parsing.
+    /// Answers of each model to every question of the bank at L0, in the strict parsing.
     pub questions: Vec<QuestionInLight>,
-    /// Paired differences between the conditions of one model, in the strict parsing: which of them agrees with L0.
+    /// Paired differences in agreement between the conditions of one model, in the strict parsing.
     pub comparisons: Vec<Comparison>,
     /// The exposure drop at which half of the evidence is lost.
     pub curves: Vec<EvidenceCurve>,
     /// Answers given against those at L0.
     pub confusions: Vec<Confusion>,
-    /// Rates of “yes” where the answer at L0 is no, and the other way round.
+    /// Rates of “yes” if the answer at L0 is no, and vice versa.
     pub hallucinations: Vec<Hallucination>,
     /// Counts of replies, unreadable replies and failures of each subject.
     pub health: Vec<Health>,
-    /// How far two models agree with each other in the light.
+    /// Agreement of each two models at L0.
     pub between: Vec<ModelsInLight>,
-    /// The light in which the photographs were taken.
+    /// Light in which the photographs were taken.
     pub set: PhotographedSet,
 }
 
@@ -110,8 +110,8 @@ impl<'a> SelfAgreement<'a> {
             let answers = LightAnswers::new(trials, model);
             for mode in ReadingMode::ALL {
                 let replies = answers.replies(mode);
-                let held = answers.held_against(trials, mode);
-                let grid = Grid::new(&held, &clusters);
+                let scored = answers.scored_against_light(trials, mode);
+                let grid = Grid::new(&scored, &clusters);
                 let questions = questions_in_light(model, &answers, &bank, mode);
                 all.cells
                     .extend(cells(&grid, &draws, &bank, &questions, mode));
@@ -130,29 +130,29 @@ impl<'a> SelfAgreement<'a> {
                 }
             }
         }
-        // The kinds stand together, as in other reports; the sort is stable.
+        // Sorted by kind, as in other reports; the sort is stable.
         all.comparisons
             .sort_by_key(|found| (found.kind, found.family.is_some()));
         correct(&mut all.comparisons);
         all
     }
 
-    /// The same results of a set whose photographs were taken in this light.
+    /// Sets the light in which the photographs of the data set were taken.
     #[must_use]
-    pub fn for_set(self, set: PhotographedSet) -> Self {
+    pub fn with_set(self, set: PhotographedSet) -> Self {
         Self { set, ..self }
     }
 
-    /// The models, in their order.
+    /// Models, in the order of the listing.
     pub fn models(&self) -> Vec<&str> {
-        let light = self.light.iter();
-        light
+        self.light
+            .iter()
             .filter(|light| light.mode == ReadingMode::Strict)
             .map(|light| &*light.model)
             .collect()
     }
 
-    /// Number of items: questions about images, each in one order of its choices, without those that were only asked again.
+    /// Number of items: questions about images, each in one order of its choices, without repeats.
     pub fn items(&self) -> usize {
         self.grid
             .items
@@ -161,38 +161,42 @@ impl<'a> SelfAgreement<'a> {
             .count()
     }
 
-    /// Counts of a model's replies in the light, in the strict parsing.
+    /// Counts of the replies of a model at L0, in the strict parsing.
     pub fn light_of(&self, model: &str) -> Option<&LightReplies> {
-        let mut light = self.light.iter();
-        light.find(|light| light.model == model && light.mode == ReadingMode::Strict)
+        self.light
+            .iter()
+            .find(|light| light.model == model && light.mode == ReadingMode::Strict)
     }
 
-    /// The cells of all families together in the strict parsing.
+    /// Cells of all families together in the strict parsing.
     pub fn whole(&self) -> impl Iterator<Item = &AgreementCell> + Clone {
         self.cells
             .iter()
             .filter(|cell| cell.family.is_none() && cell.mode == ReadingMode::Strict)
     }
 
-    /// Numbers of the bank's questions of a model: those that can tell something, and all.
+    /// Number of informative questions of the bank for a model, and number of all its questions.
     pub fn informative(&self, model: &str) -> (usize, usize) {
-        let questions = self
+        let questions: Vec<&QuestionInLight> = self
             .questions
             .iter()
-            .filter(|question| question.model == model);
-        let informative = questions.clone().filter(|found| found.is_informative());
-        (informative.count(), questions.count())
+            .filter(|question| question.model == model)
+            .collect();
+        let informative = questions
+            .iter()
+            .filter(|question| question.is_informative())
+            .count();
+        (informative, questions.len())
     }
 
-    /// Whether the bank cannot tell anything of a model: its commonest answer to every question is that about nearly all images.
+    /// True if the bank is uninformative about a model: to every question, the model gives the same answer about nearly all images.
     pub fn cannot_tell(&self, model: &str) -> bool {
         let (informative, all) = self.informative(model);
         informative == 0 && all > 0
     }
 }
 
-/// Corrects the comparisons that sentences are about over all of them: each model at the darkest level of each variant, and each
-/// enhancer at each level.
+/// Corrects all comparisons behind sentences together: each model at the darkest level of each variant, and each enhancer at each level.
 fn correct(comparisons: &mut [Comparison]) {
     let mut darkest = BTreeMap::<_, usize>::new();
     let mut enhanced = BTreeMap::<_, Vec<usize>>::new();
@@ -217,13 +221,14 @@ fn correct(comparisons: &mut [Comparison]) {
         .chain(enhanced.into_values())
         .filter(|tests: &Vec<usize>| !tests.is_empty())
         .collect();
-    let tests = questions
-        .iter()
-        .map(|tests| TestTree::group(tests.iter().copied().map(TestTree::leaf)));
-    let tests = TestTree::group(tests);
-    let corrected = adjusted(&tests, |index: usize| comparisons[index].strict.paired.p);
+    let tests = TestTree::group(
+        questions
+            .iter()
+            .map(|tests| TestTree::group(tests.iter().copied().map(TestTree::leaf))),
+    );
+    let corrected = adjust_p_values(&tests, |index: usize| comparisons[index].strict.paired.p);
     for (index, p) in corrected {
-        // The answers at L0 are those of the strict parsing, so that it is the only one.
+        // The reference answers come from the strict parsing, so no lenient comparison exists.
         let comparison = &mut comparisons[index];
         comparison.strict.p_report = Some(p);
         comparison.lenient = comparison.strict.clone();

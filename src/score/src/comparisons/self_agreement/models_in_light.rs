@@ -1,4 +1,4 @@
-//! How far two models agree with each other in the light: [`ModelsInLight`].
+//! Agreement of two models at L0: [`ModelsInLight`].
 
 use super::bank_index::BankIndex;
 use super::counts::BankCounts;
@@ -10,8 +10,8 @@ use crate::estimate::Estimate;
 use crate::grid::Grid;
 use darkqa_ground::types::{ChoiceDetail, Trials};
 
-/// Agreement of two models at L0, in the strict parsing, on the items that both answered readably. Each model has its own reference, so
-/// that their agreements with themselves in the dark compare only as far as they agree here.
+/// Agreement of two models at L0, in the strict parsing, on the items to which both gave a readable answer. Each model has its own
+/// reference, so the agreements of the models with themselves in the dark are comparable only as far as the models agree here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelsInLight {
     pub first: String,
@@ -22,7 +22,7 @@ pub struct ModelsInLight {
     pub kappa: Option<Estimate>,
 }
 
-/// Every pair of models that answered the same items in the light.
+/// Computes the agreement of every pair of models that answered the same items at L0.
 pub(super) fn models_in_light(
     trials: &Trials<ChoiceDetail>,
     clusters: &Clusters,
@@ -31,11 +31,11 @@ pub(super) fn models_in_light(
 ) -> Vec<ModelsInLight> {
     let mode = ReadingMode::Strict;
     let mut pairs = Vec::new();
-    for (place, first) in models.iter().enumerate() {
+    for (index, first) in models.iter().enumerate() {
         let answers = LightAnswers::new(trials, first);
-        for second in &models[place + 1..] {
-            let held = answers.held_against_other(trials, second, mode);
-            let grid = Grid::new(&held, clusters);
+        for second in &models[index + 1..] {
+            let scored = answers.scored_against_other(trials, second, mode);
+            let grid = Grid::new(&scored, clusters);
             if grid.subjects.is_empty() {
                 continue;
             }

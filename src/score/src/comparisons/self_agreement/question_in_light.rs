@@ -1,4 +1,4 @@
-//! [`QuestionInLight`]: a model's answers to each question of a bank in the light.
+//! Answers of a model to each question of a bank at L0: [`QuestionInLight`].
 
 use std::collections::BTreeMap;
 
@@ -7,22 +7,22 @@ use super::light::{LightAnswers, chosen};
 use crate::choice::ReadingMode;
 use darkqa_ground::types::Family;
 
-/// Share of the images at which the commonest answer makes a question uninformative; chosen.
+/// Share of the most common answer from which a question is uninformative (chosen).
 pub const UNINFORMATIVE: f64 = 0.95;
 
-/// The answers of a model to one question of the bank at L0, over all images.
+/// Answers of a model to one question of the bank at L0, over all images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuestionInLight {
     pub model: String,
     /// Index among the questions of the bank.
     pub(super) index: usize,
-    /// The name of the question in the bank.
+    /// Name of the question in the bank.
     pub bank_id: String,
     pub text: String,
     pub family: Family,
     /// Number of images with a readable answer.
     pub images: usize,
-    /// The answer given most often; of several, the first by name. Empty without a readable answer.
+    /// Most common answer, the first by name of several; empty without a readable answer.
     pub top: String,
     /// Share of the images with that answer; 0 without a readable answer.
     pub top_share: f64,
@@ -31,13 +31,13 @@ pub struct QuestionInLight {
 }
 
 impl QuestionInLight {
-    /// True if the answers differ between images; else agreement is no evidence.
+    /// True if the answers differ between images. Otherwise agreement is no evidence.
     pub fn is_informative(&self) -> bool {
         self.images > 0 && self.top_share < UNINFORMATIVE
     }
 }
 
-/// Every question of the bank that a model was asked in the light, in the order of the bank.
+/// Counts the answers of a model at L0 to every question of the bank, in the order of the bank.
 pub(super) fn questions_in_light(
     model: &str,
     answers: &LightAnswers<'_>,
@@ -76,8 +76,8 @@ pub(super) fn questions_in_light(
         .collect()
 }
 
-/// Shannon entropy of counts over that of `choices` equally frequent answers: 0 if all answers are the same, 1 if none is more
-/// frequent than another. `None` without a count.
+/// Shannon entropy of counts, relative to that of `choices` equally frequent answers: 0 if all answers are the same, 1 if all choices are
+/// equally frequent. `None` without counts.
 pub(super) fn entropy(counts: impl Iterator<Item = usize> + Clone, choices: usize) -> Option<f64> {
     let all: usize = counts.clone().sum();
     if all == 0 {
@@ -87,6 +87,6 @@ pub(super) fn entropy(counts: impl Iterator<Item = usize> + Clone, choices: usiz
         let share = count as f64 / all as f64;
         -share * libm::log(share)
     });
-    // The entropy of one answer is 0, and not −0.
+    // Adding 0 turns −0 into 0.
     Some((terms.sum::<f64>() + 0.0) / libm::log(choices as f64))
 }

@@ -1,4 +1,4 @@
-//! The system gain K that the noise of a real pair speaks for: [`GainFit`], and over pairs [`ReadingFit`].
+//! System gain K estimated from the noise of a real pair, [`GainFit`], and of several pairs, [`ReadingFit`].
 //!
 //! The gain is estimated by indirect inference (Gourieroux, Monfort and Renault 1993, J. Appl. Econometrics 8:S85): the
 //! statistic of the real image, its [`SpreadCurve`], is compared with that of synthetic images over a ladder of K.
@@ -8,24 +8,24 @@ use std::fmt;
 use serde::Serialize;
 
 use super::CameraOrigin;
-use super::mean::{LEAST_VALUES, Mean};
+use super::mean::{MIN_VALUES, Mean};
 use super::quantile::quantile;
 use super::smooth::{BINS, SpreadCurve};
 use darkqa_ground::types::ReadingName;
 
-/// Number of gains that synthetic images are made with (chosen).
+/// Number of gains for which synthetic images are made (chosen).
 pub const LADDER_STEPS: usize = 15;
-/// The least and the greatest of them, in ADU per electron (chosen; the built-in cameras lie between 0.09 and 29).
+/// Minimum and maximum gain, in ADU per electron (chosen; the built-in cameras are between 0.09 and 29).
 pub const GAINS: [f64; 2] = [0.02, 30.0];
 /// Number of gains, evenly spaced in ln K, at which the curves are compared (chosen).
 const FINE: usize = 601;
-/// The greatest misfit of a fit, in ln spread (chosen: self-made pairs have up to 0.1, a pair whose low-light image was made
-/// without a sensor 0.9 and more).
-pub const MOST_MISFIT: f64 = 0.3;
-/// Number of bins that a fit needs (chosen): fewer do not determine the shape of a curve.
-const LEAST_BINS: usize = 4;
+/// Maximum misfit of a fit, in ln spread (chosen: pairs simulated by this program have up to 0.1, a pair whose low-light image was made
+/// without a sensor at least 0.9).
+pub const MAX_MISFIT: f64 = 0.3;
+/// Minimum number of bins for a fit (chosen); fewer do not determine the shape of a curve.
+const MIN_BINS: usize = 4;
 
-/// The gains of the synthetic images, in ascending order.
+/// Gains of the synthetic images, in ascending order.
 #[must_use]
 pub fn ladder() -> [f64; LADDER_STEPS] {
     std::array::from_fn(|step| libm::exp(log_gain(step, LADDER_STEPS)))
@@ -40,15 +40,15 @@ fn log_gain(index: usize, n: usize) -> f64 {
 /// Fit of the gain to one pair under one noise profile.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GainFit {
-    /// The gain whose spread is nearest, in ADU per electron; `None` without enough smooth blocks.
+    /// Gain with the nearest spread, in ADU per electron; `None` without enough smooth blocks.
     pub gain: Option<f64>,
     /// Root mean square over the bins of ln(synthetic spread / real spread) at that gain.
     pub misfit: Option<f64>,
-    /// Whether the gain can be used.
+    /// Outcome of the fit.
     pub outcome: FitOutcome,
 }
 
-/// Whether a gain was fitted, and if not, why.
+/// Outcome of a gain fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FitOutcome {
@@ -63,7 +63,7 @@ pub enum FitOutcome {
 }
 
 impl GainFit {
-    /// The gain at which the synthetic spreads, one curve for each gain of [`ladder`], are nearest to the real one.
+    /// Finds the gain at which the synthetic spread is nearest to the real one; `synthetic` has one curve for each gain of [`ladder`].
     #[must_use]
     pub fn fit(real: &SpreadCurve, synthetic: &[SpreadCurve; LADDER_STEPS]) -> Self {
         let bins: Vec<(f64, [f64; LADDER_STEPS])> = (0..BINS)
@@ -75,7 +75,7 @@ impl GainFit {
                 Some((real.bins[bin]?, curve))
             })
             .collect();
-        if bins.len() < LEAST_BINS {
+        if bins.len() < MIN_BINS {
             return Self {
                 gain: None,
                 misfit: None,
@@ -84,8 +84,8 @@ impl GainFit {
         }
         let misfit = |index: usize| {
             let squares = bins.iter().map(|(real, curve)| {
-                let off = between(curve, index) - real;
-                off * off
+                let difference = interpolate(curve, index) - real;
+                difference * difference
             });
             (squares.sum::<f64>() / bins.len() as f64).sqrt()
         };
@@ -101,7 +101,7 @@ impl GainFit {
             misfit: Some(misfit),
             outcome: if index == 0 || index == FINE - 1 {
                 FitOutcome::EndOfLadder
-            } else if misfit > MOST_MISFIT {
+            } else if misfit > MAX_MISFIT {
                 FitOutcome::Misfit
             } else {
                 FitOutcome::Fitted
@@ -109,23 +109,23 @@ impl GainFit {
         }
     }
 
-    /// The gain, if it can be used.
+    /// Gain, if the fit succeeded.
     #[must_use]
     pub fn fitted(&self) -> Option<f64> {
         self.gain.filter(|_| self.outcome == FitOutcome::Fitted)
     }
 }
 
-/// Value of a curve over the ladder at one of the fine gains, linear in ln K between its neighbours.
-fn between(curve: &[f64; LADDER_STEPS], index: usize) -> f64 {
-    let place = index as f64 * (LADDER_STEPS - 1) as f64 / (FINE - 1) as f64;
-    let below = (place as usize).min(LADDER_STEPS - 2);
+/// Value of a curve over the ladder at one of the fine gains, by linear interpolation in ln K.
+fn interpolate(curve: &[f64; LADDER_STEPS], index: usize) -> f64 {
+    let position = index as f64 * (LADDER_STEPS - 1) as f64 / (FINE - 1) as f64;
+    let below = (position as usize).min(LADDER_STEPS - 2);
     let [low, high] = [curve[below], curve[below + 1]];
-    low + (place - below as f64) * (high - low)
+    low + (position - below as f64) * (high - low)
 }
 
 impl FitOutcome {
-    /// The word in CSV and JSON.
+    /// Word in CSV and JSON.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -150,19 +150,19 @@ impl fmt::Display for FitOutcome {
     }
 }
 
-/// The gains of several pairs under one noise profile.
+/// Summary of the gains of several pairs under one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PooledGain {
     /// Geometric mean with its 95 % interval by Student's t distribution of ln K; `None` for fewer than 3 pairs.
     pub mean: Option<Mean>,
-    /// The 10 % and the 90 % quantile of ln K, as K, in ADU per electron.
+    /// 10 % and 90 % quantiles of K, computed in ln K, in ADU per electron.
     pub range: [f64; 2],
     /// Number of pairs.
     pub n: usize,
 }
 
 impl PooledGain {
-    /// The fitted gains of pairs as one; `None` without any.
+    /// Summarizes the fitted gains of pairs; `None` without gains.
     #[must_use]
     pub fn new(gains: &[f64]) -> Option<Self> {
         let mut logs: Vec<f64> = gains.iter().map(|gain| libm::log(*gain)).collect();
@@ -186,11 +186,11 @@ impl PooledGain {
 pub struct ReadingFit {
     /// Name of the noise profile.
     pub reading: ReadingName,
-    /// Ratio r that the fit took, if images show only the product r · K; `None` if r is 2^ΔEV.
+    /// Ratio r assumed by the fit, if images determine only the product r · K; `None` if r is 2^ΔEV.
     pub ratio: Option<f64>,
-    /// The gains of the fitted pairs; `None` if no pair was fitted.
+    /// Summary of the gains of the fitted pairs; `None` if no pair was fitted.
     pub pooled: Option<PooledGain>,
-    /// The fit to each pair, by the name of the pair.
+    /// Fit to each pair.
     pub pairs: Vec<PairFit>,
 }
 
@@ -203,7 +203,7 @@ pub struct PairFit {
 }
 
 impl ReadingFit {
-    /// The fits to all pairs together.
+    /// Combines the fits to all pairs.
     #[must_use]
     pub fn new(reading: ReadingName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
         let gains: Vec<f64> = pairs.iter().filter_map(|pair| pair.fit.fitted()).collect();
@@ -215,12 +215,12 @@ impl ReadingFit {
         }
     }
 
-    /// The gains that a pair is judged by, and where they come from: those of the other pairs if 3 or more are fitted, so that no
-    /// pair is judged by its own gain; else those of all. `None` if no pair is fitted.
+    /// Gains for evaluating a pair, with their source: those of the other pairs if at least 3 are fitted, so that no pair is evaluated with
+    /// its own gain; otherwise those of all pairs. `None` if no pair is fitted.
     #[must_use]
     pub fn for_pair(&self, name: &str) -> Option<(PooledGain, CameraOrigin)> {
         let all = self.pooled.clone()?;
-        if all.n < LEAST_VALUES {
+        if all.n < MIN_VALUES {
             return Some((all, CameraOrigin::SamePairs));
         }
         let gains: Vec<f64> = self
@@ -293,7 +293,7 @@ mod tests {
         assert!((three.range[1] - f64::powf(4.0, 0.8)).abs() < 1e-9);
     }
 
-    /// A pair's own gain is not among those that it is judged by, and with fewer than three fitted pairs it is said to be.
+    /// A pair is evaluated without its own gain; with fewer than three fitted pairs, the result is marked as using it.
     #[test]
     fn no_pair_is_judged_by_its_own_gain() {
         let fit = |gain: Option<f64>| GainFit {

@@ -1,26 +1,26 @@
-//! Mean of a few numbers with its interval: [`Mean`].
+//! Mean of few numbers with its interval: [`Mean`].
 
 use serde::Serialize;
 
 use darkqa_statistics::quantiles::student;
 
-/// The number of values that an interval needs (chosen). With two values, each half is more than 6 times their distance from each
-/// other, which can be wider than the scale of the number.
-pub const LEAST_VALUES: usize = 3;
+/// Minimum number of values for an interval (chosen). With two values, the half-width is more than 6 times their distance, which can exceed
+/// the range of the quantity.
+pub const MIN_VALUES: usize = 3;
 
 /// A mean with its 95 % interval by Student's t distribution.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mean {
-    /// The mean; null in JSON if it is infinite.
+    /// Mean; null in JSON if it is infinite.
     pub value: f64,
-    /// Ends of the interval; `None` for fewer than [`LEAST_VALUES`] numbers or an infinite mean.
+    /// Bounds of the interval; `None` for fewer than [`MIN_VALUES`] numbers or an infinite mean.
     pub interval: Option<[f64; 2]>,
-    /// Number of values that the mean is taken over.
+    /// Number of values.
     pub n: usize,
 }
 
 impl Mean {
-    /// Mean of numbers; some may be infinite. `None` without numbers.
+    /// Computes the mean of numbers, some of which may be infinite; `None` without numbers.
     #[must_use]
     pub fn from_values(numbers: &[f64]) -> Option<Self> {
         let n = numbers.len();
@@ -29,7 +29,7 @@ impl Mean {
         }
         let value = numbers.iter().sum::<f64>() / n as f64;
         let squares: f64 = numbers.iter().map(|x| (x - value) * (x - value)).sum();
-        let interval = (n >= LEAST_VALUES && value.is_finite()).then(|| {
+        let interval = (n >= MIN_VALUES && value.is_finite()).then(|| {
             let error = (squares / (n - 1) as f64 / n as f64).sqrt();
             let half = student((n - 1) as f64) * error;
             [value - half, value + half]

@@ -1,5 +1,5 @@
-//! Similarity of a synthetic image to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise
-//! ([`residual`]); the gain that a real image's noise speaks for ([`gain`]), and whether two images are a pair ([`scene`]).
+//! Similarity of a synthetic image to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise ([`residual`]). Also
+//! the camera gain estimated from the noise of a real image ([`gain`]), and the check that two images show the same scene ([`scene`]).
 
 pub mod gain;
 pub mod mean;
@@ -26,9 +26,9 @@ pub struct ImageComparison {
     pub psnr: f64,
     /// Structural similarity, at most 1.
     pub ssim: f64,
-    /// Divergence of the residuals by the requested rule about empty bins.
+    /// Divergence of the residuals by the requested rule for empty bins.
     pub kl: Divergence,
-    /// The same by the other rule.
+    /// Divergence of the residuals by the other rule.
     pub kl_other: Divergence,
 }
 
@@ -39,7 +39,7 @@ impl ImageComparison {
         let numbers = |image: &Self| [image.psnr, image.ssim, image.kl.nats];
         let (of_self, of_other) = (numbers(self), numbers(other));
         std::array::from_fn(|i| {
-            // Two perfect images differ by 0, though both have an infinite PSNR.
+            // Two perfect images differ by 0, although both have an infinite PSNR.
             let is_equal = of_self[i].total_cmp(&of_other[i]).is_eq();
             if is_equal {
                 0.0
@@ -57,21 +57,21 @@ pub struct PairComparison {
     pub pair: String,
     /// Exposure drop of the pair in EV.
     pub drop: f32,
-    /// How far both images show one scene.
+    /// Agreement of the structure of both images.
     pub scene: SceneMatch,
-    /// The image made by exposure drop alone.
+    /// Image made by exposure drop alone.
     pub exposure: ImageComparison,
-    /// The images made with sensor noise, in the same order for all pairs.
+    /// Images made with sensor noise, in the same order for all pairs.
     pub noise: Vec<NoiseComparison>,
 }
 
 /// Comparison of one image made with sensor noise.
 #[derive(Debug, Clone)]
 pub struct NoiseComparison {
-    /// How the image was made.
+    /// Method by which the image was made.
     pub method: NoiseMethod,
     pub image: ImageComparison,
-    /// PSNR in dB of the sensor branch without noise, which shows the error of its tones alone.
+    /// PSNR in dB of the sensor simulation without noise, which measures the error of its tones alone.
     pub clean_psnr: f64,
 }
 
@@ -83,20 +83,20 @@ pub struct NoiseMethod {
     pub camera: CameraOrigin,
 }
 
-/// Where the gain of the camera comes from.
+/// Source of the camera gain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CameraOrigin {
-    /// From the settings.
+    /// The settings.
     Given,
-    /// It was fitted to the other pairs.
+    /// A fit to the other pairs.
     OtherPairs,
-    /// It was fitted to the same pairs that it is judged by.
+    /// A fit to the same pairs that are evaluated.
     SamePairs,
 }
 
 impl CameraOrigin {
-    /// The word in CSV and JSON.
+    /// Word in CSV and JSON.
     #[must_use]
     pub fn word(self) -> &'static str {
         match self {
@@ -124,17 +124,18 @@ impl fmt::Display for NoiseMethod {
 /// If the sizes differ.
 pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
-    // 2¹⁶ squares of 255 and more fit a `u32`, which takes a third of the time of a `u64`.
+    // A `u32` can sum 2¹⁶ squares of 255 and takes a third of the time of a `u64`.
     let mean = a
         .samples()
         .chunks(1 << 16)
         .zip(b.samples().chunks(1 << 16))
         .map(|(a, b)| {
-            let squares = a
+            let squares: u32 = a
                 .iter()
                 .zip(b)
-                .map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2));
-            u64::from(squares.sum::<u32>())
+                .map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2))
+                .sum();
+            u64::from(squares)
         })
         .sum::<u64>() as f64
         / a.samples().len() as f64;
@@ -150,10 +151,9 @@ pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
         std::array::from_fn(|code| libm::pow((code as f64 / 255.0).max(1e-8), 2.2));
     let mean = |image: &Rgb| {
         let mut counts = [0_u64; 256];
-        image
-            .samples()
-            .iter()
-            .for_each(|code| counts[usize::from(*code)] += 1);
+        for code in image.samples() {
+            counts[usize::from(*code)] += 1;
+        }
         counts
             .iter()
             .zip(linear)
@@ -161,8 +161,8 @@ pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
             .sum::<f64>()
             / image.samples().len() as f64
     };
-    let black = |image: &Rgb| image.samples().iter().all(|code| *code == 0);
-    if black(normal) || black(low) {
+    let is_black = |image: &Rgb| image.samples().iter().all(|code| *code == 0);
+    if is_black(normal) || is_black(low) {
         let problem =
             "an image is black, so its exposure drop cannot be estimated; set it with --ev";
         return Err(Error::data("pair", problem));

@@ -1,5 +1,5 @@
-//! Residuals of noisy images over their clean image: [`Residuals`], and the divergence of synthetic residuals from real
-//! ones ([`divergence`]).
+//! Residuals of noisy images relative to their clean image ([`Residuals`]), and the divergence of synthetic residuals from real ones
+//! ([`divergence`]).
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ use darkqa_ground::types::Rgb;
 /// Number of possible differences of two 8-bit codes: −255 to 255.
 const STEPS: usize = 511;
 
-/// Counts of the differences of codes, all channels pooled, and their moments by clean code.
+/// Histogram of the differences of codes over all channels, and their moments by clean code.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Residuals {
     /// Number of samples with each difference, from −255 to 255.
@@ -32,7 +32,7 @@ impl Default for Residuals {
 }
 
 impl Residuals {
-    /// Residuals of `image` over `clean`.
+    /// Computes the residuals of `image` relative to `clean`.
     ///
     /// # Errors
     /// If the sizes differ.
@@ -62,13 +62,13 @@ impl Residuals {
         }
     }
 
-    /// Each difference of codes, −255 to 255, with its share of all samples.
+    /// Differences of codes, from −255 to 255, each with its share of all samples.
     pub fn shares(&self) -> impl Iterator<Item = (i32, f64)> {
         let n = self.counts.iter().sum::<u64>().max(1) as f64;
         (-255..).zip(self.counts.iter().map(move |count| *count as f64 / n))
     }
 
-    /// For each clean code that occurs: the code, its number of samples, and the mean and standard deviation of its residuals.
+    /// For each clean code that occurs: code, number of samples, and mean and standard deviation of its residuals.
     pub fn by_code(&self) -> impl Iterator<Item = (usize, i64, [f64; 2])> {
         self.codes
             .iter()
@@ -85,6 +85,7 @@ impl Residuals {
             })
     }
 
+    /// Number of samples in each bin.
     fn binned(&self, bins: Bins) -> Vec<u64> {
         let mut binned = vec![0; bins.count()];
         for (difference, count) in (-255..).zip(&self.counts) {
@@ -135,10 +136,10 @@ impl Bins {
         }
     }
 
-    /// The bin of a difference of codes.
+    /// Bin of a difference of codes.
     fn index(self, difference: i32) -> usize {
         match self {
-            // An edge belongs to the bin above it, as in numpy.
+            // A value on an edge belongs to the bin above, as in numpy.
             Self::Fu => {
                 let residual = f64::from(difference) / 255.0;
                 (0..65)
@@ -150,7 +151,7 @@ impl Bins {
     }
 }
 
-/// The inner edges of [`Bins::Fu`] are numpy's `arange(-0.1, 0.1 + 1e-9, 0.2 / 64)`: s + i · d with d = (s + 0.2/64) − s.
+/// Inner edge of [`Bins::Fu`]. The edges are those of numpy's `arange(-0.1, 0.1 + 1e-9, 0.2 / 64)`: s + i · d with d = (s + 0.2/64) − s.
 /// The middle edge is 8·10⁻¹⁷, not 0, so that a residual of 0 is counted in the bin below it.
 fn inner_edge(index: usize) -> f64 {
     const FIRST: f64 = -0.1;
@@ -167,7 +168,7 @@ pub struct Divergence {
     pub empty: usize,
 }
 
-/// D_KL(real ‖ synthetic) of two sets of residuals. The rule is ignored for [`Bins::Kousha`], which leaves no bin empty.
+/// Computes D_KL(real ‖ synthetic) of two sets of residuals. The rule is ignored for [`Bins::Kousha`], which has no empty bins.
 #[must_use]
 pub fn divergence(
     real: &Residuals,
@@ -207,6 +208,7 @@ enum AddedCount {
     Share,
 }
 
+/// Share of each bin, after adding an amount to each.
 fn shares(counts: &[u64], added: AddedCount) -> Vec<f64> {
     let n = counts.iter().sum::<u64>() as f64;
     let raised: Vec<f64> = counts
@@ -295,7 +297,7 @@ mod tests {
 
     /// The bins of numpy for the residuals k/255, k from −26 to 26: `np.histogram` with the edges above.
     #[test]
-    fn bins_are_those_of_numpy() {
+    fn bins_match_numpy() {
         let found: Vec<usize> = (-26..=26).map(|k| Bins::Fu.index(k)).collect();
         assert_eq!(found, NUMPY);
         assert_eq!((Bins::Fu.index(-255), Bins::Fu.index(255)), (0, 65));

@@ -1,34 +1,34 @@
-//! [`SceneMatch`]: evidence that two images show one scene in different light.
+//! Check that two images show the same scene in different light: [`SceneMatch`].
 //!
-//! Both images are cut into blocks, whose means have little noise. The mean of the 5 × 5 blocks around it is subtracted from each, so that
-//! the general distribution of light does not count. The rest correlates if the scene is the same. An exposure drop multiplies codes by
-//! 2^(−ΔEV/2.2), which does not change a correlation.
+//! Both images are divided into blocks, whose means have little noise. The mean of the surrounding 5 × 5 blocks is subtracted from each
+//! mean, which removes the large-scale distribution of light. The remaining structure correlates if the scene is the same. An exposure drop
+//! multiplies codes by 2^(−ΔEV/2.2), which does not change the correlation.
 //!
 //! Measured on 33 indoor photographs of 21 scenes at 600 × 400: the correlation is 0.37 to 1 (median 0.99) for 1,055 synthetic
 //! partners of 2 to 9 EV, all noise profiles, K 0.1 and 6; at most 0.21 for 1,483 pairs of two scenes, 427 of them with real
-//! low-light images; 1.00 and 0.86 for a real and a synthetic pair of LOL-v2. A picture of 4 EV that is moved by 2 % of its shorter
-//! side has 0.67 or more, by 4 % 0.25 or more.
+//! low-light images; 1.00 and 0.86 for a real and a synthetic pair of LOL-v2. An image at 4 EV that is shifted by 2 % of its shorter
+//! side has at least 0.67, by 4 % at least 0.25.
 
 use darkqa_ground::types::Rgb;
 
-/// Correlation below which images do not show one scene (chosen, see above).
-pub const LEAST_CORRELATION: f64 = 0.25;
-/// Least correlation that the structure of the image in normal light must be able to reach under the noise of the other one. Below it, a
-/// low correlation is no evidence (chosen).
-const LEAST_REACH: f64 = 0.5;
-/// Number of blocks along the shorter side, about (chosen).
+/// Minimum correlation of images of the same scene (chosen, see above).
+pub const MIN_CORRELATION: f64 = 0.25;
+/// Minimum correlation that the same scene would reach under the noise of the dark image (chosen). Below it, a low correlation is no
+/// evidence.
+const MIN_REACH: f64 = 0.5;
+/// Approximate number of blocks along the shorter side (chosen).
 const BLOCKS: usize = 25;
-/// A block's side in pixels is a multiple of this, and at least this (chosen).
+/// Step of the side of a block in pixels, and its minimum (chosen).
 const SIDE_STEP: usize = 8;
-/// Number of blocks on each side of a block that its surroundings reach (chosen).
-const REACH: usize = 2;
-/// Median of the absolute value of a standard normal number.
+/// Radius of the surroundings of a block, in blocks (chosen).
+const SURROUNDING_RADIUS: usize = 2;
+/// Median of the absolute value of a standard normal variable.
 const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
-/// How far the structure of two images agrees.
+/// Agreement of the structure of two images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SceneMatch {
-    /// Correlation of the structure, −1 to 1; `None` if there is too little structure or too much noise to compare.
+    /// Correlation of the structure, from −1 to 1; `None` with too little structure or too much noise.
     pub correlation: Option<f64>,
 }
 
@@ -43,7 +43,7 @@ impl SceneMatch {
         let dropped = libm::exp2(-drop_ev / 2.2);
         let signal = dropped * (squares / clean.len().max(1) as f64).sqrt();
         let reach = signal / libm::hypot(signal, low.noise);
-        let is_clear = reach >= LEAST_REACH && squares > 0.0;
+        let is_clear = reach >= MIN_REACH && squares > 0.0;
         Self {
             correlation: is_clear.then(|| {
                 if others > 0.0 {
@@ -55,20 +55,20 @@ impl SceneMatch {
         }
     }
 
-    /// Whether the images show two scenes.
+    /// True if the images show two different scenes.
     #[must_use]
     pub fn is_of_two_scenes(self) -> bool {
         self.correlation
-            .is_some_and(|correlation| correlation < LEAST_CORRELATION)
+            .is_some_and(|correlation| correlation < MIN_CORRELATION)
     }
 }
 
-/// Means of the green codes of an image's blocks.
+/// Mean green code of each block of an image.
 struct BlockMeans {
-    /// Number of blocks: down, across.
+    /// Numbers of rows and columns of blocks.
     size: [usize; 2],
     means: Vec<f64>,
-    /// Standard deviation of a mean by noise, in codes.
+    /// Standard deviation of a mean due to noise, in codes.
     noise: f64,
 }
 
@@ -91,22 +91,24 @@ impl BlockMeans {
         }
     }
 
-    /// Each mean minus that of the blocks around it (edge blocks are extended beyond the image), then minus the mean of all.
+    /// Subtracts from each mean that of the surrounding blocks, then the overall mean. Blocks at the edges are repeated beyond the image.
     fn structure(&self) -> Vec<f64> {
         let [height, width] = self.size;
-        let near = |at: usize, size: usize| {
-            (at..=at + 2 * REACH).map(move |place| place.saturating_sub(REACH).min(size - 1))
+        let surrounding = |index: usize, size: usize| {
+            (index..=index + 2 * SURROUNDING_RADIUS)
+                .map(move |other| other.saturating_sub(SURROUNDING_RADIUS).min(size - 1))
         };
         let mut structure: Vec<f64> = (0..height)
             .flat_map(|row| (0..width).map(move |column| (row, column)))
             .map(|(row, column)| {
-                let rows = near(row, height);
-                let sums = rows.map(|y| {
-                    let line = &self.means[y * width..][..width];
-                    near(column, width).map(|x| line[x]).sum::<f64>()
-                });
-                let n = (2 * REACH + 1).pow(2) as f64;
-                self.means[row * width + column] - sums.sum::<f64>() / n
+                let sum: f64 = surrounding(row, height)
+                    .map(|y| {
+                        let line = &self.means[y * width..][..width];
+                        surrounding(column, width).map(|x| line[x]).sum::<f64>()
+                    })
+                    .sum();
+                let n = (2 * SURROUNDING_RADIUS + 1).pow(2) as f64;
+                self.means[row * width + column] - sum / n
             })
             .collect();
         let mean = structure.iter().sum::<f64>() / structure.len().max(1) as f64;
@@ -117,8 +119,8 @@ impl BlockMeans {
     }
 }
 
-/// Mean green codes of two halves of a block with the same centre: of every eight rows, the two first and the two last, and the
-/// four between them. Their difference is noise.
+/// Mean green codes of two halves of a block with the same center: of every eight rows, the outer four and the inner four. Their difference
+/// is noise.
 fn halves(image: &Rgb, [top, left]: [usize; 2], side: usize) -> [f64; 2] {
     let mut sums = [0_u64; 2];
     for row in 0..side {

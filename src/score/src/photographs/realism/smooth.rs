@@ -1,4 +1,4 @@
-//! Noise of a low-light image in smooth blocks: [`SmoothBlocks`] and [`SpreadCurve`].
+//! Noise of a low-light image, measured in smooth blocks: [`SmoothBlocks`] and [`SpreadCurve`].
 //!
 //! Blocks are smooth if the image in normal light has little structure there. Variation in the same blocks of the low-light image is
 //! noise. A noise model must reproduce its spread as a function of the clean code, which is the green code that the exposure drop alone

@@ -1,50 +1,48 @@
-//! How a frame looks in numbers that any two sets of frames can be compared by: [`FrameLook`]. No rule reads them.
+//! Image statistics of a frame for comparing sets of frames: [`FrameAppearance`]. No rule uses them.
 
 use ndarray::Array2;
 
-use super::colors::{BINS, Color, NONE, Palette};
+use super::colors::{BINS, Palette};
 use super::statistics::ppm;
 use darkqa_ground::types::{Frame, Rgb};
 
-/// The number of rows to which higher images are reduced before edges are looked for (chosen). A picture of more pixels has weaker
-/// edges from pixel to pixel, whatever it shows.
-const ROWS: usize = 480;
+/// Maximum number of rows for detecting edges (chosen). Higher images are reduced, because the luma of a large image changes less from
+/// pixel to pixel.
+const MAX_ROWS: usize = 480;
 
-/// The minimum gradient of an edge, in codes of luma per pixel (chosen).
-pub const STEEP: f32 = 2.5;
+/// Minimum gradient of an edge, in codes of luma per pixel (chosen).
+pub const MIN_EDGE_GRADIENT: f32 = 2.5;
 
-/// The minimum area of a segment that is counted, in millionths of the frame; as in the rulebook.
-const LEAST_PPM: u64 = 500;
+/// Minimum area of a segment that is counted, in millionths of the frame; the same as in the rulebook.
+const MIN_SEGMENT_PPM: u64 = 500;
 
-/// The weights of red, green and blue in luminance and luma (ITU-R BT.709).
+/// Weights of red, green and blue in luminance and luma (ITU-R BT.709).
 const WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 
-/// How a frame looks.
+/// Image statistics of a frame.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrameLook {
-    /// Its mean linear light in EV relative to white.
+pub struct FrameAppearance {
+    /// Mean linear light in EV relative to white.
     pub light_ev: f64,
-    /// The share of its pixels at edges.
+    /// Share of pixels at edges, from 0 to 1.
     pub edges: f64,
-    /// The share of its pixels of each colour: the eleven names in order, then those without a name.
+    /// Share of pixels of each colour, from 0 to 1: the eleven names in order, then pixels without a name.
     pub colors: [f64; BINS],
-    /// The number of its segments that are not tiny; `None` without a map of segments.
+    /// Number of segments that are not tiny; `None` without a segment map.
     pub segments: Option<usize>,
-    /// The 10 %, 50 % and 90 % quantiles of its depth in metres; `None` without a depth map.
+    /// 10 %, 50 % and 90 % quantiles of depth in metres; `None` without a depth map.
     pub depth: Option<[f64; 3]>,
 }
 
-impl FrameLook {
-    /// The look of a frame, its colours named by a palette. The depth is taken as its map has it.
+impl FrameAppearance {
+    /// Measures a frame, with colours named by a palette. Depth values are used as stored in the map.
     #[must_use]
     pub fn new(frame: &Frame, palette: &Palette) -> Self {
         let pixels = (frame.rgb.height() * frame.rgb.width()).max(1) as f64;
         let mut colors = [0_u64; BINS];
         let (codes, _) = frame.rgb.samples().as_chunks::<3>();
         for code in codes {
-            let color = palette.color(*code);
-            let place = color.and_then(|name| Color::ALL.iter().position(|other| *other == name));
-            colors[place.unwrap_or(NONE)] += 1;
+            colors[palette.bin(*code)] += 1;
         }
         Self {
             light_ev: mean_light(codes).log2(),
@@ -56,7 +54,7 @@ impl FrameLook {
     }
 }
 
-/// The mean luminance of 8-bit sRGB codes, 1 for white; at least that of half a code (IEC 61966-2-1).
+/// Mean luminance of 8-bit sRGB codes, 1 for white; at least half of that of code 1 (IEC 61966-2-1).
 fn mean_light(codes: &[[u8; 3]]) -> f64 {
     let light: [f64; 256] = std::array::from_fn(|code| {
         let value = code as f64 / 255.0;
@@ -78,14 +76,14 @@ fn mean_light(codes: &[[u8; 3]]) -> f64 {
     (sum / codes.len().max(1) as f64).max(light[1] / 2.0)
 }
 
-/// The share of pixels whose luma changes by [`STEEP`] codes per pixel or more: the magnitude of Sobel's gradient (I. Sobel and
-/// G. Feldman 1968), an eighth of the sums of its masks. Images of more than [`ROWS`] rows are reduced first.
+/// Share of pixels whose luma changes by at least [`MIN_EDGE_GRADIENT`] codes per pixel, by the magnitude of the Sobel gradient (I. Sobel
+/// and G. Feldman 1968): an eighth of the response of its kernels. Images of more than [`MAX_ROWS`] rows are reduced first.
 fn edges(image: &Rgb) -> f64 {
-    let luma = reduced(&luma(image));
+    let luma = reduce(&luma(image));
     let (height, width) = luma.dim();
     let at = |y: usize, x: usize, down: usize, right: usize| {
         let near =
-            |place: usize, step: usize, end: usize| (place + step).saturating_sub(1).min(end - 1);
+            |index: usize, step: usize, end: usize| (index + step).saturating_sub(1).min(end - 1);
         luma[(near(y, down, height), near(x, right, width))]
     };
     let mut steep = 0_usize;
@@ -94,34 +92,39 @@ fn edges(image: &Rgb) -> f64 {
             let side = |right| at(y, x, 0, right) + 2.0 * at(y, x, 1, right) + at(y, x, 2, right);
             let row = |down| at(y, x, down, 0) + 2.0 * at(y, x, down, 1) + at(y, x, down, 2);
             let (across, along) = (side(2) - side(0), row(2) - row(0));
-            steep += usize::from((across * across + along * along).sqrt() / 8.0 >= STEEP);
+            steep +=
+                usize::from((across * across + along * along).sqrt() / 8.0 >= MIN_EDGE_GRADIENT);
         }
     }
     steep as f64 / (height * width).max(1) as f64
 }
 
+/// Luma of each pixel, in codes.
 fn luma(image: &Rgb) -> Array2<f32> {
     let (codes, _) = image.samples().as_chunks::<3>();
     let width = image.width();
     Array2::from_shape_fn((image.height(), width), |(y, x)| {
-        let code = codes[y * width + x].iter().zip(WEIGHTS);
-        code.map(|(code, weight)| f32::from(*code) * weight).sum()
+        codes[y * width + x]
+            .iter()
+            .zip(WEIGHTS)
+            .map(|(code, weight)| f32::from(*code) * weight)
+            .sum()
     })
 }
 
-/// A map with at most [`ROWS`] rows: each new pixel is the mean of those that it covers.
-fn reduced(map: &Array2<f32>) -> Array2<f32> {
+/// Reduces a map to at most [`MAX_ROWS`] rows; each new pixel is the mean of the pixels that it covers.
+fn reduce(map: &Array2<f32>) -> Array2<f32> {
     let (height, width) = map.dim();
-    if height <= ROWS {
+    if height <= MAX_ROWS {
         return map.clone();
     }
-    let columns = (width * ROWS / height).max(1);
-    let rows = shrunk(map, ROWS);
-    shrunk(&rows.reversed_axes(), columns).reversed_axes()
+    let columns = (width * MAX_ROWS / height).max(1);
+    let rows = resize_rows(map, MAX_ROWS);
+    resize_rows(&rows.reversed_axes(), columns).reversed_axes()
 }
 
-/// A map with another number of rows, each the mean of the rows that it covers.
-fn shrunk(map: &Array2<f32>, rows: usize) -> Array2<f32> {
+/// Reduces a map to a number of rows, each the mean of the rows that it covers.
+fn resize_rows(map: &Array2<f32>, rows: usize) -> Array2<f32> {
     let (height, width) = map.dim();
     let step = height as f32 / rows as f32;
     let mut shrunk = Array2::zeros((rows, width));
@@ -137,6 +140,7 @@ fn shrunk(map: &Array2<f32>, rows: usize) -> Array2<f32> {
     shrunk
 }
 
+/// Number of segments that are not tiny.
 fn segments(map: &Array2<u32>) -> usize {
     let mut counts = std::collections::BTreeMap::<u32, u64>::new();
     for number in map.iter().filter(|number| **number != 0) {
@@ -145,10 +149,11 @@ fn segments(map: &Array2<u32>) -> usize {
     let whole = map.len() as u64;
     counts
         .values()
-        .filter(|count| ppm(**count, whole) >= LEAST_PPM)
+        .filter(|count| ppm(**count, whole) >= MIN_SEGMENT_PPM)
         .count()
 }
 
+/// 10 %, 50 % and 90 % quantiles of depth in metres; `None` if no pixel has depth.
 fn depth(map: &Array2<u32>) -> Option<[f64; 3]> {
     let mut known: Vec<u32> = map.iter().copied().filter(|depth| *depth > 0).collect();
     known.sort_unstable();
@@ -180,10 +185,10 @@ mod tests {
     #[test]
     fn edges_are_where_luma_changes() {
         assert!(edges(&image(40, 50, |_, _| 90)) == 0.0);
-        // A step of 100 codes: the two columns beside it.
+        // A step of 100 codes: the columns on both sides of it.
         let step = image(40, 50, |_, x| if x < 25 { 60 } else { 160 });
         assert!((edges(&step) - 2.0 / 50.0).abs() < 1e-9);
-        // A slope below the threshold is none, one above it is, but for the border.
+        // A slope below the threshold has no edges; one above it has edges everywhere but at the border.
         assert!(edges(&image(40, 50, |_, x| 2 * x as u8)) == 0.0);
         assert!(edges(&image(40, 50, |_, x| 3 * x as u8)) > 0.9);
     }
@@ -203,7 +208,7 @@ mod tests {
             (small - large).abs() < 1e-9 && small > 0.1,
             "{small} {large}"
         );
-        let odd = reduced(&luma(&image(720, 960, |_, _| 77)));
+        let odd = reduce(&luma(&image(720, 960, |_, _| 77)));
         assert_eq!(odd.dim(), (480, 640));
         assert!(odd.iter().all(|luma| (luma - 77.0).abs() < 1e-3));
     }

@@ -1,34 +1,33 @@
-//! One correction over all tests that a report's sentences rest on: [`adjusted`].
+//! Multiple-testing correction over a tree of tests: [`adjust_p_values`].
 //!
-//! The tests are a tree. The level of 5 % is shared by the branches in proportion to their weights. A test that depends on another one
-//! starts only after that one is rejected, and takes over its share: so a finding about several levels together costs nothing more if the
-//! single levels are tested below it, each after the one before. When all tests of a branch are rejected, its share goes to the
-//! branches beside it. Where all tests are leaves of one weight, this is Holm's procedure (Holm 1979, Scand. J. Stat. 6:65); a single
-//! branch of tests below each other is a fixed sequence.
+//! The significance level of 5 % is divided between the branches in proportion to their weights. A test below another one starts only after
+//! that one is rejected, and inherits its share. Single levels can therefore be tested after their mean, one after the other, at no
+//! additional cost. When all tests of a branch are rejected, its share goes to its sibling branches. If all tests are leaves of equal
+//! weight, this is Holm's procedure (Holm 1979, Scand. J. Stat. 6:65); a single chain of tests is a fixed sequence.
 //!
-//! Shares never shrink while tests are rejected and never add up to more than 1. Therefore the probability that any true hypothesis is
-//! rejected is at most 5 %, whichever others are false and however the tests depend on each other (Goeman and Solari 2010, Ann. Stat.
+//! Shares never shrink while tests are rejected, and never add up to more than 1. The probability that any true hypothesis is rejected is
+//! therefore at most 5 %, whichever others are false and however the tests depend on each other (Goeman and Solari 2010, Ann. Stat.
 //! 38:3782, theorem 1; Goeman and Finos 2012, Stat. Appl. Genet. Mol. Biol. 11(1):11, for trees; Bretz, Maurer, Brannath and Posch 2009,
 //! Stat. Med. 28:586, for weights that pass from test to test).
 
-/// A test with the tests that start after it, or a group of tests that start together.
+/// A test and the branches that start after its rejection, or a group of branches that start together.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct TestTree<T> {
-    /// The test before the others; `None` for a group.
+    /// The test; `None` for a group.
     test: Option<T>,
-    /// Share of the level beside the other branches, in any unit.
+    /// Share of the level, relative to the weights of the sibling branches.
     weight: f64,
     branches: Vec<Self>,
 }
 
 impl<T> TestTree<T> {
-    /// A test alone.
+    /// Creates a single test.
     pub(super) fn leaf(test: T) -> Self {
-        Self::before(test, Vec::new())
+        Self::with_branches(test, Vec::new())
     }
 
-    /// A test, and the branches that start once it is rejected.
-    pub(super) fn before(test: T, branches: Vec<Self>) -> Self {
+    /// Creates a test with branches that start once it is rejected.
+    pub(super) fn with_branches(test: T, branches: Vec<Self>) -> Self {
         Self {
             test: Some(test),
             weight: 1.0,
@@ -36,30 +35,34 @@ impl<T> TestTree<T> {
         }
     }
 
-    /// Branches that start together. Those without a test are left out.
+    /// Creates a group of branches that start together; branches without a test are left out.
     pub(super) fn group(branches: impl IntoIterator<Item = Self>) -> Self {
-        let branches = branches.into_iter().filter(|branch| !branch.is_empty());
         Self {
             test: None,
             weight: 1.0,
-            branches: branches.collect(),
+            branches: branches
+                .into_iter()
+                .filter(|branch| !branch.is_empty())
+                .collect(),
         }
     }
 
-    /// A chain of tests: each starts once the one before is rejected.
+    /// Creates a chain of tests: each starts once the previous one is rejected.
     pub(super) fn chain(tests: impl DoubleEndedIterator<Item = T>) -> Self {
-        let below = tests.rev().fold(None, |below, test| {
-            Some(Self::before(test, below.into_iter().collect()))
-        });
-        below.unwrap_or_else(|| Self::group([]))
+        tests
+            .rev()
+            .fold(None, |below, test| {
+                Some(Self::with_branches(test, below.into_iter().collect()))
+            })
+            .unwrap_or_else(|| Self::group([]))
     }
 
-    /// The same branch with this weight.
-    pub(super) fn weighing(self, weight: f64) -> Self {
+    /// Returns the branch with this weight.
+    pub(super) fn with_weight(self, weight: f64) -> Self {
         Self { weight, ..self }
     }
 
-    /// True without any test.
+    /// True if there is no test.
     pub(super) fn is_empty(&self) -> bool {
         self.test.is_none() && self.branches.iter().all(Self::is_empty)
     }
@@ -71,15 +74,15 @@ impl<T> TestTree<T> {
     }
 }
 
-/// A branch while tests are rejected.
+/// A branch of the tree during the procedure.
 struct Branch<T> {
-    /// The test with its p-value; `None` for a group.
+    /// Test with its p-value; `None` for a group.
     test: Option<(T, f64)>,
-    /// p-value after correction; `None` until the test is rejected.
+    /// Corrected p-value; `None` until the test is rejected.
     rejected: Option<f64>,
     weight: f64,
     branches: Vec<Self>,
-    /// Number of tests that are not rejected, with those below.
+    /// Number of tests that are not yet rejected, including those below.
     remaining: usize,
 }
 
@@ -98,69 +101,68 @@ impl<T: Copy> Branch<T> {
         }
     }
 
-    /// The test that has started, with a share of the level of `share` for this branch, and has the smallest p-value over its own
-    /// share: that ratio, and the places of the branches on the way to it.
-    fn next(&self, share: f64, way: &mut Vec<usize>) -> Option<f64> {
+    /// Finds the started test with the smallest ratio of its p-value to its share of the level; `share` is the share of this branch. Returns
+    /// the ratio and appends the indices of the branches that lead to the test to `path`.
+    fn next(&self, share: f64, path: &mut Vec<usize>) -> Option<f64> {
         if let (Some((_, p)), None) = (self.test, self.rejected) {
             return Some(p / share);
         }
-        let weights: f64 = self.open().map(|(_, branch)| branch.weight).sum();
+        let weights: f64 = self.unfinished().map(|(_, branch)| branch.weight).sum();
         let mut best: Option<(f64, Vec<usize>)> = None;
-        for (place, branch) in self.open() {
-            let mut below = vec![place];
-            let found = branch.next(share * branch.weight / weights, &mut below);
-            if let Some(found) = found
-                && best.as_ref().is_none_or(|(least, _)| found < *least)
+        for (index, branch) in self.unfinished() {
+            let mut below = vec![index];
+            if let Some(ratio) = branch.next(share * branch.weight / weights, &mut below)
+                && best.as_ref().is_none_or(|(smallest, _)| ratio < *smallest)
             {
-                best = Some((found, below));
+                best = Some((ratio, below));
             }
         }
-        let (least, below) = best?;
-        way.extend(below);
-        Some(least)
+        let (smallest, below) = best?;
+        path.extend(below);
+        Some(smallest)
     }
 
-    /// The branches with tests that are not rejected.
-    fn open(&self) -> impl Iterator<Item = (usize, &Self)> {
+    /// Branches with tests that are not yet rejected, by index.
+    fn unfinished(&self) -> impl Iterator<Item = (usize, &Self)> {
         self.branches
             .iter()
             .enumerate()
             .filter(|(_, branch)| branch.remaining > 0)
     }
 
-    /// Rejects the test at the end of a way.
-    fn reject(&mut self, way: &[usize], p: f64) {
+    /// Rejects the test at the end of a path.
+    fn reject(&mut self, path: &[usize], p: f64) {
         self.remaining -= 1;
-        match way {
+        match path {
             [] => self.rejected = Some(p),
-            [place, rest @ ..] => self.branches[*place].reject(rest, p),
+            [index, rest @ ..] => self.branches[*index].reject(rest, p),
         }
     }
 
-    /// The tests with their p-values after correction, those before others first.
-    fn corrected(&self, corrected: &mut Vec<(T, f64)>) {
+    /// Collects the tests with their corrected p-values, each before the tests below it.
+    fn collect_corrected(&self, corrected: &mut Vec<(T, f64)>) {
         if let Some((test, _)) = self.test {
             corrected.push((test, self.rejected.unwrap_or(1.0)));
         }
         for branch in &self.branches {
-            branch.corrected(corrected);
+            branch.collect_corrected(corrected);
         }
     }
 }
 
-/// All tests with their p-values after correction, by their p-values before. Those below 0.05 are the rejected ones.
+/// Returns all tests with their corrected p-values; `p` gives the p-value of a test. Tests with a corrected p-value below 0.05 are rejected.
 #[must_use]
-pub(super) fn adjusted<T: Copy>(tree: &TestTree<T>, p: impl Fn(T) -> f64) -> Vec<(T, f64)> {
+pub(super) fn adjust_p_values<T: Copy>(tree: &TestTree<T>, p: impl Fn(T) -> f64) -> Vec<(T, f64)> {
     let mut root = Branch::new(tree, &p);
     let mut highest = 0.0_f64;
-    let mut way = Vec::new();
-    while let Some(value) = root.next(1.0, &mut way) {
-        highest = highest.max(value).min(1.0);
-        root.reject(&way, highest);
-        way.clear();
+    let mut path = Vec::new();
+    while let Some(ratio) = root.next(1.0, &mut path) {
+        highest = highest.max(ratio).min(1.0);
+        root.reject(&path, highest);
+        path.clear();
     }
     let mut corrected = Vec::new();
-    root.corrected(&mut corrected);
+    root.collect_corrected(&mut corrected);
     corrected
 }
 
@@ -169,9 +171,9 @@ mod tests {
     use super::super::significance::holm;
     use super::*;
 
-    /// The p-values after correction of tests that are their own p-values.
+    /// Corrected p-values of tests, each represented by its p-value.
     fn corrected(tree: &TestTree<f64>) -> Vec<f64> {
-        adjusted(tree, |p| p)
+        adjust_p_values(tree, |p| p)
             .into_iter()
             .map(|(_, p)| (p * 1e9).round() / 1e9)
             .collect()
@@ -182,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn leaves_of_one_weight_are_holms_procedure() {
+    fn equal_leaves_follow_holms_procedure() {
         let values = [0.01, 0.04, 0.03, 0.005, 0.6, 0.0001, 0.03, 1.0];
         for (found, expected) in corrected(&leaves(&values)).iter().zip(holm(&values)) {
             assert!((found - expected).abs() < 1e-8);
@@ -200,14 +202,14 @@ mod tests {
 
     #[test]
     fn branches_start_after_the_test_before_them_and_share_its_level() {
-        let tree = TestTree::before(0.04, vec![TestTree::leaf(0.02), TestTree::leaf(0.03)]);
+        let tree = TestTree::with_branches(0.04, vec![TestTree::leaf(0.02), TestTree::leaf(0.03)]);
         assert_eq!(corrected(&tree), [0.04, 0.04, 0.04]);
-        let stopped = TestTree::before(0.2, vec![TestTree::leaf(0.001)]);
+        let stopped = TestTree::with_branches(0.2, vec![TestTree::leaf(0.001)]);
         assert_eq!(corrected(&stopped), [0.2, 0.2]);
     }
 
     #[test]
-    fn a_finished_branch_leaves_its_share_to_those_beside_it() {
+    fn finished_branch_passes_its_share_to_siblings() {
         let found = corrected(&TestTree::group([
             leaves(&[0.001, 0.002]),
             TestTree::leaf(0.03),
@@ -218,12 +220,12 @@ mod tests {
 
     #[test]
     fn weights_share_the_level() {
-        let heavy = TestTree::leaf(0.03).weighing(3.0);
+        let heavy = TestTree::leaf(0.03).with_weight(3.0);
         let found = corrected(&TestTree::group([heavy, TestTree::leaf(0.04), leaves(&[])]));
         assert_eq!(found, [0.04, 0.04]);
         let found = corrected(&TestTree::group([
             TestTree::leaf(0.01),
-            TestTree::leaf(0.5).weighing(3.0),
+            TestTree::leaf(0.5).with_weight(3.0),
         ]));
         assert_eq!(found, [0.04, 0.5]);
     }
@@ -237,13 +239,14 @@ mod tests {
         let share = (0..runs)
             .filter(|_| {
                 let mut p = || random.random_range(0.0..1.0);
-                let set = TestTree::before(p(), vec![TestTree::chain([p(), p()].into_iter())]);
+                let set =
+                    TestTree::with_branches(p(), vec![TestTree::chain([p(), p()].into_iter())]);
                 let tree = TestTree::group([
                     set,
-                    TestTree::leaf(p()).weighing(0.25),
+                    TestTree::leaf(p()).with_weight(0.25),
                     TestTree::group([TestTree::leaf(p()), TestTree::leaf(p())]),
                 ]);
-                adjusted(&tree, |p| p).iter().any(|(_, p)| *p < 0.05)
+                adjust_p_values(&tree, |p| p).iter().any(|(_, p)| *p < 0.05)
             })
             .count() as f64
             / f64::from(runs);

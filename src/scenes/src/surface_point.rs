@@ -10,12 +10,12 @@ use super::surface::SurfaceFinish;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SurfacePoint {
     /// Position in the scene, in metres.
-    pub(super) at: Vec3,
-    /// The surface normal, on the side that the ray came from.
+    pub(super) position: Vec3,
+    /// Surface normal, on the side that the ray came from.
     pub(super) normal: Vec3,
-    /// The share of light that the surface reflects, by channel.
+    /// Share of light that the surface reflects, by channel.
     pub(super) color: Vec3,
-    /// The light that the surface emits, by channel.
+    /// Light that the surface emits, by channel.
     pub(super) glow: Vec3,
     /// Index of the first thing that the ray hits; a mirror counts.
     pub(super) thing: usize,
@@ -23,8 +23,7 @@ pub(super) struct SurfacePoint {
     pub(super) seen_thing: usize,
     /// Distance along the ray to `thing`, in metres.
     pub(super) distance: f32,
-    /// Whether the surface has a highlight.
-    pub(super) glossy: Gloss,
+    pub(super) gloss: Gloss,
 }
 
 /// Whether a surface has a highlight.
@@ -41,29 +40,30 @@ pub(super) const FAR: f32 = 100.0;
 const MIRROR_REFLECTANCE: f32 = 0.92;
 
 impl SurfacePoint {
-    /// The first point that a ray hits; mirrors are ordinary surfaces. `None` if the ray hits nothing.
-    pub(super) fn first(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
-        let hit = tree.first(ray, FAR)?;
+    /// Returns the first point that a ray hits, treating mirrors as ordinary surfaces; `None` if the ray hits nothing.
+    pub(super) fn first_hit(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
+        let hit = tree.closest_hit(ray, FAR)?;
         Some(Self::new(scene, ray, hit))
     }
 
-    /// The first point that a ray hits. If it is on a mirror, the point that the mirror reflects, with the `thing` and `distance` of the
-    /// mirror; a second mirror is an ordinary surface. `None` if the ray or its reflection hits nothing.
+    /// Returns the first point that a ray hits, or the point reflected there if that is a mirror, with the `thing` and `distance` of the
+    /// mirror. A second mirror is an ordinary surface. `None` if the ray or its reflection hits nothing.
     pub(super) fn through_mirror(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
-        let hit = tree.first(ray, FAR)?;
-        let spot = Self::new(scene, ray, hit);
+        let hit = tree.closest_hit(ray, FAR)?;
+        let point = Self::new(scene, ray, hit);
         if scene.surface(hit.face).finish != SurfaceFinish::Mirror {
-            return Some(spot);
+            return Some(point);
         }
-        let direction = reflected(ray.direction, spot.normal);
+        let direction = reflect(ray.direction, point.normal);
         // The reflected ray starts 1 mm above the mirror, so that it does not hit the mirror again.
-        let reflection = Ray::new(spot.at + spot.normal * 1e-3, direction).wide(ray.spread);
-        let mirrored = Self::first(scene, tree, &reflection)?;
+        let reflection =
+            Ray::new(point.position + point.normal * 1e-3, direction).with_spread(ray.spread);
+        let mirrored = Self::first_hit(scene, tree, &reflection)?;
         Some(Self {
             color: mirrored.color * MIRROR_REFLECTANCE,
-            thing: spot.thing,
-            distance: spot.distance,
-            glossy: Gloss::Dull,
+            thing: point.thing,
+            distance: point.distance,
+            gloss: Gloss::Dull,
             ..mirrored
         })
     }
@@ -71,7 +71,7 @@ impl SurfacePoint {
     /// Interpolates the normal at a hit and evaluates the surface there.
     fn new(scene: &Scene, ray: &Ray, hit: Hit) -> Self {
         let face = &scene.mesh.faces[hit.face];
-        let thing = scene.owners[hit.face];
+        let thing = scene.face_owners[hit.face];
         let surface = scene.surface(hit.face);
         let [u, v] = hit.weights;
         let [a, b, c] = face.corners.map(|corner| corner.normal);
@@ -79,26 +79,26 @@ impl SurfacePoint {
         if normal.dot(ray.direction) > 0.0 {
             normal = -normal;
         }
-        let at = ray.from + ray.direction * hit.distance;
+        let position = ray.origin + ray.direction * hit.distance;
         let pose = &scene.things[thing].pose;
         let slant = normal.dot(ray.direction).abs().max(0.1);
         // Geometric mean width of the ray on the surface, in metres: a slanted surface widens it in one direction.
         let footprint = hit.distance * ray.spread / slant.sqrt();
         let local_normal = pose.direction_to_piece(normal);
-        let color = surface.color_at(pose.to_piece(at), local_normal, footprint);
+        let color = surface.color_at(pose.to_piece(position), local_normal, footprint);
         let glow = match surface.finish {
             SurfaceFinish::Glow(strength) => color * strength,
             SurfaceFinish::Matte | SurfaceFinish::Glossy | SurfaceFinish::Mirror => Vec3::ZERO,
         };
         Self {
-            at,
+            position,
             normal,
             color,
             glow,
             thing,
             seen_thing: thing,
             distance: hit.distance,
-            glossy: if surface.finish == SurfaceFinish::Glossy {
+            gloss: if surface.finish == SurfaceFinish::Glossy {
                 Gloss::Shiny
             } else {
                 Gloss::Dull
@@ -107,7 +107,7 @@ impl SurfacePoint {
     }
 }
 
-/// Reflects a direction by a surface with a unit normal.
-pub(super) fn reflected(direction: Vec3, normal: Vec3) -> Vec3 {
+/// Reflects a direction at a surface with a unit normal.
+pub(super) fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
     direction - normal * (2.0 * direction.dot(normal))
 }

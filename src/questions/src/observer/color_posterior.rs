@@ -1,4 +1,4 @@
-//! The colour of a thing in the untouched frame, inferred from the received pixels in the light of its surroundings: [`Shade`].
+//! Untouched colour of an object, inferred from the received pixels and the light of its surroundings: [`ColorPosterior`].
 
 use super::cells::Cells;
 use super::channel::{ChannelFit, Fit, ROUNDING};
@@ -7,15 +7,14 @@ use super::outlines::PatchSums;
 use super::tiles::Tiles;
 use crate::colors::{Color, Palette};
 
-/// Largest standard deviation of an inferred code with which a colour is named, in codes (chosen).
+/// Maximum standard deviation of an inferred code for naming a colour, in codes (chosen).
 const MAX_DEVIATION: f64 = 48.0;
 
-/// Standard deviation of the weights with which the surroundings of a thing show the light on it, in longer sides of the frame
-/// (chosen).
-const SMOOTHED: f64 = 0.125;
+/// Standard deviation of the Gaussian weights of the surroundings of an object, relative to the longer side of the frame (chosen).
+const KERNEL_WIDTH: f64 = 0.125;
 
 /// Ratio of the standard deviation of normal numbers to their median absolute deviation.
-const DEVIATION: f64 = 1.4826;
+const DEVIATION_PER_MAD: f64 = 1.4826;
 
 /// Ratio of the standard error of the median of normal numbers to that of their mean, √(π/2).
 const MEDIAN_ERROR: f64 = 1.25;
@@ -32,25 +31,26 @@ struct Posterior {
     blocks: [f64; BLOCKS],
 }
 
-/// Posterior of the untouched colour of a thing.
+/// Posterior of the untouched colour of an object, for each channel.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Shade([Posterior; 3]);
+pub(super) struct ColorPosterior([Posterior; 3]);
 
-/// The light on the objects of a frame, estimated from their surroundings. An object's own colour is no evidence of its light: with a local
-/// light of its own, each object would have the expected colour.
-pub(super) struct Light<'a> {
+/// Light on the objects of a frame, estimated from their surroundings. The pixels of the object itself are ignored: otherwise, the
+/// estimated light would give each object the expected colour.
+pub(super) struct LightEstimate<'a> {
     cells: &'a Cells,
     tiles: &'a Tiles,
     sums: &'a [PatchSums],
     fit: &'a Fit,
-    /// Patches of the coarsest scale in tiles that are not disturbed; empty if the light is the same everywhere.
-    pieces: Vec<Piece>,
+    /// Patches in tiles that are not disturbed; empty if the light is the same everywhere.
+    patches: Vec<TilePatch>,
 }
 
-/// The pixels of one mask in one tile.
-struct Piece {
+/// Pixels of one mask in one tile.
+struct TilePatch {
     mask: u32,
-    place: [f64; 2],
+    /// Column and row of the tile.
+    tile: [f64; 2],
     pixels: f64,
     /// Mean received code of each channel.
     received: [f64; 3],
@@ -58,16 +58,16 @@ struct Piece {
     predicted: [f64; 3],
 }
 
-/// Linear fields of light about a place, one for each channel.
+/// Light that varies linearly around a center, for each channel. Positions are columns and rows of tiles.
 struct LightField {
-    middle: [f64; 2],
+    center: [f64; 2],
     channels: [[f64; 3]; 3],
 }
 
 impl LightField {
     /// Gain of the light in each channel.
-    fn at(&self, place: [f64; 2]) -> [f64; 3] {
-        let terms = linear_terms(place, self.middle);
+    fn gains_at(&self, tile: [f64; 2]) -> [f64; 3] {
+        let terms = linear_terms(tile, self.center);
         self.channels.map(|channel| {
             let gain: f64 = channel.iter().zip(terms).map(|(c, term)| c * term).sum();
             gain.max(MIN_GAIN)
@@ -75,11 +75,11 @@ impl LightField {
     }
 }
 
-fn linear_terms(place: [f64; 2], middle: [f64; 2]) -> [f64; 3] {
-    [1.0, place[0] - middle[0], place[1] - middle[1]]
+fn linear_terms(tile: [f64; 2], center: [f64; 2]) -> [f64; 3] {
+    [1.0, tile[0] - center[0], tile[1] - center[1]]
 }
 
-impl<'a> Light<'a> {
+impl<'a> LightEstimate<'a> {
     pub(super) fn new(
         cells: &'a Cells,
         tiles: &'a Tiles,
@@ -91,15 +91,15 @@ impl<'a> Light<'a> {
             tiles,
             sums,
             fit,
-            pieces: Vec::new(),
+            patches: Vec::new(),
         };
         if fit.is_local {
-            light.pieces = light.pieces();
+            light.patches = light.undisturbed_patches();
         }
         light
     }
 
-    fn pieces(&self) -> Vec<Piece> {
+    fn undisturbed_patches(&self) -> Vec<TilePatch> {
         let [.., coarsest] = &self.cells.scales;
         let mut sums = vec![PatchSums::default(); coarsest.patches.len()];
         for (part, whole) in self.sums.iter().zip(&coarsest.part_of) {
@@ -113,9 +113,9 @@ impl<'a> Light<'a> {
             .map(|(patch, sums)| {
                 let pixels = f64::from(patch.count);
                 let means = [0, 1, 2].map(|channel| sums.means(channel, pixels));
-                Piece {
+                TilePatch {
                     mask: patch.mask,
-                    place: self.tiles.place(patch.cell),
+                    tile: self.tiles.column_and_row(patch.cell),
                     pixels,
                     received: means.map(|[received, ..]| received),
                     predicted: means.map(|[_, predicted, _]| predicted),
@@ -124,35 +124,38 @@ impl<'a> Light<'a> {
             .collect()
     }
 
-    /// The shade of a mask; `None` if it has an eighth of no cell.
-    pub(super) fn shade(&self, mask: u32) -> Option<Shade> {
-        let least = (self.cells.side * self.cells.side / 8).max(3) as u32;
+    /// Infers the colour of a mask; `None` unless it covers at least an eighth of one of the smallest cells.
+    pub(super) fn color(&self, mask: u32) -> Option<ColorPosterior> {
+        let min_pixels = (self.cells.side * self.cells.side / 8).max(3) as u32;
         let [finest, _, coarsest] = &self.cells.scales;
-        let patches = finest.patches.iter().zip(self.sums).zip(&coarsest.part_of);
-        // The tile, the number of pixels and the sums of each patch of the mask.
-        let patches: Vec<(usize, f64, &PatchSums)> = patches
-            .filter(|((patch, _), _)| patch.mask == mask && patch.count >= least)
+        // Tile, number of pixels and sums of each patch of the mask.
+        let patches: Vec<(usize, f64, &PatchSums)> = finest
+            .patches
+            .iter()
+            .zip(self.sums)
+            .zip(&coarsest.part_of)
+            .filter(|((patch, _), _)| patch.mask == mask && patch.count >= min_pixels)
             .map(|((patch, sums), part_of)| {
                 let tile = coarsest.patches[*part_of as usize].cell;
                 (tile, f64::from(patch.count), sums)
             })
             .collect();
         let is_disturbed = |tile: usize| self.fit.tiles[tile].is_disturbed;
-        let all_are = patches.iter().all(|(tile, ..)| is_disturbed(*tile));
+        let all_disturbed = patches.iter().all(|(tile, ..)| is_disturbed(*tile));
         let patches: Vec<_> = patches
             .into_iter()
-            .filter(|(tile, ..)| all_are || !is_disturbed(*tile))
+            .filter(|(tile, ..)| all_disturbed || !is_disturbed(*tile))
             .collect();
-        let places: Vec<[f64; 2]> = patches
+        let positions: Vec<[f64; 2]> = patches
             .iter()
-            .map(|(tile, ..)| self.tiles.place(*tile))
+            .map(|(tile, ..)| self.tiles.column_and_row(*tile))
             .collect();
-        if places.is_empty() {
+        if positions.is_empty() {
             return None;
         }
-        let field = self.field_around(mask, &places);
-        let gains: Vec<[f64; 3]> = places.iter().map(|place| field.at(*place)).collect();
-        Some(Shade([0, 1, 2].map(|channel| {
+        let field = self.field_around(mask, &positions);
+        let gains: Vec<[f64; 3]> = positions.iter().map(|tile| field.gains_at(*tile)).collect();
+        Some(ColorPosterior([0, 1, 2].map(|channel| {
             let means = patches
                 .iter()
                 .zip(&gains)
@@ -164,22 +167,22 @@ impl<'a> Light<'a> {
         })))
     }
 
-    /// The light on a mask at these places, from the pieces of all others: a local linear regression (Cleveland, J. Am. Stat.
-    /// Assoc. 74:829, 1979).
-    fn field_around(&self, mask: u32, places: &[[f64; 2]]) -> LightField {
-        let middle = [0, 1].map(|axis| {
-            let sum: f64 = places.iter().map(|place| place[axis]).sum();
-            sum / places.len() as f64
+    /// Fits the light around the mean of these positions to the patches of all other masks, by local linear regression (Cleveland, J. Am.
+    /// Stat. Assoc. 74:829, 1979).
+    fn field_around(&self, mask: u32, positions: &[[f64; 2]]) -> LightField {
+        let center = [0, 1].map(|axis| {
+            let sum: f64 = positions.iter().map(|position| position[axis]).sum();
+            sum / positions.len() as f64
         });
         let rows = self.tiles.len().div_ceil(self.tiles.columns);
-        let width = rows.max(self.tiles.columns) as f64 * SMOOTHED;
+        let width = rows.max(self.tiles.columns) as f64 * KERNEL_WIDTH;
         let mut equations = [0, 1, 2].map(|_| NormalEquations::<3>::default());
-        for piece in self.pieces.iter().filter(|piece| piece.mask != mask) {
-            let terms = linear_terms(piece.place, middle);
+        for patch in self.patches.iter().filter(|patch| patch.mask != mask) {
+            let terms = linear_terms(patch.tile, center);
             let distance = (terms[1] * terms[1] + terms[2] * terms[2]) / (width * width);
-            let weight = piece.pixels * libm::exp(-0.5 * distance);
+            let weight = patch.pixels * libm::exp(-0.5 * distance);
             for (channel, equations) in equations.iter_mut().enumerate() {
-                let (received, predicted) = (piece.received[channel], piece.predicted[channel]);
+                let (received, predicted) = (patch.received[channel], patch.predicted[channel]);
                 equations.add(
                     &terms,
                     weight * predicted * predicted,
@@ -188,14 +191,14 @@ impl<'a> Light<'a> {
             }
         }
         LightField {
-            middle,
+            center,
             channels: equations.map(NormalEquations::solve),
         }
     }
 }
 
-impl Shade {
-    /// The most probable of the offered colours. `None` if a channel is too uncertain, or none of them is possible.
+impl ColorPosterior {
+    /// Most probable of the offered colours. `None` if a channel is too uncertain, or if no offered colour is possible.
     pub(super) fn name(&self, palette: &Palette, offered: &[Color]) -> Option<Color> {
         if self
             .0
@@ -211,7 +214,7 @@ impl Shade {
             .or_else(|| self.most_probable(palette, offered))
     }
 
-    /// The offered colour with the most posterior mass; of several, the first.
+    /// Offered colour with the highest posterior probability; the first if several are equal.
     fn most_probable(&self, palette: &Palette, offered: &[Color]) -> Option<Color> {
         let mut masses = vec![0.0; offered.len()];
         let [red, green, blue] = &self.0;
@@ -220,9 +223,8 @@ impl Shade {
             for (g, green) in green.blocks.iter().enumerate() {
                 for (b, blue) in blue.blocks.iter().enumerate() {
                     let color = palette.color([code(r), code(g), code(b)]);
-                    let place = offered.iter().position(|offered| Some(*offered) == color);
-                    if let Some(place) = place {
-                        masses[place] += red * green * blue;
+                    if let Some(index) = offered.iter().position(|other| Some(*other) == color) {
+                        masses[index] += red * green * blue;
                     }
                 }
             }
@@ -238,12 +240,13 @@ impl Shade {
 }
 
 impl Posterior {
-    /// The posterior of the code behind the median of these means, with a flat prior over all codes. The means are received codes
-    /// divided by the gain of the light.
+    /// Computes the posterior of the untouched code for the median of these means, with a flat prior over all codes. The means are received
+    /// codes divided by the gain of the light.
     fn new(fit: &ChannelFit, mut means: Vec<f64>, gain: f64) -> Self {
         let middle = median(&mut means);
         let mut distances: Vec<f64> = means.iter().map(|mean| (mean - middle).abs()).collect();
-        let error = DEVIATION * median(&mut distances) * MEDIAN_ERROR / (means.len() as f64).sqrt();
+        let error =
+            DEVIATION_PER_MAD * median(&mut distances) * MEDIAN_ERROR / (means.len() as f64).sqrt();
         let variance = ROUNDING / (gain * gain) + error * error;
         let distance = |code: usize| (middle - fit.curve[code]) * (middle - fit.curve[code]);
         let mut likelihood: [f64; 256] =
@@ -277,7 +280,7 @@ impl Posterior {
     }
 }
 
-/// The median; of an even number of values, the mean of the middle two; 0 without values.
+/// Median, the mean of the middle two for an even number of values; 0 without values.
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     match values.len() {

@@ -1,4 +1,4 @@
-//! Random numbers that a seed and names decide: [`Dice`].
+//! Random numbers determined by a seed and names: [`SeededRng`].
 
 use blake3::OutputReader;
 
@@ -6,46 +6,46 @@ use darkqa_ground::types::Digest;
 
 /// A sequence of random numbers: the output stream of BLAKE3, keyed by the digest of a seed and names.
 #[derive(Debug, Clone)]
-pub(super) struct Dice(OutputReader);
+pub(super) struct SeededRng(OutputReader);
 
-impl Dice {
-    /// The sequence of a seed for one use, which `parts` name.
-    pub(super) fn new(seed: u64, parts: &[&str]) -> Self {
-        let seed = seed.to_le_bytes();
-        let all = [&b"darkqa-eval rooms"[..], &seed]
-            .into_iter()
-            .chain(parts.iter().map(|part| part.as_bytes()));
-        let digest = Digest::from_parts(all);
+impl SeededRng {
+    /// Creates the sequence of a seed for one purpose, such as `["kitchen-0001", "furniture"]`.
+    pub(super) fn new(seed: u64, purpose: &[&str]) -> Self {
+        let digest = Digest::from_parts(
+            [&b"darkqa-eval rooms"[..], &seed.to_le_bytes()]
+                .into_iter()
+                .chain(purpose.iter().map(|name| name.as_bytes())),
+        );
         Self(blake3::Hasher::new_keyed(digest.as_bytes()).finalize_xof())
     }
 
-    fn word(&mut self) -> u32 {
+    fn next_u32(&mut self) -> u32 {
         let mut bytes = [0; 4];
         self.0.fill(&mut bytes);
         u32::from_le_bytes(bytes)
     }
 
-    /// A number from 0 to 1, without 1.
+    /// Returns a number from 0 (inclusive) to 1 (exclusive).
     pub(super) fn unit(&mut self) -> f32 {
-        (self.word() >> 8) as f32 / (1_u32 << 24) as f32
+        (self.next_u32() >> 8) as f32 / (1_u32 << 24) as f32
     }
 
-    /// A number from `low` to `high`, without `high`.
+    /// Returns a number from `low` (inclusive) to `high` (exclusive).
     pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.unit()
     }
 
-    /// A whole number below `count`, which must be above 0.
+    /// Returns an integer from 0 to `count` − 1; `count` must be above 0.
     pub(super) fn below(&mut self, count: usize) -> usize {
-        ((u64::from(self.word()) * count as u64) >> 32) as usize
+        ((u64::from(self.next_u32()) * count as u64) >> 32) as usize
     }
 
-    /// `true` with this probability.
+    /// Returns true with this probability.
     pub(super) fn chance(&mut self, probability: f32) -> bool {
         self.unit() < probability
     }
 
-    /// One entry of a list, which must not be empty.
+    /// Returns a random entry of a list, which must not be empty.
     pub(super) fn pick<T: Copy>(&mut self, list: &[T]) -> T {
         list[self.below(list.len())]
     }
@@ -56,10 +56,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parts_decide_the_sequence() {
-        let sequence = |seed, parts: &[&str]| -> Vec<u32> {
-            let mut dice = Dice::new(seed, parts);
-            (0..4).map(|_| dice.word()).collect()
+    fn sequence_depends_on_seed_and_purpose() {
+        let sequence = |seed, purpose: &[&str]| -> Vec<u32> {
+            let mut rng = SeededRng::new(seed, purpose);
+            (0..4).map(|_| rng.next_u32()).collect()
         };
         assert_eq!(sequence(1, &["a", "b"]), sequence(1, &["a", "b"]));
         assert_ne!(sequence(1, &["a", "b"]), sequence(1, &["ab"]));
@@ -68,11 +68,11 @@ mod tests {
 
     #[test]
     fn numbers_stay_within_their_bounds() {
-        let mut dice = Dice::new(0, &[]);
+        let mut rng = SeededRng::new(0, &[]);
         let mut counts = [0; 3];
         for _ in 0..3000 {
-            counts[dice.below(3)] += 1;
-            assert!((2.0..3.0).contains(&dice.between(2.0, 3.0)));
+            counts[rng.below(3)] += 1;
+            assert!((2.0..3.0).contains(&rng.between(2.0, 3.0)));
         }
         // Five standard deviations of a fair draw are 129.
         assert!(counts.iter().all(|count: &i32| count.abs_diff(1000) < 130));

@@ -1,16 +1,16 @@
-//! Shapes of masks, and the segments made of them: [`MaskShapes`].
+//! Shapes of masks, and the segments made from them: [`MaskShapes`].
 
 use std::collections::BTreeMap;
 
-use super::light::{MaskCore, PixelLight};
-use super::rim::{cores, runs};
-use super::scene::{JointCounts, SceneMaps, rounded};
+use super::erosion::{cores, runs};
+use super::mask_core::{MaskCore, PixelLight};
+use super::scene_maps::{JointCounts, SceneMaps, scaled_length};
 use super::{Segment, WordSource, plain_word, ppm};
 use crate::colors::{BINS, Palette};
 use crate::rules::{CoarseRule, MeasureRule};
 use darkqa_ground::types::{Frame, Segmentation};
 
-/// Measurements of the shape of a mask.
+/// Shape of a mask: area, bounding box and rim.
 #[derive(Clone)]
 pub(super) struct MaskShape {
     area: u64,
@@ -40,9 +40,8 @@ impl MaskShape {
     }
 }
 
-/// The number of rim pixels of a run between columns `from` and `to`: the ends of the run, and pixels with another mask above or
-/// below.
-fn rim(
+/// Number of rim pixels of a run between the columns `from` and `to`: the ends of the run, and pixels with another mask above or below.
+fn count_rim(
     mask: u32,
     [from, to]: [usize; 2],
     [left, right]: [usize; 2],
@@ -61,13 +60,13 @@ fn rim(
         .map(|(above, below)| u32::from(*above != mask) | u32::from(*below != mask))
         .sum();
     let last = (right - left > 1).then(|| right - 1);
-    let whole = std::iter::once(left)
+    let ends = std::iter::once(left)
         .chain(last)
         .filter(|x| (from..to).contains(x) && !differs(*x));
-    u64::from(count) + whole.count() as u64
+    u64::from(count) + ends.count() as u64
 }
 
-/// The shapes of all masks of a frame.
+/// Shapes of all masks of a frame.
 pub(super) struct MaskShapes {
     pub(super) list: Vec<MaskShape>,
     /// Number of pixels by mask and label.
@@ -83,13 +82,13 @@ impl MaskShapes {
             joint: JointCounts::new(),
         };
         for y in 0..height {
-            scene.each_run_of(y, &mut |left, right, mask, id| {
+            scene.each_run_in_row(y, &mut |left, right, mask, id| {
                 *shapes.joint.entry((mask, id)).or_insert(0) += (right - left) as u64;
             });
             let row = &scene.masks[y * width..][..width];
             let rows = [y.checked_sub(1), (y + 1 < height).then_some(y + 1)];
             let [above, below] = rows.map(|y| y.map(|y| &scene.masks[y * width..][..width]));
-            let outer_row = y < rule.border_px || y + rule.border_px >= height;
+            let is_border_row = y < rule.border_px || y + rule.border_px >= height;
             for (left, right) in runs(row) {
                 let mask = row[left];
                 let Some(index) = mask.checked_sub(1) else {
@@ -99,10 +98,10 @@ impl MaskShapes {
                 shape.add(y, left, right);
                 let rim = |from: usize, to: usize| {
                     let (from, to) = (from.max(left), to.min(right));
-                    rim(mask, [from, to], [left, right], [above, below])
+                    count_rim(mask, [from, to], [left, right], [above, below])
                 };
                 shape.rim += rim(left, right);
-                shape.rim_on_border += if outer_row {
+                shape.rim_on_border += if is_border_row {
                     rim(left, right)
                 } else {
                     let inner = width.saturating_sub(rule.border_px).max(rule.border_px);
@@ -113,7 +112,7 @@ impl MaskShapes {
         shapes
     }
 
-    /// The segment of a mask, still without depth and colour; `None` if no pixel has a class.
+    /// Creates the segment of a mask, still without depth and colour; `None` if no pixel has a class.
     pub(super) fn segment(
         &self,
         frame: &Frame,
@@ -138,18 +137,18 @@ impl MaskShapes {
         };
         let word = own.map_or_else(
             || {
-                let most_common = labels
+                labels
                     .filter(|((_, id), _)| scene.class(*id) == Some(class))
                     .rev()
-                    .max_by_key(|(_, count)| **count);
-                most_common.map_or("", |((_, id), _)| scene.word(*id))
+                    .max_by_key(|(_, count)| **count)
+                    .map_or("", |((_, id), _)| scene.word(*id))
             },
             |name| &name.name,
         );
-        let (word, stands) = plain_word(word);
+        let (word, place) = plain_word(word);
         let source = if own.is_some() && coarse.is_name(&word) {
             WordSource::Name
-        } else if own.is_none() && coarse.says(&scene.labels.space, &word) {
+        } else if own.is_none() && coarse.identifies_object(&scene.labels.space, &word) {
             WordSource::Label
         } else {
             WordSource::Coarse
@@ -159,7 +158,7 @@ impl MaskShapes {
             class: class.to_owned(),
             word,
             source,
-            stands,
+            place,
             region: own.and_then(|name| name.region),
             parts: scene.parts.get(mask as usize - 1).copied().unwrap_or(0),
             area: shape.area,
@@ -186,14 +185,14 @@ impl MaskShapes {
         palette: &Palette,
     ) -> Vec<Option<MaskCore>> {
         let pixels = scene.masks.len() as u64;
-        let large = |shape: &MaskShape| ppm(shape.area, pixels) >= rule.detail_ppm;
+        let is_large = |shape: &MaskShape| ppm(shape.area, pixels) >= rule.detail_ppm;
         let mut found: Vec<Option<MaskCore>> = self
             .list
             .iter()
-            .map(|shape| large(shape).then(|| MaskCore::new(shape.area, frame)))
+            .map(|shape| is_large(shape).then(|| MaskCore::new(shape.area, frame)))
             .collect();
         let light = PixelLight::new(frame, rule, palette);
-        let radius = rounded(scene.size[1], rule.erosion_per_height);
+        let radius = scaled_length(scene.size[1], rule.erosion_per_height);
         cores(&scene.masks, scene.size, radius, |y, left, right, mask| {
             if let Some(core) = &mut found[mask as usize - 1] {
                 light.add_run(core, y, left, right);

@@ -1,10 +1,10 @@
-//! The subject of a question, read from its text: [`QuestionTopic`].
+//! Subject of a question, parsed from its text: [`QuestionTopic`].
 
 use crate::rules::{RuleBook, Rules};
 use crate::statistics::Segment;
 use darkqa_ground::types::Question;
 
-/// The word by which a question calls a thing, with the class that the word belongs to.
+/// Word that a question uses for an object, with the class of the word.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ThingWord {
     pub(crate) class: String,
@@ -12,9 +12,9 @@ pub(crate) struct ThingWord {
 }
 
 impl ThingWord {
-    /// Whether a segment is called so.
-    pub(super) fn calls(&self, segment: &Segment, book: &RuleBook) -> bool {
-        segment.class == self.class && segment.called(book) == Some(&*self.word)
+    /// True if questions use this word for a segment.
+    pub(super) fn matches(&self, segment: &Segment, book: &RuleBook) -> bool {
+        segment.class == self.class && segment.question_word(book) == Some(&*self.word)
     }
 }
 
@@ -34,7 +34,7 @@ pub(crate) enum QuestionTopic {
 }
 
 impl QuestionTopic {
-    /// Compares the text of a question with the templates of the rulebook. The evidence, which holds the answer, is not read.
+    /// Parses the text of a question by the templates of the rulebook. The evidence is not read, because it contains the answer.
     pub(crate) fn from_question(question: &Question, book: &RuleBook) -> Option<Self> {
         let text = question.text.trim();
         if text == book.room_type.text {
@@ -57,7 +57,7 @@ impl QuestionTopic {
                 let word = rule
                     .words
                     .iter()
-                    .find(|word| text == book.filled(singular, plural, word))?;
+                    .find(|word| text == book.fill_template(singular, plural, word))?;
                 Some(ThingWord {
                     class: class.clone(),
                     word: word.clone(),
@@ -70,8 +70,8 @@ impl QuestionTopic {
     }
 }
 
-/// Whether a question is one of the rulebook, so that the observer can answer it.
+/// True if a question is one of the rulebook, so that the observer can answer it.
 #[must_use]
-pub fn understood(question: &Question, rules: &Rules) -> bool {
+pub fn is_in_rulebook(question: &Question, rules: &Rules) -> bool {
     QuestionTopic::from_question(question, rules.book()).is_some()
 }

@@ -1,4 +1,4 @@
-//! A drawn frame of a room in little memory: [`DrawnRoom`].
+//! The rendered image and maps of a frame in a compact form: [`RenderedFrame`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,46 +9,52 @@ use super::camera::Camera;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::{DepthKind, Frame, FrameId, Light, Rgb, SegmentName, Segmentation};
 
-/// A drawn frame. The frames of the default data set fit into the cache, so that each is drawn once for its questions and its images.
+/// The rendered image and maps of a frame, compact enough that the cache holds all frames of the default data set.
 #[derive(Debug)]
-pub(super) struct DrawnRoom {
+pub(super) struct RenderedFrame {
     pub(super) id: FrameId,
     pub(super) scene: String,
     pub(super) room: &'static str,
     pub(super) camera: Camera,
     pub(super) rgb: Arc<Rgb>,
-    /// Linear light; `None` if only codes of a display are drawn.
+    /// Linear light; `None` if only 8-bit display codes are rendered.
     pub(super) light: Option<Arc<Light>>,
-    /// Depth of each pixel in millimetres along the optical axis; 0 if there is none.
+    /// Depth of each pixel in millimetres along the optical axis; 0 without a thing.
     pub(super) depth: Vec<u16>,
-    /// Number of the thing at each pixel, from 1; 0 if there is none.
+    /// Number of the thing at each pixel, from 1; 0 without a thing.
     pub(super) things: Vec<u16>,
-    /// Class number by number of the thing.
+    /// Class number of each thing, by the number of the thing.
     pub(super) classes: Vec<u16>,
-    /// Names by number of the thing.
+    /// Name of each thing, by the number of the thing.
     pub(super) names: Arc<BTreeMap<u32, SegmentName>>,
 }
 
-impl DrawnRoom {
-    /// Bytes per pixel: three for colour, two for depth, two for the thing.
+impl RenderedFrame {
+    /// Bytes per pixel: three for colour, two for depth and two for the thing.
     pub(super) const BYTES_PER_PIXEL: usize = 7;
-    /// Further bytes per pixel of linear light.
-    pub(super) const BYTES_OF_LIGHT: usize = 12;
+    /// Additional bytes per pixel if linear light is kept.
+    pub(super) const LIGHT_BYTES_PER_PIXEL: usize = 12;
 
-    /// The frame with its maps, and an image of its size.
+    /// Returns the frame with its maps and the given image.
     ///
     /// # Errors
-    /// If a map has another size than the image.
+    /// If the image and the maps differ in size.
     pub(super) fn frame(&self, rgb: Rgb) -> Result<Frame> {
         let shape = (rgb.height(), rgb.width());
-        let class = |thing: &u16| self.classes[usize::from(*thing)];
         Ok(Frame {
             id: self.id.clone(),
             scene: self.scene.clone(),
             depth: Some(self.map(shape, self.depth.iter().copied().map(u32::from))?),
             depth_kind: DepthKind::Planar,
             intrinsics: Some(self.camera.intrinsics()),
-            semantic: Some(self.map(shape, self.things.iter().map(class))?),
+            semantic: Some(
+                self.map(
+                    shape,
+                    self.things
+                        .iter()
+                        .map(|thing| self.classes[usize::from(*thing)]),
+                )?,
+            ),
             segments: Some(self.map(shape, self.things.iter().copied().map(u32::from))?),
             segmentation: Segmentation::Instances,
             names: Arc::clone(&self.names),

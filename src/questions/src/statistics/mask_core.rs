@@ -1,4 +1,4 @@
-//! Colour and depth of the pixels of a mask, [`MaskCore`], and measurements over all pixels.
+//! Colour and depth of the core pixels of a mask, [`MaskCore`], and measurements over all pixels of a frame.
 
 use ndarray::{CowArray, Ix2};
 
@@ -18,7 +18,7 @@ pub(super) struct MaskCore {
 }
 
 impl MaskCore {
-    /// An empty core, with memory for the depths of `area` pixels.
+    /// Creates an empty core, with capacity for the depths of `area` pixels.
     pub(super) fn new(area: u64, frame: &Frame) -> Self {
         Self {
             count: 0,
@@ -33,7 +33,7 @@ impl MaskCore {
         }
     }
 
-    /// Writes the results into a segment.
+    /// Writes the measurements into a segment.
     pub(super) fn write_to(self, segment: &mut Segment) {
         segment.core = self.count;
         segment.colors = self.colors;
@@ -41,18 +41,18 @@ impl MaskCore {
             .channels
             .map(|counts| quantile(&counts, self.count, 50));
         (segment.bright, segment.crushed) = (self.bright, self.crushed);
-        segment.depth = self.depths.and_then(depths);
+        segment.depth = self.depths.and_then(depth_quantiles);
     }
 }
 
-/// The nearest-rank quantiles of depths.
-fn depths(mut depths: Vec<u32>) -> Option<SegmentDepth> {
+/// Nearest-rank quantiles of depths; `None` without depths.
+fn depth_quantiles(mut depths: Vec<u32>) -> Option<SegmentDepth> {
     if depths.is_empty() {
         return None;
     }
     let count = depths.len() as u64;
     let [near, middle, far] = [10, 50, 90].map(|percent| rank(count, percent) as usize);
-    // Values before the median are smaller, values after it larger, so each half is enough for its quantile.
+    // The values before the median are smaller and those after it larger, so each outer quantile is searched in its half only.
     let (nearer, &mut median, farther) = depths.select_nth_unstable(middle);
     let ranked = |depths: &mut [u32], rank| *depths.select_nth_unstable(rank).1;
     Some(SegmentDepth {
@@ -70,12 +70,12 @@ fn depths(mut depths: Vec<u32>) -> Option<SegmentDepth> {
     })
 }
 
-/// The index of a quantile in a sorted list: ⌈percent · count / 100⌉ − 1.
+/// Index of a quantile in a sorted list: ⌈percent · count / 100⌉ − 1.
 fn rank(count: u64, percent: u64) -> u64 {
     (percent * count).div_ceil(100).saturating_sub(1)
 }
 
-/// A quantile of 8-bit values, from their histogram.
+/// Quantile of 8-bit values, from their histogram.
 pub(super) fn quantile(counts: &[u32; 256], count: u64, percent: u64) -> u8 {
     let rank = rank(count, percent);
     let mut seen = 0;
@@ -86,7 +86,7 @@ pub(super) fn quantile(counts: &[u32; 256], count: u64, percent: u64) -> u8 {
     value.unwrap_or(0) as u8
 }
 
-/// The image and depth of a frame, prepared for reading runs of pixels.
+/// Image and depth of a frame, prepared for reading runs of pixels.
 pub(super) struct PixelLight<'a> {
     frame: &'a Frame,
     rule: &'a MeasureRule,
@@ -98,7 +98,7 @@ pub(super) struct PixelLight<'a> {
 
 impl<'a> PixelLight<'a> {
     pub(super) fn new(frame: &'a Frame, rule: &'a MeasureRule, palette: &'a Palette) -> Self {
-        let slopes = rays(frame).map(|camera| {
+        let slopes = depth_conversion(frame).map(|camera| {
             let square = |length: usize, focal: f64, center: f64| -> Vec<f64> {
                 (0..length)
                     .map(|i| (i as f64 - center) / focal)
@@ -153,14 +153,14 @@ impl<'a> PixelLight<'a> {
     }
 }
 
-/// The camera, if depth must be converted from the optical axis to the rays.
-fn rays(frame: &Frame) -> Option<Intrinsics> {
+/// Camera intrinsics, if depth must be converted from the optical axis to the rays.
+fn depth_conversion(frame: &Frame) -> Option<Intrinsics> {
     frame
         .intrinsics
         .filter(|_| frame.depth_kind == DepthKind::Planar)
 }
 
-/// The measurements of a frame's depth map; `None` without one.
+/// Measures the depth map of a frame; `None` without one.
 pub(super) fn frame_depth(frame: &Frame) -> Option<FrameDepth> {
     const SIZE: usize = 1 << 16;
     let depth = frame.depth.as_ref()?;
@@ -178,14 +178,14 @@ pub(super) fn frame_depth(frame: &Frame) -> Option<FrameDepth> {
     Some(FrameDepth {
         holes,
         median: median.map_or(0, |median| median as u32 + 1),
-        along: match (frame.depth_kind, rays(frame)) {
+        along: match (frame.depth_kind, depth_conversion(frame)) {
             (DepthKind::Euclid, _) | (_, Some(_)) => DepthAxis::Ray,
             (DepthKind::Planar, None) => DepthAxis::Axis,
         },
     })
 }
 
-/// The 10 %, 50 % and 90 % quantiles of luma.
+/// 10 %, 50 % and 90 % quantiles of luma.
 pub(super) fn luma(frame: &Frame) -> [u8; 3] {
     let mut counts = [0; 256];
     let (pixels, _) = frame.rgb.samples().as_chunks::<3>();
@@ -195,7 +195,7 @@ pub(super) fn luma(frame: &Frame) -> [u8; 3] {
     [10, 50, 90].map(|percent| quantile(&counts, pixels.len() as u64, percent))
 }
 
-/// The luma of a pixel (weights of ITU-R BT.709 in 256ths).
+/// Luma of a pixel (weights of ITU-R BT.709 in 256ths).
 pub(super) fn pixel_luma([red, green, blue]: [u8; 3]) -> u8 {
     let luma = 54 * u32::from(red) + 183 * u32::from(green) + 19 * u32::from(blue);
     (luma >> 8) as u8

@@ -1,10 +1,10 @@
-//! The eroded masks of an image, all in one pass: [`cores`].
+//! Erosion of all masks of an image in one pass: [`cores`].
 
-/// Calls `visit(y, left, right, mask)`, row by row, for every run of pixels whose square of radius `radius` lies within their
-/// own mask. Masks continue beyond the edge of the image, because there are no flying pixels of depth there. Mask 0 is skipped.
+/// Calls `visit(y, left, right, mask)`, row by row, for every run of pixels whose square of radius `radius` is within their own mask. Masks
+/// continue beyond the edge of the image, because depth has no flying pixels there. Mask 0 is skipped.
 ///
-/// One pass: each run of a row is shortened by the radius. For each column, `streaks` counts the rows for which the column has
-/// been inside such a run of the same mask.
+/// Each run of a row is shortened by the radius. For each column, `streaks` counts the consecutive rows in which the column was inside such
+/// a shortened run of the same mask.
 pub(super) fn cores(
     masks: &[u32],
     [width, height]: [usize; 2],
@@ -64,28 +64,28 @@ pub(super) fn cores(
     }
 }
 
-/// The runs of equal values of a row, as left and right (exclusive).
+/// Runs of equal values of a row, as left and right (exclusive).
 pub(super) fn runs<T: PartialEq>(row: &[T]) -> impl Iterator<Item = (usize, usize)> {
     let mut left = 0;
     std::iter::from_fn(move || {
-        let run = (left, left + streak(row.get(left..)?)?);
+        let run = (left, left + run_length(row.get(left..)?)?);
         left = run.1;
         Some(run)
     })
 }
 
-/// The number of equal values at the front; `None` if the list is empty.
-fn streak<T: PartialEq>(values: &[T]) -> Option<usize> {
+/// Number of equal values at the start; `None` if the list is empty.
+fn run_length<T: PartialEq>(values: &[T]) -> Option<usize> {
     /// Number of values compared without a branch, so that the compiler can use SIMD.
     const LANES: usize = 32;
     let first = values.first()?;
-    let different =
+    let count_different =
         |lanes: &[T; LANES]| -> u32 { lanes.iter().map(|value| u32::from(value != first)).sum() };
     let (chunks, _) = values.as_chunks::<LANES>();
     let whole = LANES
         * chunks
             .iter()
-            .take_while(|lanes| different(lanes) == 0)
+            .take_while(|lanes| count_different(lanes) == 0)
             .count();
     let rest = values[whole..].iter();
     Some(whole + rest.take_while(|value| *value == first).count())
@@ -120,7 +120,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn cores_are_those_computed_pixel_by_pixel(
+        fn cores_match_reference(
             width in 1..14_usize, height in 1..14_usize, radius in 0..4_usize, bits in any::<u64>(), coarse in 1..5_usize,
         ) {
             let masks: Vec<u32> = (0..width * height)

@@ -1,13 +1,13 @@
-//! The masks and labels of a frame's pixels: [`SceneMaps`].
+//! Masks and labels of the pixels of a frame: [`SceneMaps`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use ndarray::{CowArray, Ix2};
 
 use super::components::components;
-use super::opening::open;
+use super::erosion::runs;
+use super::opening::open_mask;
 use super::plain_word;
-use super::rim::runs;
 use crate::rules::{CoarseRule, MeasureRule};
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::{Frame, Labels, Segmentation};
@@ -15,31 +15,31 @@ use darkqa_ground::types::{Frame, Labels, Segmentation};
 /// Label of pixels without a class.
 const VOID: u32 = u32::MAX;
 
-/// Source of the label of a pixel.
+/// Source of the labels of pixels.
 enum LabelSource<'a> {
     /// A semantic map, which gives each pixel a label.
-    OfPixels(CowArray<'a, u16, Ix2>),
-    /// The names of segments: the label of each mask, or [`VOID`]. Index 0 stands for pixels without a mask.
-    OfMasks(Vec<u32>),
+    SemanticMap(CowArray<'a, u16, Ix2>),
+    /// The names of segments: the label of each mask, or [`VOID`]. Index 0 is for pixels without a mask.
+    SegmentNames(Vec<u32>),
 }
 
-/// The mask and the label of each pixel of a frame.
+/// Mask and label of each pixel of a frame.
 pub(crate) struct SceneMaps<'a> {
     pub(crate) size: [usize; 2],
     pub(super) labels: &'a Labels,
     source: LabelSource<'a>,
-    /// Mask of each pixel, from 1; 0 for no mask.
+    /// Mask of each pixel, from 1; 0 without a mask.
     pub(crate) masks: Vec<u32>,
-    /// Number of each mask in the map of segments.
+    /// Number of each mask in the segment map.
     pub(crate) numbers: Vec<u32>,
     /// Number of parts of each mask; empty unless the map has parts.
     pub(super) parts: Vec<usize>,
-    /// Class of each label from [`NAMED`] on: labels of segments that have a class by their name only.
+    /// Class of each label from [`FIRST_NAMED`] on.
     named: BTreeMap<u32, String>,
 }
 
-/// First label of segments that have a class by their name only; labels of semantic maps have 16 bits.
-const NAMED: u32 = 1 << 16;
+/// First label of segments whose class comes from their name only; labels of semantic maps have 16 bits.
+const FIRST_NAMED: u32 = 1 << 16;
 
 impl<'a> SceneMaps<'a> {
     pub(crate) fn new(frame: &'a Frame, labels: &'a Labels) -> Result<Self> {
@@ -47,18 +47,18 @@ impl<'a> SceneMaps<'a> {
         let mut scene = Self {
             size,
             labels,
-            source: LabelSource::OfMasks(Vec::new()),
+            source: LabelSource::SegmentNames(Vec::new()),
             masks: Vec::new(),
             numbers: Vec::new(),
             parts: Vec::new(),
             named: BTreeMap::new(),
         };
         if let Some(segments) = &frame.segments {
-            scene.number_masks(plain(&segments.as_standard_layout()));
+            scene.number_masks(values(&segments.as_standard_layout()));
         }
         match &frame.semantic {
             Some(semantic) => {
-                scene.source = LabelSource::OfPixels(semantic.as_standard_layout());
+                scene.source = LabelSource::SemanticMap(semantic.as_standard_layout());
             }
             None if frame.segments.is_some() && !frame.names.is_empty() => {
                 scene.label_by_name(frame);
@@ -76,7 +76,7 @@ impl<'a> SceneMaps<'a> {
         Ok(scene)
     }
 
-    /// Numbers the masks from 1, in the order of their numbers in the map.
+    /// Numbers the masks from 1, in the order of their numbers in the segment map.
     fn number_masks(&mut self, segments: &[u32]) {
         let mut ids = BTreeMap::new();
         for (left, _) in runs(segments) {
@@ -95,30 +95,29 @@ impl<'a> SceneMaps<'a> {
         self.numbers = ids.into_keys().collect();
     }
 
-    /// Gives each mask the class that belongs to the name of its segment.
+    /// Labels each mask with the class of the name of its segment.
     fn label_by_name(&mut self, frame: &Frame) {
         let mut classes: BTreeMap<&str, u32> = BTreeMap::new();
         let named = self.numbers.iter().map(|number| {
-            let name = frame.names.get(number);
-            name.map_or(VOID, |name| {
-                let next = NAMED + classes.len() as u32;
+            frame.names.get(number).map_or(VOID, |name| {
+                let next = FIRST_NAMED + classes.len() as u32;
                 *classes.entry(&name.canonical).or_insert(next)
             })
         });
-        self.source = LabelSource::OfMasks(std::iter::once(VOID).chain(named).collect());
+        self.source = LabelSource::SegmentNames(std::iter::once(VOID).chain(named).collect());
         self.named = classes
             .into_iter()
             .map(|(name, id)| (id, name.to_owned()))
             .collect();
     }
 
-    /// Makes each connected component of a label a mask.
+    /// Makes a mask of each connected component of a label.
     fn split_labels(&mut self) {
-        let LabelSource::OfPixels(ids) = &self.source else {
+        let LabelSource::SemanticMap(ids) = &self.source else {
             return;
         };
         let label = |id| self.label(id).wrapping_add(1);
-        self.masks = components(plain(ids), self.size, label);
+        self.masks = components(values(ids), self.size, label);
         self.numbers = (1..=self.masks.iter().copied().max().unwrap_or(0)).collect();
     }
 
@@ -161,7 +160,7 @@ impl<'a> SceneMaps<'a> {
         self.numbers = (1..=count).collect();
     }
 
-    /// The label of a number of the semantic map; [`VOID`] for void numbers.
+    /// Label of a number of the semantic map; [`VOID`] for void numbers.
     fn label(&self, id: u16) -> u32 {
         if self.labels.void.contains(&id) {
             VOID
@@ -170,24 +169,24 @@ impl<'a> SceneMaps<'a> {
         }
     }
 
-    /// Visits every run of pixels of one mask and one label, row by row.
+    /// Visits every run of pixels of one mask and one label, row by row, as left, right (exclusive), mask and label.
     pub(super) fn each_run(&self, mut visit: impl FnMut(usize, usize, u32, u32)) {
         for y in 0..self.size[1] {
-            self.each_run_of(y, &mut visit);
+            self.each_run_in_row(y, &mut visit);
         }
     }
 
-    /// Visits every run of one mask and one label in a row.
-    pub(super) fn each_run_of(&self, y: usize, visit: &mut impl FnMut(usize, usize, u32, u32)) {
+    /// Visits every run of pixels of one mask and one label in a row, as left, right (exclusive), mask and label.
+    pub(super) fn each_run_in_row(&self, y: usize, visit: &mut impl FnMut(usize, usize, u32, u32)) {
         let [width, _] = self.size;
         let start = y * width;
         let masks = &self.masks[start..start + width];
         for (left, right) in runs(masks) {
             let (from, to, mask) = (start + left, start + right, masks[left]);
             match &self.source {
-                LabelSource::OfMasks(labels) => visit(from, to, mask, labels[mask as usize]),
-                LabelSource::OfPixels(ids) => {
-                    let ids = &plain(ids)[from..to];
+                LabelSource::SegmentNames(labels) => visit(from, to, mask, labels[mask as usize]),
+                LabelSource::SemanticMap(ids) => {
+                    let ids = &values(ids)[from..to];
                     for (left, right) in runs(ids) {
                         visit(from + left, from + right, mask, self.label(ids[left]));
                     }
@@ -196,7 +195,7 @@ impl<'a> SceneMaps<'a> {
         }
     }
 
-    /// The canonical class of a label; `None` if it has none.
+    /// Canonical class of a label; `None` if it has no class.
     pub(super) fn class(&self, id: u32) -> Option<&str> {
         match u16::try_from(id) {
             Ok(id) => self
@@ -208,7 +207,7 @@ impl<'a> SceneMaps<'a> {
         }
     }
 
-    /// The word of the data set for a label; may be empty.
+    /// Word of the data set for a label; may be empty.
     pub(super) fn word(&self, id: u32) -> &str {
         let label = u16::try_from(id)
             .ok()
@@ -216,7 +215,7 @@ impl<'a> SceneMaps<'a> {
         label.map_or("", |label| &label.name)
     }
 
-    /// True if pixels of a mask and a label have a word of their own: the name of their segment, or a label that identifies the object.
+    /// True if pixels of a mask and a label have a specific word: the name of their segment, or a label that identifies the object.
     pub(super) fn is_named(&self, frame: &Frame, mask: u32, id: u32, coarse: &CoarseRule) -> bool {
         let number = (mask as usize)
             .checked_sub(1)
@@ -227,11 +226,11 @@ impl<'a> SceneMaps<'a> {
         };
         match name {
             Some(name) => coarse.is_name(&plain_word(&name.name).0),
-            None => coarse.says(&self.labels.space, &plain_word(self.word(id)).0),
+            None => coarse.identifies_object(&self.labels.space, &plain_word(self.word(id)).0),
         }
     }
 
-    /// The number of pixels of each map number that the label space does not have.
+    /// Number of pixels of each map number that the label space does not have.
     pub(super) fn unknown(&self, joint: &JointCounts) -> BTreeMap<u16, u64> {
         let mut unknown = BTreeMap::new();
         for (&(_, id), count) in joint {
@@ -244,7 +243,8 @@ impl<'a> SceneMaps<'a> {
         unknown
     }
 
-    /// Numbers of pixels without a class: all, those that remain after an opening, and those of these in the lower half.
+    /// Numbers of pixels without a class: of all pixels, after a morphological opening, and after the opening in the lower half of the
+    /// frame.
     pub(super) fn void(&self, joint: &JointCounts, rule: &MeasureRule) -> (u64, u64, u64) {
         let [width, height] = self.size;
         let all = joint
@@ -257,7 +257,11 @@ impl<'a> SceneMaps<'a> {
         }
         let mut void = vec![false; width * height];
         self.each_run(|left, right, _, id| void[left..right].fill(self.class(id).is_none()));
-        open(&mut void, self.size, rounded(height, rule.void_per_height));
+        open_mask(
+            &mut void,
+            self.size,
+            scaled_length(height, rule.void_per_height),
+        );
         let count = |pixels: &[bool]| pixels.iter().filter(|void| **void).count() as u64;
         (all, count(&void), count(&void[height / 2 * width..]))
     }
@@ -266,12 +270,12 @@ impl<'a> SceneMaps<'a> {
 /// Number of pixels by mask and label.
 pub(super) type JointCounts = BTreeMap<(u32, u32), u64>;
 
-/// The values of a map, row by row.
-fn plain<'a, T>(map: &'a CowArray<'_, T, Ix2>) -> &'a [T] {
+/// Values of a map, row by row.
+fn values<'a, T>(map: &'a CowArray<'_, T, Ix2>) -> &'a [T] {
     map.as_slice().unwrap_or_default()
 }
 
-/// A length in pixels proportional to the height: round(height / per_height), at least 1.
-pub(super) fn rounded(height: usize, per_height: usize) -> usize {
+/// Length in pixels, proportional to the height: round(height / per_height), at least 1.
+pub(super) fn scaled_length(height: usize, per_height: usize) -> usize {
     ((2 * height + per_height) / (2 * per_height)).max(1)
 }
