@@ -28,12 +28,12 @@ pub(crate) use costs::{
     Price, PricedRequest, Prices, ReplyExcess, Reservation, Spending, TokenBound,
 };
 pub use endpoints::{Access, BaseUrl, Endpoint, Sending};
-pub(crate) use endpoints::{AccessArgs, OPENAI_KEY, Server, own_variables, sleep_running};
+pub(crate) use endpoints::{AccessArgs, OPENAI_KEY, Server, sleep_running, vendor_variables};
 pub(crate) use failures::QuotaRefusal;
 pub use failures::{AskError, Reach};
 pub(crate) use models::{Local, LocalAnswer};
 pub use models::{Model, Random, Remote, Script};
-pub(crate) use pace::Bounds;
+pub(crate) use pace::ConcurrencyBounds;
 pub use pace::Quota;
 pub use prompts::Prompts;
 pub use requests::{

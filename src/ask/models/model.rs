@@ -154,7 +154,7 @@ impl Model {
             return Ok(None);
         };
         let body = model.batch_body(message, choices)?;
-        batch::line(id, url, &body).map(Some)
+        batch::input_line(id, url, &body).map(Some)
     }
 
     /// The path in a line of a Batch API's file; `None` if the model cannot be asked in a batch.
@@ -182,9 +182,9 @@ impl Model {
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
-    pub(crate) fn has_account_of(&self, other: &Self) -> Result<bool> {
+    pub(crate) fn shares_account_with(&self, other: &Self) -> Result<bool> {
         match (self.remote(), other.remote()) {
-            (Some(own), Some(other)) => own.endpoint().has_account_of(other.endpoint()),
+            (Some(own), Some(other)) => own.endpoint().shares_account_with(other.endpoint()),
             _ => Ok(false),
         }
     }

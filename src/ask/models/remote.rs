@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 use tracing::warn;
 
 use crate::ask::costs::Reservation;
-use crate::ask::endpoints::{Endpoint, ModelNumber};
+use crate::ask::endpoints::{Endpoint, ModelIndex};
 use crate::ask::failures::{AskError, Reach};
 use crate::ask::requests::constraint::letter_of;
 use crate::ask::requests::{
@@ -24,7 +24,7 @@ use crate::types::{FailureKind, LostAttempts, Reply};
 pub struct Remote {
     endpoint: Arc<Endpoint>,
     /// The model at the endpoint.
-    number: ModelNumber,
+    number: ModelIndex,
     /// Headers for each replica of the endpoint.
     headers: Vec<HeaderMap>,
     parameters: Parameters,
@@ -321,8 +321,8 @@ impl Remote {
             has_key: self.endpoint.has_key(),
         };
         let wire = fields.wire.in_batch();
-        let complaint = wire.complaint(body);
-        AskError::refused(status, &complaint, wire, sent).refused_field
+        let api_error = wire.parse_error(body);
+        AskError::refused(status, &api_error, wire, sent).refused_field
     }
 
     /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.

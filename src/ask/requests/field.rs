@@ -7,7 +7,7 @@ use super::parameters::{Parameters, Temperature};
 use super::thinking::ThinkingSwitch;
 use super::token_field::TokenField;
 use crate::ask::endpoints::BaseUrl;
-use crate::ask::failures::Complaint;
+use crate::ask::failures::ApiError;
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::{Wire, WireSetting};
 use crate::error::{Error, Result};
@@ -296,30 +296,30 @@ pub(in crate::ask) struct RequestField<'a> {
 
 impl RequestField<'_> {
     /// Whether the server names the field as the cause: in the error's own field for it, or in words of refusal that name it.
-    pub(in crate::ask) fn is_named(&self, complaint: &Complaint) -> bool {
-        if self.is_param(complaint) {
+    pub(in crate::ask) fn is_named(&self, api_error: &ApiError) -> bool {
+        if self.is_param(api_error) {
             return true;
         }
         let is_ordinary = ORDINARY_WORDS.contains(&self.name);
-        let in_words = self.is_mentioned(complaint) && !is_ordinary;
-        is_unsupported(complaint) && (in_words || self.is_quoted(complaint))
+        let in_words = self.is_mentioned(api_error) && !is_ordinary;
+        is_unsupported(api_error) && (in_words || self.is_quoted(api_error))
     }
 
     /// Whether the error's own field for it names the field, alone or at the end of a path.
-    pub(in crate::ask) fn is_param(&self, complaint: &Complaint) -> bool {
-        let param = complaint.param.as_deref();
+    pub(in crate::ask) fn is_param(&self, api_error: &ApiError) -> bool {
+        let param = api_error.param.as_deref();
         let param = param.and_then(|param| param.rsplit(['.', '/']).next());
         param == Some(self.name)
     }
 
     /// Whether the server's text mentions the field.
-    pub(in crate::ask) fn is_mentioned(&self, complaint: &Complaint) -> bool {
-        mentions(&complaint.message.to_lowercase(), self.name)
+    pub(in crate::ask) fn is_mentioned(&self, api_error: &ApiError) -> bool {
+        mentions(&api_error.message.to_lowercase(), self.name)
     }
 
     /// Whether the server's text has the field in quotation marks, alone or at the end of a path.
-    fn is_quoted(&self, complaint: &Complaint) -> bool {
-        let quoted = complaint
+    fn is_quoted(&self, api_error: &ApiError) -> bool {
+        let quoted = api_error
             .message
             .split(['`', '\'', '"', '“', '”', '‘', '’']);
         quoted
@@ -330,13 +330,13 @@ impl RequestField<'_> {
 }
 
 /// Whether the server states that it does not support a field or a kind of value.
-pub(in crate::ask) fn is_unsupported(complaint: &Complaint) -> bool {
+pub(in crate::ask) fn is_unsupported(api_error: &ApiError) -> bool {
     let codes = [
         "unsupported_parameter",
         "unsupported_value",
         "unknown_parameter",
     ];
-    complaint.mentions_any(&UNSUPPORTED) || complaint.has_code(&codes)
+    api_error.mentions_any(&UNSUPPORTED) || api_error.has_code(&codes)
 }
 
 /// Whether a text has a name as a whole word: `max_tokens` is not in `max_tokens_total`.

@@ -5,13 +5,13 @@ use reqwest::header::HeaderMap;
 use super::body::Parts;
 use super::field::SentFields;
 use crate::ask::costs::Reservation;
-use crate::ask::endpoints::ModelNumber;
+use crate::ask::endpoints::ModelIndex;
 use crate::ask::wire_kind::Wire;
 
 /// One request, which may be sent several times.
 pub(in crate::ask) struct Request<'a> {
     /// The model at the endpoint.
-    pub(in crate::ask) model: ModelNumber,
+    pub(in crate::ask) model: ModelIndex,
     pub(in crate::ask) wire: Wire,
     /// The headers for each replica.
     pub(in crate::ask) headers: &'a [HeaderMap],

@@ -7,7 +7,7 @@ use super::json_body;
 use super::logprobs;
 use super::stream;
 use super::usage;
-use crate::ask::failures::{Complaint, Unreadable, UnreadableReply, Wording};
+use crate::ask::failures::{ApiError, ReplyError, Unreadable, Wording};
 use crate::types::{Finish, Reply, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
@@ -16,23 +16,21 @@ use crate::types::{Finish, Reply, TokenChances, Usage};
 /// fields may be missing, null or of another type; hidden reasoning is never read. Invalid UTF-8 and escapes of no character
 /// become replacement characters: a small model at temperature 0 would send them again at each retry. An event stream that was
 /// not requested is joined.
-pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
+pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
     let completion = parsed(&json_body::text(body), content_type)?;
     // A completion may have its own field "message", so only `error` counts there.
-    let complaint = match completion.get("choices") {
-        Some(_) => Complaint::in_error(&completion),
-        None => Complaint::from_json(&completion),
+    let api_error = match completion.get("choices") {
+        Some(_) => ApiError::in_error(&completion),
+        None => ApiError::from_json(&completion),
     };
-    if let Some(complaint) = complaint {
-        return Err(UnreadableReply::Complaint(Box::new(complaint)));
+    if let Some(api_error) = api_error {
+        return Err(ReplyError::Api(Box::new(api_error)));
     }
     let usage = usage::read(completion.get("usage"));
-    let charged = |what| Unreadable::new(what).charged(usage);
+    let charged = |what| Unreadable::new(what).with_usage(usage);
     let choice = choice(&completion).map_err(charged)?;
     if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
-        return Err(UnreadableReply::Complaint(Box::new(Complaint::from_error(
-            error,
-        ))));
+        return Err(ReplyError::Api(Box::new(ApiError::from_error(error))));
     }
     let word = choice.get("finish_reason").and_then(Value::as_str);
     let finish = finish_reason::read(word.unwrap_or_default(), usage)
@@ -68,12 +66,12 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableR
     })
 }
 
-fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
+fn parsed(text: &str, content_type: &str) -> Result<Value, ReplyError> {
     if stream::is_stream(text, content_type) {
         return stream::assemble(text).map_err(|usage| {
             let what = "an event stream without a complete chat completion";
             let usage = usage::read(usage.as_ref());
-            Unreadable::new(what).charged(usage).into()
+            Unreadable::new(what).with_usage(usage).into()
         });
     }
     json_body::parsed(text, content_type)
@@ -93,11 +91,11 @@ fn choice(completion: &Value) -> Result<&Value, &'static str> {
 }
 
 /// The error that stands in the text of a reply that broke off, if its wording is known: LMDeploy sends errors in this way.
-fn error_in_text(choice: &Value) -> Option<UnreadableReply> {
+fn error_in_text(choice: &Value) -> Option<ReplyError> {
     let text = choice.pointer("/message/content")?.as_str()?;
-    let complaint = Complaint::from_body(text);
-    Wording::find(&complaint, true)?;
-    Some(UnreadableReply::Complaint(Box::new(complaint)))
+    let api_error = ApiError::from_body(text);
+    Wording::find(&api_error, true)?;
+    Some(ReplyError::Api(Box::new(api_error)))
 }
 
 /// The text of a message, and the text of a refusal among its parts.
@@ -135,7 +133,7 @@ fn is_lost(finish: &Finish, usage: Option<Usage>) -> bool {
 mod tests {
     use super::*;
 
-    fn json(body: &str) -> Result<Reply, UnreadableReply> {
+    fn json(body: &str) -> Result<Reply, ReplyError> {
         read(body.as_bytes(), "application/json")
     }
 
@@ -223,10 +221,10 @@ mod tests {
             r#"{"error":"m"}"#,
             r#"{"choices":[{"error":{"message":"m"},"message":{"content":"B"}}]}"#,
         ] {
-            let Err(UnreadableReply::Complaint(complaint)) = json(body) else {
+            let Err(ReplyError::Api(api_error)) = json(body) else {
                 panic!("{body}");
             };
-            assert_eq!(complaint.message, "m");
+            assert_eq!(api_error.message, "m");
         }
     }
 
@@ -238,12 +236,12 @@ mod tests {
             )
         };
         let text = "internal error happened, status code ResponseType.INPUT_LENGTH_ERROR";
-        let Err(UnreadableReply::Complaint(complaint)) = json(&body(text)) else {
-            panic!("no complaint");
+        let Err(ReplyError::Api(api_error)) = json(&body(text)) else {
+            panic!("no api_error");
         };
-        assert_eq!(complaint.message, text);
+        assert_eq!(api_error.message, text);
         let other = json(&body("The answer is"));
-        assert!(matches!(other, Err(UnreadableReply::Other(_))));
+        assert!(matches!(other, Err(ReplyError::Unreadable(_))));
     }
 
     #[test]
@@ -275,10 +273,10 @@ mod tests {
             ("<html><title>Welcome</title>", "text/html", "Welcome"),
             (&deep, "application/json", "not complete JSON"),
         ] {
-            let Err(UnreadableReply::Other(found)) = read(body.as_bytes(), content_type) else {
+            let Err(ReplyError::Unreadable(found)) = read(body.as_bytes(), content_type) else {
                 panic!("{body}");
             };
-            assert!(found.what.contains(expected), "{found:?}");
+            assert!(found.description.contains(expected), "{found:?}");
         }
     }
 
@@ -292,10 +290,10 @@ mod tests {
         let none = r#"{"prompt_tokens":0,"completion_tokens":0}"#;
         for usage in [none, r#"{"prompt_tokens":300,"completion_tokens":0}"#] {
             for content in ["null", "\"\"", "[]"] {
-                let Err(UnreadableReply::Other(lost)) = json(&body(content, "stop", usage)) else {
+                let Err(ReplyError::Unreadable(lost)) = json(&body(content, "stop", usage)) else {
                     panic!("{content} {usage}");
                 };
-                assert!(lost.what.contains("lost") && !lost.is_final);
+                assert!(lost.description.contains("lost") && !lost.is_final);
             }
         }
         let ended = r#"{"prompt_tokens":300,"completion_tokens":1}"#;
@@ -317,7 +315,7 @@ mod tests {
             ),
             format!("data: {{\"choices\":[],{usage}}}\n\ndata: [DONE]\n\n"),
         ] {
-            let Err(UnreadableReply::Other(found)) = json(&body) else {
+            let Err(ReplyError::Unreadable(found)) = json(&body) else {
                 panic!("{body}");
             };
             assert_eq!(

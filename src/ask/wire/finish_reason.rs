@@ -103,7 +103,7 @@ mod tests {
         ] {
             let broken = read(word, None).unwrap_err();
             assert!(
-                !broken.is_final && broken.what.contains("broke off"),
+                !broken.is_final && broken.description.contains("broke off"),
                 "{word}"
             );
         }
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn unknown_reason_is_an_error() {
         let unknown = read("zeitgeist", None).unwrap_err();
-        assert!(unknown.what.contains("\"zeitgeist\" is not known"));
+        assert!(unknown.description.contains("\"zeitgeist\" is not known"));
     }
 
     #[test]

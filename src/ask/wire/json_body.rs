@@ -4,12 +4,12 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
-use crate::ask::failures::{Unreadable, UnreadableReply, page_title};
+use crate::ask::failures::{ReplyError, Unreadable, page_title};
 use crate::ask::replies::bounded_json::parse;
 use crate::ask::replies::escapes;
 
 /// The reason why a body is not a reply, in words.
-pub(super) fn other(what: &str) -> UnreadableReply {
+pub(super) fn other(what: &str) -> ReplyError {
     Unreadable::new(what).into()
 }
 
@@ -22,7 +22,7 @@ pub(super) fn text(body: &[u8]) -> Cow<'_, str> {
 }
 
 /// The JSON of a text; escapes of no character become replacement characters.
-pub(super) fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
+pub(super) fn parsed(text: &str, content_type: &str) -> Result<Value, ReplyError> {
     parse(text).or_else(|error| {
         let repaired = escapes::repaired(text).and_then(|text| parse(&text).ok());
         repaired.ok_or_else(|| unreadable(text, content_type, &error))
@@ -35,7 +35,7 @@ pub(super) fn word(object: &Value, field: &str) -> Option<String> {
 }
 
 /// The description of a body that is not JSON.
-fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> UnreadableReply {
+fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> ReplyError {
     if text.trim().is_empty() {
         return other("an empty body");
     }

@@ -18,7 +18,7 @@ mod usage;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderName, HeaderValue};
 
-use super::failures::{Complaint, UnreadableReply};
+use super::failures::{ApiError, ReplyError};
 use super::replies::bounded_json::parse;
 use super::requests::{Message, Parameters, Parts, RequestField, RequestFields, SentFields};
 use super::secrets::{KeyHeader, Secret};
@@ -73,7 +73,7 @@ impl Wire {
     }
 
     /// Reads the body of a reply with a status of success; `latency_ms` and `attempts` stay zero.
-    pub(super) fn reply(self, body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
+    pub(super) fn reply(self, body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
         match self {
             Self::Chat | Self::ChatStream => chat_reply::read(body, content_type),
             Self::Responses => responses_reply::read(body, content_type),
@@ -81,17 +81,17 @@ impl Wire {
     }
 
     /// Reads the body of a refused request.
-    pub(super) fn complaint(self, body: &[u8]) -> Complaint {
+    pub(super) fn parse_error(self, body: &[u8]) -> ApiError {
         match self {
             Self::Chat | Self::ChatStream | Self::Responses => {
-                Complaint::from_body(&String::from_utf8_lossy(body))
+                ApiError::from_body(&String::from_utf8_lossy(body))
             }
         }
     }
 }
 
 /// Reads the body of a reply in a batch's file, whichever wire asked for it: a response has an `output`, a chat completion has none.
-pub(super) fn batch_reply(body: &str) -> Result<Reply, UnreadableReply> {
+pub(super) fn batch_reply(body: &str) -> Result<Reply, ReplyError> {
     let parsed = parse(body).ok();
     let is_response = parsed.is_some_and(|body| body.get("output").is_some());
     let wire = if is_response {

@@ -1,6 +1,6 @@
 //! Refusals of a wire: [`other_wire`], the one that the server asks for instead.
 
-use crate::ask::failures::Complaint;
+use crate::ask::failures::ApiError;
 use crate::ask::wire_kind::Wire;
 
 /// The words by which servers state that they answer by event streams alone (Alibaba's model studio, ModelScope).
@@ -24,10 +24,10 @@ const RESPONSES_ONLY: [&str; 3] = [
 ];
 
 /// The wire that a server asks for in its refusal of a request; `None` if it does not speak of another one.
-pub(in crate::ask) fn other_wire(complaint: &Complaint, sent: Wire) -> Option<Wire> {
-    let wanted = if complaint.mentions_any(&RESPONSES_ONLY) {
+pub(in crate::ask) fn other_wire(api_error: &ApiError, sent: Wire) -> Option<Wire> {
+    let wanted = if api_error.mentions_any(&RESPONSES_ONLY) {
         Wire::Responses
-    } else if complaint.mentions_any(&STREAM_ONLY) {
+    } else if api_error.mentions_any(&STREAM_ONLY) {
         Wire::ChatStream
     } else {
         return None;
@@ -76,11 +76,11 @@ mod tests {
             ("a streaming error occurred", None),
             ("", None),
         ] {
-            let complaint = Complaint::from_body(words);
-            assert_eq!(other_wire(&complaint, Chat), expected, "{words}");
+            let api_error = ApiError::from_body(words);
+            assert_eq!(other_wire(&api_error, Chat), expected, "{words}");
             // What was sent already is not the remedy.
             if let Some(wire) = expected {
-                assert_eq!(other_wire(&complaint, wire), None, "{words}");
+                assert_eq!(other_wire(&api_error, wire), None, "{words}");
             }
         }
     }

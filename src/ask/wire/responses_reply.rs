@@ -7,38 +7,38 @@ use super::json_body::{self, other};
 use super::logprobs;
 use super::stream;
 use super::usage;
-use crate::ask::failures::{Complaint, Unreadable, UnreadableReply};
+use crate::ask::failures::{ApiError, ReplyError, Unreadable};
 use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 
 /// Reads a body; `latency_ms` and `attempts` stay zero.
 ///
 /// The text is that of all parts of type `output_text` in items of type `message`; items of reasoning are never read. A response
 /// that failed states an error; one that is incomplete gives the reason, which becomes the reason why the model stopped.
-pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
+pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
     let text = json_body::text(body);
     let response = if stream::is_stream(&text, content_type) {
         ended(&text).ok_or_else(|| other("an event stream without a complete response"))?
     } else {
         json_body::parsed(&text, content_type)?
     };
-    let complaint = match response.get("output") {
-        Some(_) => Complaint::in_error(&response),
-        None => Complaint::from_json(&response),
+    let api_error = match response.get("output") {
+        Some(_) => ApiError::in_error(&response),
+        None => ApiError::from_json(&response),
     };
-    if let Some(complaint) = complaint {
-        return Err(UnreadableReply::Complaint(Box::new(complaint)));
+    if let Some(api_error) = api_error {
+        return Err(ReplyError::Api(Box::new(api_error)));
     }
     let usage = usage::read(response.get("usage"));
     let finish = finish(&response, usage)?;
     let items = response
         .get("output")
         .and_then(Value::as_array)
-        .ok_or_else(|| Unreadable::new("JSON without output").charged(usage))?;
+        .ok_or_else(|| Unreadable::new("JSON without output").with_usage(usage))?;
     // Tokens without any item: the answer was dropped on its way.
     let has_tokens = usage.is_some_and(|usage| usage.completion_tokens > Some(0));
     if items.is_empty() && finish == Finish::Stop && has_tokens {
         return Err(Unreadable::new("a response without an output")
-            .charged(usage)
+            .with_usage(usage)
             .into());
     }
     let (text, refusal) = words(items);
@@ -72,7 +72,7 @@ fn ended(stream: &str) -> Option<Value> {
 }
 
 /// The reason why the model stopped. A response that is not at its end is no reply.
-fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, UnreadableReply> {
+fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, ReplyError> {
     let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
     let status = text(response.get("status")).unwrap_or_default();
     match &*status {
@@ -88,7 +88,7 @@ fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, UnreadableRe
         }
         status => Err(
             Unreadable::new(format!("a response whose status is {status:?}"))
-                .charged(usage)
+                .with_usage(usage)
                 .into(),
         ),
     }
@@ -138,7 +138,7 @@ fn words(items: &[Value]) -> (String, String) {
 mod tests {
     use super::*;
 
-    fn json(body: &str) -> Result<Reply, UnreadableReply> {
+    fn json(body: &str) -> Result<Reply, ReplyError> {
         read(body.as_bytes(), "application/json")
     }
 
@@ -211,20 +211,20 @@ mod tests {
                 "without a complete response",
             ),
         ] {
-            let Err(UnreadableReply::Other(found)) = json(body) else {
+            let Err(ReplyError::Unreadable(found)) = json(body) else {
                 panic!("{body}");
             };
-            assert!(found.what.contains(expected), "{found:?}");
+            assert!(found.description.contains(expected), "{found:?}");
         }
         for body in [
             r#"{"status":"failed","error":{"code":"server_error","message":"m"},"output":[]}"#,
             r#"{"error":{"message":"m"}}"#,
             r#"data: {"type":"error","message":"m"}"#,
         ] {
-            let Err(UnreadableReply::Complaint(complaint)) = json(body) else {
+            let Err(ReplyError::Api(api_error)) = json(body) else {
                 panic!("{body}");
             };
-            assert_eq!(complaint.message, "m");
+            assert_eq!(api_error.message, "m");
         }
     }
 

@@ -86,7 +86,7 @@ impl JudgeArgs {
             || self.judge_api_key_file.is_some();
         if own_access {
             let access_args = match self.judge_base_url {
-                Some(url) => access.elsewhere(url),
+                Some(url) => access.for_base_url(url),
                 None => access,
             };
             access = AccessArgs {

@@ -19,7 +19,7 @@ fn per_minute(requests: Option<u32>, tokens: Option<u32>) -> Quota {
 }
 
 fn succeed(gate: &Gate, sent: Instant) {
-    gate.succeeded(sent, None, RateLimits::default(), Duration::MAX);
+    gate.record_success(sent, None, RateLimits::default(), Duration::MAX);
 }
 
 #[tokio::test(start_paused = true)]
@@ -37,7 +37,7 @@ async fn an_open_gate_delays_nobody() {
 async fn waiting_requests_wait_for_a_second_pause_too() {
     let gate = Arc::new(free());
     let start = Instant::now();
-    let refused = |seconds| gate.rate_limited(start, Some(Duration::from_secs(seconds)));
+    let refused = |seconds| gate.record_rate_limited(start, Some(Duration::from_secs(seconds)));
     refused(1);
     let waiting = tokio::spawn({
         let gate = gate.clone();
@@ -87,11 +87,11 @@ async fn absurd_numbers_from_a_server_do_not_stop_the_run() {
     ] {
         headers.insert(name, value.parse().unwrap());
     }
-    let allowance = RateLimits::read(&headers, std::time::SystemTime::now());
+    let limits = RateLimits::read(&headers, std::time::SystemTime::now());
     for _ in 0..10 {
         let sent = Instant::now();
-        gate.succeeded(sent, Some(u64::MAX), allowance, Duration::from_mins(2));
-        gate.rate_limited(sent, Some(Duration::MAX));
+        gate.record_success(sent, Some(u64::MAX), limits, Duration::from_mins(2));
+        gate.record_rate_limited(sent, Some(Duration::MAX));
     }
     let passed = tokio::time::timeout(Duration::from_mins(1), gate.pass()).await;
     assert!(passed.is_ok(), "a wait beyond the clock's range is ignored");
@@ -196,7 +196,7 @@ async fn no_minute_has_more_tokens_than_the_quota() {
                 // The first replies are among the largest; later ones are no larger.
                 let tokens = 500 + (1000.0 * dice.throw()) as u64;
                 tokio::time::sleep(Duration::from_millis(200)).await;
-                gate.succeeded(sent, Some(tokens), RateLimits::default(), Duration::MAX);
+                gate.record_success(sent, Some(tokens), RateLimits::default(), Duration::MAX);
                 used.lock().unwrap().push((sent, tokens));
             }
         });
@@ -224,7 +224,7 @@ async fn a_request_larger_than_the_quota_of_tokens_is_sent_alone() {
     let start = Instant::now();
     for _ in 0..2 {
         let sent = gate.pass().await;
-        gate.succeeded(sent, Some(5000), RateLimits::default(), Duration::MAX);
+        gate.record_success(sent, Some(5000), RateLimits::default(), Duration::MAX);
     }
     assert!(start.elapsed() >= Duration::from_mins(1));
 }

@@ -171,7 +171,7 @@ pub(super) async fn ask(limit: Limit, told: Told, items: usize, quota: Quota, se
                     refused.fetch_add(1, Relaxed);
                     tokio::time::sleep(Duration::from_millis(30)).await;
                     if !matches!(limit, Limit::Broken(_)) {
-                        gate.rate_limited(sent, wait);
+                        gate.record_rate_limited(sent, wait);
                     }
                     if wait.is_none() {
                         tokio::time::sleep(own).await;

@@ -22,7 +22,7 @@ fn classify(status: u16, body: &str) -> AskError {
         has_image: true,
         has_key: true,
     };
-    AskError::refused(status, &Complaint::from_body(body), Wire::Chat, sent)
+    AskError::refused(status, &ApiError::from_body(body), Wire::Chat, sent)
 }
 
 #[test]
@@ -30,8 +30,8 @@ fn each_status_has_its_class() {
     for status in [301, 302, 307, 401, 402, 403, 404, 405, 407, 410] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.again),
-            (Reach::Endpoint, Again::Never),
+            (class.reach, class.retry),
+            (Reach::Endpoint, Retry::Never),
             "{status}"
         );
         assert!(!class.failure.message.is_empty(), "{status}");
@@ -49,8 +49,8 @@ fn each_status_has_its_class() {
     ] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.again),
-            (Reach::Trial, Again::Later),
+            (class.reach, class.retry),
+            (Reach::Trial, Retry::AfterDelay),
             "{status}"
         );
         assert_eq!(class.failure.kind, kind);
@@ -58,8 +58,8 @@ fn each_status_has_its_class() {
     for status in [400, 413, 415, 422] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.again),
-            (Reach::Trial, Again::Never),
+            (class.reach, class.retry),
+            (Reach::Trial, Retry::Never),
             "{status}"
         );
     }
@@ -92,21 +92,21 @@ fn codes_and_texts_overrule_the_status() {
     ] {
         let class = classify(status, body);
         assert_eq!(
-            (class.reach, class.again),
-            (Reach::Endpoint, Again::Never),
+            (class.reach, class.retry),
+            (Reach::Endpoint, Retry::Never),
             "{body}"
         );
     }
     // Gemini's limit per minute mentions a quota too; waiting helps.
     let minute = r#"{"error":{"code":429,"status":"RESOURCE_EXHAUSTED","message":"You exceeded your current quota, please check your plan"}}"#;
-    assert_eq!(classify(429, minute).again, Again::Later);
+    assert_eq!(classify(429, minute).retry, Retry::AfterDelay);
     let moderated = r#"{"error":{"code":403,"message":"x","metadata":{"reasons":["violence"]}}}"#;
     let filtered = r#"{"error":{"code":"content_filter","message":"x","innererror":{"code":"ResponsibleAIPolicyViolation"}}}"#;
     for (status, body) in [(403, moderated), (400, filtered)] {
         let class = classify(status, body);
         assert_eq!(
-            (class.reach, class.again, class.failure.kind),
-            (Reach::Trial, Again::Never, FailureKind::Filtered)
+            (class.reach, class.retry, class.failure.kind),
+            (Reach::Trial, Retry::Never, FailureKind::Filtered)
         );
     }
 }
