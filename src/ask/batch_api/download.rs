@@ -62,7 +62,7 @@ mod tests {
             after(b"{\"a\": 1}\r\n\n{\"key\": \"sk-0123456789abcdef\"}"),
             b"{\"a\": 1}\r\n\n{\"key\": \"[secret]\"}"
         );
-        // Parts of a key within a string are removed; strings stay apart, and so do ids.
+        // Parts of a key within one string are removed, but not across strings or in ids.
         assert_eq!(
             after(br#"{"custom_id": "abc0123456789abcdef", "b": ["0123", "4567"], "c": "\u0030123 4567 89a"}"#),
             br#"{"custom_id": "abc0123456789abcdef", "b": ["0123", "4567"], "c": "[secret]"}"#
