@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::failures::{ApiError, ReplyError};
 use super::replies::bounded_json::parse;
 use super::requests::Constrain;
-use super::requests::constraint::letter_of;
+use super::requests::constraint::constrained_letter;
 use super::secrets::{Scrub, without_secrets};
 use super::wire::{batch_reply, body_usage};
 use crate::types::{Failure, FailureKind, Reply, Usage};
@@ -141,7 +141,7 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
 #[must_use]
 pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
     Reply {
-        text: letter_of(constrain, choices, &reply.text).unwrap_or(reply.text),
+        text: constrained_letter(constrain, choices, &reply.text).unwrap_or(reply.text),
         finish: reply.finish.shortened(),
         ..reply
     }

@@ -1,11 +1,11 @@
 //! Stage 4, ask: sends a prompt and an image to a model and receives a [`Reply`](crate::types::Reply). The only asynchronous
 //! stage.
 //!
-//! [`Prompts`] turn a question into text, [`Payload`](crate::picture::Payload) an image into the text of a data URL; both are CPU work and done before.
-//! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. The endpoint is one server,
-//! at one or several addresses: each replica has its key, connections and pauses. All models at that server share it. What is known
-//! of vendors is a table, `vendors.toml`. A [`Wire`](wire_kind::Wire) defines the form of requests and replies: files of one API in
-//! `wire/`.
+//! Before this stage, [`Prompts`] turn a question into text and [`Payload`](crate::picture::Payload) encodes an image as a data URL; both
+//! are CPU work. A [`Model`] receives them as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. An endpoint is one
+//! server with one or several replicas, each with its own address, key, connections and rate limiter; all models at the server share it.
+//! The table `vendors.toml` has the properties of vendors. A [`Wire`](wire_kind::Wire) is an API; `wire/` has the form of its requests
+//! and replies.
 
 pub(crate) mod batch;
 pub(crate) mod batch_api;

@@ -16,7 +16,7 @@ use super::time_limit::TimeLimit;
 use super::url::BaseUrl;
 use crate::ask::failures::{AskError, Reach, Retry};
 use crate::ask::replies::bounded_json::parse;
-use crate::ask::requests::{Parameters, Parts};
+use crate::ask::requests::{Parameters, RequestBody};
 use crate::ask::secrets::Scrub;
 use crate::error::Result;
 use crate::files;
@@ -157,7 +157,7 @@ impl Connection {
         &self,
         path: &str,
         headers: &HeaderMap,
-        body: &Parts,
+        body: &RequestBody,
         deadline: Deadline,
     ) -> Result<HttpResponse, AskError> {
         loop {

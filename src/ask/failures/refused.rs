@@ -4,7 +4,7 @@ use super::api_error::ApiError;
 use super::ask_error::{AskError, Reach, Retry};
 use super::wording::Wording;
 use crate::ask::requests::{AdaptableField, FieldState, RequestField, SentFields, is_unsupported};
-use crate::ask::wire::other_wire;
+use crate::ask::wire::requested_wire;
 use crate::ask::wire_kind::Wire;
 use crate::types::FailureKind;
 
@@ -59,7 +59,9 @@ impl AskError {
         wire: Wire,
         sent: SentFields<'_>,
     ) -> Self {
-        if let Some(wanted) = other_wire(api_error, wire).filter(|_| (400..500).contains(&status)) {
+        if let Some(wanted) =
+            requested_wire(api_error, wire).filter(|_| (400..500).contains(&status))
+        {
             return Self::needs_wire(wanted);
         }
         let no_credit = api_error.has_code(&NO_CREDIT)

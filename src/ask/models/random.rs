@@ -1,4 +1,4 @@
-//! [`Random`]: a model that guesses.
+//! Model that guesses: [`Random`].
 
 use serde_json::{Value, json};
 
@@ -73,7 +73,7 @@ mod tests {
         let call = Call {
             query: Query::Choice(question),
             condition,
-            message: Message::words(""),
+            message: Message::text_only(""),
             turn,
         };
         Random { seed }.answer(question, call)

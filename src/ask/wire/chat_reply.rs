@@ -1,4 +1,4 @@
-//! Replies of OpenAI's chat completions, read leniently, because servers differ: [`read`].
+//! Lenient parsing of chat completions, because servers differ: [`read`].
 
 use serde_json::Value;
 
@@ -10,15 +10,14 @@ use super::usage;
 use crate::ask::failures::{ApiError, ReplyError, Unreadable, Wording};
 use crate::types::{Finish, Reply, TokenChances, Usage};
 
-/// Reads a body; `latency_ms` and `attempts` stay zero.
+/// Parses a response body; `latency_ms` and `attempts` remain zero.
 ///
-/// Errors are searched first at the top level and then in the choice, because gateways send both with status 200. Unimportant
-/// fields may be missing, null or of another type; hidden reasoning is never read. Invalid UTF-8 and escapes of no character
-/// become replacement characters: a small model at temperature 0 would send them again at each retry. An event stream that was
-/// not requested is joined.
+/// Errors may be at the top level or in the choice, because gateways send both with status 200. Optional fields may be missing, null
+/// or of another type; hidden reasoning is ignored. Invalid UTF-8 and unpaired surrogates become replacement characters, because a small
+/// model at temperature 0 would send them again in each retry. An event stream is accepted even if it was not requested.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
-    let completion = parsed(&json_body::text(body), content_type)?;
-    // A completion may have its own field "message", so only `error` counts there.
+    let completion = parse(&json_body::text(body), content_type)?;
+    // A completion may have a field "message", so only the field `error` counts there.
     let api_error = match completion.get("choices") {
         Some(_) => ApiError::in_error(&completion),
         None => ApiError::from_json(&completion),
@@ -27,58 +26,59 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         return Err(ReplyError::Api(Box::new(api_error)));
     }
     let usage = usage::read(completion.get("usage"));
-    let charged = |what| Unreadable::new(what).with_usage(usage);
-    let choice = choice(&completion).map_err(charged)?;
+    let unreadable = |description| Unreadable::new(description).with_usage(usage);
+    let choice = first_choice(&completion).map_err(unreadable)?;
     if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
         return Err(ReplyError::Api(Box::new(ApiError::from_error(error))));
     }
-    let word = choice.get("finish_reason").and_then(Value::as_str);
-    let finish = finish_reason::read(word.unwrap_or_default(), usage)
-        .map_err(|broken| error_in_text(choice).unwrap_or_else(|| broken.into()))?;
+    let reason = choice.get("finish_reason").and_then(Value::as_str);
+    let finish = finish_reason::read(reason.unwrap_or_default(), usage)
+        .map_err(|incomplete| error_in_text(choice).unwrap_or_else(|| incomplete.into()))?;
     let message = choice
         .get("message")
         .filter(|message| message.is_object())
-        .ok_or_else(|| charged("a choice without a message"))?;
-    let (text, refusal_part) = content(message.get("content")).map_err(charged)?;
-    let positions = logprobs::positions(choice.get("logprobs"));
-    let chances = positions.map(|positions| TokenChances {
+        .ok_or_else(|| unreadable("a choice without a message"))?;
+    let (text, refusal_part) = content(message.get("content")).map_err(unreadable)?;
+    let chances = logprobs::positions(choice.get("logprobs")).map(|positions| TokenChances {
         positions,
         thought: logprobs::thought(message, completion.get("usage"), &text),
     });
-    let refusal = message.get("refusal").and_then(Value::as_str);
-    let refusal = refusal
-        .filter(|words| !words.is_empty())
+    let refusal = message
+        .get("refusal")
+        .and_then(Value::as_str)
+        .filter(|text| !text.is_empty())
         .map(str::to_owned)
         .or(refusal_part);
     let is_empty = text.is_empty() && refusal.is_none() && !logprobs::has_reasoning(message);
     if is_empty && is_lost(&finish, usage) {
-        return Err(charged(LOST).into());
+        return Err(unreadable(LOST).into());
     }
     Ok(Reply {
         refusal,
         finish,
         usage,
-        served_model: json_body::word(&completion, "model"),
-        provider: json_body::word(&completion, "provider"),
+        served_model: json_body::string_field(&completion, "model"),
+        provider: json_body::string_field(&completion, "provider"),
         attempts: 0,
         chances,
         ..Reply::local(text)
     })
 }
 
-fn parsed(text: &str, content_type: &str) -> Result<Value, ReplyError> {
+/// Parses a completion from JSON or an event stream.
+fn parse(text: &str, content_type: &str) -> Result<Value, ReplyError> {
     if stream::is_stream(text, content_type) {
         return stream::assemble(text).map_err(|usage| {
-            let what = "an event stream without a complete chat completion";
+            let description = "an event stream without a complete chat completion";
             let usage = usage::read(usage.as_ref());
-            Unreadable::new(what).with_usage(usage).into()
+            Unreadable::new(description).with_usage(usage).into()
         });
     }
-    json_body::parsed(text, content_type)
+    json_body::parse_lenient(text, content_type)
 }
 
-/// The choice with index 0, or the first one if none has it.
-fn choice(completion: &Value) -> Result<&Value, &'static str> {
+/// The choice with index 0, or the first one if none has that index.
+fn first_choice(completion: &Value) -> Result<&Value, &'static str> {
     let choices = completion
         .get("choices")
         .and_then(Value::as_array)
@@ -90,7 +90,7 @@ fn choice(completion: &Value) -> Result<&Value, &'static str> {
         .ok_or("a completion with no choices in it")
 }
 
-/// The error that stands in the text of a reply that broke off, if its wording is known: LMDeploy sends errors in this way.
+/// Error in the text of an incomplete reply, if its wording is known: LMDeploy sends errors in this way.
 fn error_in_text(choice: &Value) -> Option<ReplyError> {
     let text = choice.pointer("/message/content")?.as_str()?;
     let api_error = ApiError::from_body(text);
@@ -98,7 +98,7 @@ fn error_in_text(choice: &Value) -> Option<ReplyError> {
     Some(ReplyError::Api(Box::new(api_error)))
 }
 
-/// The text of a message, and the text of a refusal among its parts.
+/// Text of a message, and the text of the refusals among its parts.
 fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static str> {
     let parts = match content {
         None | Some(Value::Null) => return Ok((String::new(), None)),
@@ -112,7 +112,7 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static
         match part.get("type").and_then(Value::as_str) {
             Some("text" | "output_text") => text += words("text"),
             Some("refusal") => refusal += words("refusal"),
-            // A part without a type is a text, or has a field `text`.
+            // A part without a type is a string, or has a field `text`.
             None => text += part.as_str().unwrap_or_else(|| words("text")),
             Some(_) => {}
         }
@@ -120,10 +120,10 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static
     Ok((text, (!refusal.is_empty()).then_some(refusal)))
 }
 
-/// The words for a reply that was lost.
+/// Description of a lost reply.
 const LOST: &str = "an empty reply for which it counts no token, so that it was lost";
 
-/// Whether a reply without content was lost on its way: it is called complete, and no token of it is counted.
+/// True if a reply without content was lost in transit: the server calls it complete, but counts no tokens.
 fn is_lost(finish: &Finish, usage: Option<Usage>) -> bool {
     let tokens = usage.map(|usage| usage.completion_tokens);
     matches!(finish, Finish::Stop | Finish::Unknown) && matches!(tokens, Some(Some(0)))
@@ -237,7 +237,7 @@ mod tests {
         };
         let text = "internal error happened, status code ResponseType.INPUT_LENGTH_ERROR";
         let Err(ReplyError::Api(api_error)) = json(&body(text)) else {
-            panic!("no api_error");
+            panic!("no API error");
         };
         assert_eq!(api_error.message, text);
         let other = json(&body("The answer is"));

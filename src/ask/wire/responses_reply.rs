@@ -1,25 +1,26 @@
-//! Replies of OpenAI's Responses API, read leniently: [`read`].
+//! Lenient parsing of replies of OpenAI's Responses API: [`read`].
 
 use serde_json::Value;
 
 use super::finish_reason;
-use super::json_body::{self, other};
+use super::json_body;
 use super::logprobs;
 use super::stream;
 use super::usage;
 use crate::ask::failures::{ApiError, ReplyError, Unreadable};
 use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 
-/// Reads a body; `latency_ms` and `attempts` stay zero.
+/// Parses a response body; `latency_ms` and `attempts` remain zero.
 ///
-/// The text is that of all parts of type `output_text` in items of type `message`; items of reasoning are never read. A response
-/// that failed states an error; one that is incomplete gives the reason, which becomes the reason why the model stopped.
+/// The text is the text of all parts of type `output_text` in items of type `message`; reasoning items are ignored. A failed response has
+/// an error; an incomplete response has a reason, which becomes the finish reason.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
     let text = json_body::text(body);
     let response = if stream::is_stream(&text, content_type) {
-        ended(&text).ok_or_else(|| other("an event stream without a complete response"))?
+        last_response(&text)
+            .ok_or_else(|| Unreadable::new("an event stream without a complete response"))?
     } else {
-        json_body::parsed(&text, content_type)?
+        json_body::parse_lenient(&text, content_type)?
     };
     let api_error = match response.get("output") {
         Some(_) => ApiError::in_error(&response),
@@ -34,31 +35,30 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         .get("output")
         .and_then(Value::as_array)
         .ok_or_else(|| Unreadable::new("JSON without output").with_usage(usage))?;
-    // Tokens without any item: the answer was dropped on its way.
+    // Tokens without any item: the answer was lost in transit.
     let has_tokens = usage.is_some_and(|usage| usage.completion_tokens > Some(0));
     if items.is_empty() && finish == Finish::Stop && has_tokens {
         return Err(Unreadable::new("a response without an output")
             .with_usage(usage)
             .into());
     }
-    let (text, refusal) = words(items);
+    let (text, refusal) = text_and_refusal(items);
     let chances = chances(items, &response, &text);
     Ok(Reply {
-        refusal: Some(refusal).filter(|words| !words.is_empty()),
+        refusal: Some(refusal).filter(|text| !text.is_empty()),
         finish,
         usage,
-        served_model: json_body::word(&response, "model"),
-        provider: json_body::word(&response, "provider"),
+        served_model: json_body::string_field(&response, "model"),
+        provider: json_body::string_field(&response, "provider"),
         attempts: 0,
         chances,
         ..Reply::local(text)
     })
 }
 
-/// The response in the last event of a stream that nobody asked for; `None` if the stream was cut before.
-fn ended(stream: &str) -> Option<Value> {
-    let mut events = stream::events(stream);
-    events.find_map(|event| {
+/// Response in the last event of an unrequested stream; `None` if the stream was truncated.
+fn last_response(stream: &str) -> Option<Value> {
+    stream::events(stream).find_map(|event| {
         let kind = event.get("type")?.as_str()?;
         let ends = [
             "response.completed",
@@ -71,7 +71,10 @@ fn ended(stream: &str) -> Option<Value> {
     })
 }
 
-/// The reason why the model stopped. A response that is not at its end is no reply.
+/// Finish reason of a response.
+///
+/// # Errors
+/// If the response has not ended.
 fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, ReplyError> {
     let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
     let status = text(response.get("status")).unwrap_or_default();
@@ -94,7 +97,7 @@ fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, ReplyError> 
     }
 }
 
-/// The likeliest tokens of the first text; `None` if it states none. Items of reasoning stand before it if the model thought.
+/// Token probabilities of the first text that has them, and whether the model thought before it; `None` without any.
 fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances> {
     let positions = items
         .iter()
@@ -103,27 +106,29 @@ fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances
         .map(|part| part.get("logprobs"))
         .find_map(logprobs::positions)?;
     let thought = logprobs::thought(response, response.get("usage"), text);
-    let summarized = items
+    let has_summary = items
         .iter()
         .filter_map(|item| item.get("summary")?.as_array())
-        .flatten()
-        .next()
-        .is_some();
+        .any(|summary| !summary.is_empty());
     Some(TokenChances {
         positions,
-        thought: if summarized { Thought::Before } else { thought },
+        thought: if has_summary {
+            Thought::Before
+        } else {
+            thought
+        },
     })
 }
 
-/// The text of the messages among the items of a response, and that of refusals in them.
-fn words(items: &[Value]) -> (String, String) {
+/// Text of the messages in a response, and the text of the refusals in them.
+fn text_and_refusal(items: &[Value]) -> (String, String) {
     let (mut text, mut refusal) = (String::new(), String::new());
-    let is_message = |item: &&Value| item.get("type").is_none_or(|kind| kind == "message");
     let parts = items
         .iter()
-        .filter(is_message)
-        .filter_map(|item| item.get("content")?.as_array());
-    for part in parts.flatten() {
+        .filter(|item| item.get("type").is_none_or(|kind| kind == "message"))
+        .filter_map(|item| item.get("content")?.as_array())
+        .flatten();
+    for part in parts {
         let words = |field| part.get(field).and_then(Value::as_str).unwrap_or_default();
         match part.get("type").and_then(Value::as_str) {
             Some("output_text" | "text") => text += words("text"),

@@ -63,7 +63,7 @@ impl Judge {
             ..self.parameters.clone()
         };
         let column = columns.get(JUDGES).and_then(|judges| judges.get(id));
-        if let Some(grown) = column.and_then(|column| own.grown_from_column(column)) {
+        if let Some(grown) = column.and_then(|column| own.raised_from_column(column)) {
             self.parameters = grown;
         }
     }

@@ -1,4 +1,4 @@
-//! The body of a request: [`Parts`], text around images that many requests share.
+//! Body of a request: [`RequestBody`], text around image data that many requests share.
 
 use std::convert::Infallible;
 use std::pin::Pin;
@@ -8,31 +8,33 @@ use std::task::{Context, Poll};
 use bytes::Bytes;
 use hyper::body::{Body, Frame, SizeHint};
 
-/// A body of known length that is sent in pieces; cloning it copies no bytes.
+/// A body of known length that is sent in chunks; cloning it copies no bytes.
 #[derive(Debug, Clone)]
-pub(in crate::ask) struct Parts {
-    pieces: Arc<[Bytes]>,
+pub(in crate::ask) struct RequestBody {
+    chunks: Arc<[Bytes]>,
+    /// Index of the next chunk to send.
     next: usize,
 }
 
-impl Parts {
-    /// The body of these pieces, in order; empty pieces are skipped.
-    pub(in crate::ask) fn new(pieces: impl IntoIterator<Item = Bytes>) -> Self {
-        let pieces = pieces.into_iter().collect();
-        Self { pieces, next: 0 }
+impl RequestBody {
+    /// Creates a body from its chunks. Empty chunks are not sent.
+    pub(in crate::ask) fn new(chunks: impl IntoIterator<Item = Bytes>) -> Self {
+        let chunks = chunks.into_iter().collect();
+        Self { chunks, next: 0 }
     }
 
-    /// The whole body in one piece.
-    pub(in crate::ask) fn joined(&self) -> Vec<u8> {
-        self.pieces.concat()
+    /// The whole body.
+    pub(in crate::ask) fn concat(&self) -> Vec<u8> {
+        self.chunks.concat()
     }
 
+    /// Chunks that are not yet sent.
     fn rest(&self) -> &[Bytes] {
-        self.pieces.get(self.next..).unwrap_or_default()
+        self.chunks.get(self.next..).unwrap_or_default()
     }
 }
 
-impl Body for Parts {
+impl Body for RequestBody {
     type Data = Bytes;
     type Error = Infallible;
 
@@ -43,20 +45,20 @@ impl Body for Parts {
         let skipped = self
             .rest()
             .iter()
-            .take_while(|piece| piece.is_empty())
+            .take_while(|chunk| chunk.is_empty())
             .count();
-        let piece = self.rest().get(skipped).cloned();
+        let chunk = self.rest().get(skipped).cloned();
         self.next += skipped + 1;
-        Poll::Ready(piece.map(|piece| Ok(Frame::data(piece))))
+        Poll::Ready(chunk.map(|chunk| Ok(Frame::data(chunk))))
     }
 
     fn is_end_stream(&self) -> bool {
         self.rest().iter().all(Bytes::is_empty)
     }
 
-    /// The exact size, so that the request has a `Content-Length`: some servers accept no chunked bodies.
+    /// The exact size, so that the request has a `Content-Length`: some servers reject chunked bodies.
     fn size_hint(&self) -> SizeHint {
-        SizeHint::with_exact(self.rest().iter().map(|piece| piece.len() as u64).sum())
+        SizeHint::with_exact(self.rest().iter().map(|chunk| chunk.len() as u64).sum())
     }
 }
 
@@ -67,7 +69,7 @@ mod tests {
     #[test]
     fn pieces_come_in_order_and_the_remaining_size_falls() {
         let piece = Bytes::from_static;
-        let mut body = Parts::new([piece(b"ab"), piece(b""), piece(b"cde")]);
+        let mut body = RequestBody::new([piece(b"ab"), piece(b""), piece(b"cde")]);
         let mut context = Context::from_waker(std::task::Waker::noop());
         let mut seen = Vec::new();
         let mut remaining = vec![body.size_hint().exact()];
@@ -78,6 +80,6 @@ mod tests {
         assert_eq!(seen, b"abcde");
         assert_eq!(remaining, [Some(5), Some(3), Some(0)]);
         assert!(body.is_end_stream());
-        assert!(Parts::new([piece(b""), piece(b""), piece(b"")]).is_end_stream());
+        assert!(RequestBody::new([piece(b""), piece(b""), piece(b"")]).is_end_stream());
     }
 }
