@@ -151,7 +151,7 @@ pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) ->
 mod tests {
     use super::*;
 
-    /// A key that a server repeats in a line is in no text that a record keeps. Without knowing it, nothing is removed.
+    /// A known key is removed from every recorded text; an unknown one is not.
     #[test]
     fn keys_are_removed_from_replies_and_failures() {
         const KEY: &str = "sk-0123456789abcdef";

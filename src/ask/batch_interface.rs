@@ -87,24 +87,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_batch_api_is_known_by_the_address() {
+    fn the_address_decides_the_batch_api() {
         let together = BatchInterface::at("https://api.together.xyz/v1");
         assert_eq!(
             (together.purpose(), together.file_size().get()),
             ("batch-api", 100)
         );
-        let own = BatchInterface::at("http://127.0.0.1:8000/v1");
-        assert_eq!((own.purpose(), own.file_size().get()), ("batch", 200));
-        assert_eq!(own.requests().get(), 50_000);
+        let unknown = BatchInterface::at("http://127.0.0.1:8000/v1");
+        assert_eq!(
+            (unknown.purpose(), unknown.file_size().get()),
+            ("batch", 200)
+        );
+        assert_eq!(unknown.requests().get(), 50_000);
         let azure = BatchInterface::at("https://r.openai.azure.com/openai/v1");
-        let of = |usual| azure.url(usual).to_owned();
-        assert_eq!(of("/v1/chat/completions"), "/chat/completions");
-        assert_eq!(of("/v1/responses"), "/v1/responses");
-        assert_eq!(own.url("/v1/chat/completions"), "/v1/chat/completions");
+        assert_eq!(azure.url("/v1/chat/completions"), "/chat/completions");
+        assert_eq!(azure.url("/v1/responses"), "/v1/responses");
+        assert_eq!(unknown.url("/v1/chat/completions"), "/v1/chat/completions");
     }
 
     #[test]
-    fn a_batch_api_of_another_form_is_refused_by_name() {
+    fn other_batch_apis_are_refused() {
         for (base, expected) in [
             ("https://api.anthropic.com/v1", "Anthropic has another form"),
             ("https://api.mistral.ai/v1", "Mistral has another form"),

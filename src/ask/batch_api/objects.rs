@@ -194,7 +194,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn states_are_read_in_any_case_and_unknown_ones_are_kept() {
+    fn states_are_parsed_in_any_case() {
         for (word, state) in [
             ("in_progress", BatchState::Working("in_progress".into())),
             ("IN_PROGRESS", BatchState::Working("in_progress".into())),
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failed_batch_names_its_line_or_its_quota() {
+    fn a_failed_batch_has_its_line_or_quota() {
         let read = |errors: Value| {
             let object = json!({"id": "b", "status": "failed", "errors": errors});
             RemoteBatch::from_json(&object, &Scrub::default()).unwrap()

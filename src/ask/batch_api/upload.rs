@@ -92,25 +92,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_is_framed_and_the_size_is_exact() {
+    fn the_form_has_an_exact_size() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let content = b"{\"custom_id\":1}\n".repeat(40_000);
         std::fs::write(file.path(), &content).unwrap();
         let mut form = FileForm::open(file.path(), "a.jsonl", "batch", "XX").unwrap();
         let size = form.size_hint().exact().unwrap();
-        let (mut sent, mut pieces) = (Vec::new(), 0);
-        while let Some(piece) = form.next_chunk().unwrap() {
-            assert!(piece.len() <= CHUNK);
-            sent.extend_from_slice(&piece);
-            pieces += 1;
+        let (mut sent, mut chunks) = (Vec::new(), 0);
+        while let Some(chunk) = form.next_chunk().unwrap() {
+            assert!(chunk.len() <= CHUNK);
+            sent.extend_from_slice(&chunk);
+            chunks += 1;
         }
         assert!(form.is_end_stream());
         assert_eq!(sent.len() as u64, size);
-        assert!(pieces > 3, "{pieces}");
+        assert!(chunks > 3, "{chunks}");
         let text = String::from_utf8(sent).unwrap();
-        let begin =
+        let start =
             "--XX\r\nContent-Disposition: form-data; name=\"purpose\"\r\n\r\nbatch\r\n--XX\r\n";
-        assert!(text.starts_with(begin), "{}", &text[..200]);
+        assert!(text.starts_with(start), "{}", &text[..200]);
         assert!(text.ends_with("\n\r\n--XX--\r\n"));
         assert!(text.contains("filename=\"a.jsonl\""));
     }

@@ -165,6 +165,7 @@ fn patches_after_fit(width: f64, height: f64, side: f64, most: f64) -> f64 {
 }
 
 /// Limits of an image: maximum side in pixels, and maximum number of patches.
+#[derive(Clone, Copy)]
 struct PatchLimits {
     side: f64,
     most: f64,
@@ -213,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_match_the_published_ones() {
+    fn counts_match_published_ones() {
         let high = Some(ImageDetail::High);
         for (model, detail, width, height, tokens) in [
             // platform.openai.com/docs/guides/images-vision
@@ -233,11 +234,11 @@ mod tests {
             ("gemini-2.5-flash", None, 384, 384, 258),
             ("gemini-2.5-flash", None, 960, 540, 1548),
             ("gemini-3-flash", None, 2560, 1440, 1120),
-            // platform.claude.com/docs, vision: the two sizes that it states, and one at the limit
+            // platform.claude.com/docs, vision: the two documented sizes, and one at the limit
             ("claude-opus-4-7", None, 1000, 1000, 1296),
             ("claude-opus-5-5", None, 1920, 1080, 2691),
             ("anthropic/claude-sonnet-5", None, 2560, 1440, 4784),
-            // users' counts with the words: 1558 to 1561
+            // counts reported by users, including the text: 1558 to 1561
             ("claude-sonnet-4-5", None, 2560, 1440, 1560),
             ("Qwen/Qwen2.5-VL-7B-Instruct", None, 1288, 728, 1196),
             ("Qwen/Qwen2.5-VL-7B-Instruct", None, 2560, 1440, 4641),
@@ -249,33 +250,33 @@ mod tests {
             let counted = image_tokens(model, detail, width, height);
             assert_eq!(counted, Some(tokens), "{model} {width} × {height}");
         }
-        // 1800 × 2400 is more than 1536 patches: 33 × 44 of them.
+        // 1800 × 2400 pixels are reduced to at most 1536 patches: 33 × 44.
         assert_eq!(image_tokens("gpt-4.1-mini", None, 1800, 2400), Some(2353));
         assert_eq!(image_tokens("my-model", None, 640, 480), None);
     }
 
     #[test]
-    fn no_family_hides_behind_a_shorter_name_before_it() {
-        let mut before: Vec<&String> = Vec::new();
+    fn no_prefix_is_hidden_by_an_earlier_one() {
+        let mut earlier: Vec<&String> = Vec::new();
         for begin in TABLE.family.iter().flat_map(|family| &family.begins) {
-            let hides = before
+            let hidden_by = earlier
                 .iter()
-                .find(|earlier| begin.starts_with(earlier.as_str()));
-            assert_eq!(hides, None, "{begin} is never reached");
-            before.push(begin);
+                .find(|prefix| begin.starts_with(prefix.as_str()));
+            assert_eq!(hidden_by, None, "{begin} is never reached");
+            earlier.push(begin);
         }
-        assert!(before.len() > 30);
+        assert!(earlier.len() > 30);
     }
 
     #[test]
-    fn more_pixels_never_count_fewer_tokens_beyond_rounding() {
+    fn counts_grow_with_the_size() {
         for family in &TABLE.family {
             let count = |side: f64| family.rule.count(None, side, side);
             let counts: Vec<u64> = (1..40).map(|step| count(f64::from(step) * 100.0)).collect();
-            let falls = counts
+            let decrease = counts
                 .windows(2)
                 .find(|pair| (pair[1] as f64) < 0.9 * pair[0] as f64);
-            assert_eq!(falls, None, "{:?}", family.begins);
+            assert_eq!(decrease, None, "{:?}", family.begins);
         }
     }
 }

@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn requests_reserve_the_most_they_can_cost() {
+    fn requests_reserve_their_maximum_cost() {
         let spending = spending();
         let first = spending.reserve(request()).unwrap();
         let second = spending.reserve(request()).unwrap();
@@ -399,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_that_was_never_sent_costs_nothing() {
+    fn unsent_requests_cost_nothing() {
         let spending = spending();
         drop(spending.reserve(request()));
         assert_eq!(spending.spent().to_bits(), 0.0_f64.to_bits());
@@ -411,7 +411,7 @@ mod tests {
     }
 
     #[test]
-    fn tokens_that_are_not_stated_count_at_their_bound() {
+    fn unreported_tokens_count_at_their_bound() {
         for (charge, dollars, unstated) in [
             (Charge::Nothing, 0.0, 0),
             (Charge::Unknown, 100.0, 100),
@@ -424,8 +424,8 @@ mod tests {
                 .unwrap();
             reservation.mark_sent();
             reservation.settle(charge);
-            let own = reservation.spending.spent();
-            assert!((own - dollars).abs() < 1e-9, "{charge:?}: {own}");
+            let spent = reservation.spending.spent();
+            assert!((spent - dollars).abs() < 1e-9, "{charge:?}: {spent}");
             let charged = reservation.charged().unstated;
             let tokens = charged.prompt_tokens + charged.completion_tokens;
             assert_eq!(tokens, unstated, "{charge:?}");
@@ -433,7 +433,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_retry_waits_for_others_and_goes_before_new_requests() {
+    async fn retries_have_priority_over_new_requests() {
         let spending = spending();
         let retried = spending.reserve(request()).unwrap();
         let other = spending.reserve(request()).unwrap();
@@ -452,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn replies_beyond_their_limit_raise_the_bound() {
+    fn long_replies_raise_the_bound() {
         let request = request();
         let spending = Arc::new(Spending::new(None, 0.0));
         let reservation = spending.reserve(request.clone()).unwrap();

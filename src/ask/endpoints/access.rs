@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_key_is_sent_in_the_header_that_the_server_expects() {
+    fn the_vendor_decides_the_key_header() {
         let azure = "https://r.openai.azure.com/openai/v1/";
         for (base, header, name, value) in [
             (azure, KeyHeader::Auto, "api-key", "sk-0123"),

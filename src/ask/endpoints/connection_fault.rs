@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn causes_that_stay_have_a_remedy() {
+    fn permanent_causes_have_a_remedy() {
         for (text, is_plain, remedy) in [
             (
                 "invalid peer certificate: UnknownIssuer",
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_name_server_is_no_unknown_host() {
+    fn a_dns_outage_is_not_an_unknown_host() {
         let lookup = "dns error: failed to lookup address information: ";
         assert!(is_unknown_host(&format!(
             "{lookup}Name or service not known"
@@ -156,13 +156,13 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn open_files_are_found_among_causes() {
+    fn too_many_open_files_are_found_among_causes() {
         #[derive(Debug, thiserror::Error)]
         #[error("outer")]
         struct Outer(#[source] io::Error);
-        let of_code = |code| Outer(io::Error::from_raw_os_error(code));
-        assert!(lacks_open_files(&of_code(24)));
-        assert!(!lacks_open_files(&of_code(111)));
+        let error_with_code = |code| Outer(io::Error::from_raw_os_error(code));
+        assert!(lacks_open_files(&error_with_code(24)));
+        assert!(!lacks_open_files(&error_with_code(111)));
         assert!(!lacks_open_files(&Outer(io::Error::other(
             "Too many open files"
         ))));

@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_secret_on_the_command_line_is_refused_and_not_shown() {
+    fn secrets_on_the_command_line_are_refused() {
         for secret in [
             "X-Any: sk-0123456789",
             "Authorization: Bearer abcdefghijklmnop",

@@ -82,14 +82,16 @@ fn is_valid_authority(authority: &Authority) -> bool {
 mod tests {
     use super::*;
 
-    /// The variable that is refused for this address and environment.
+    /// Variable with an unusable proxy for this address and environment.
     fn refused(base: &str, set: &[(&str, &str)]) -> Option<String> {
         let variable = |name: &str| {
-            let found = set.iter().find(|(known, _)| *known == name);
-            found.map(|(_, value)| value.into())
+            set.iter()
+                .find(|(known, _)| *known == name)
+                .map(|(_, value)| value.into())
         };
-        let error = check_proxy(&base.parse().unwrap(), variable).err()?;
-        let error = error.to_string();
+        let error = check_proxy(&base.parse().unwrap(), variable)
+            .err()?
+            .to_string();
         assert!(!error.contains("pass"), "{error}");
         Some(error.split(':').next().unwrap_or_default().to_owned())
     }
@@ -123,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn proxies_that_can_be_used_are_taken() {
+    fn usable_proxies_are_accepted() {
         for proxy in [
             "",
             "http://proxy:3128",
@@ -136,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_proxy_that_is_not_asked_may_be_anything() {
+    fn unused_proxies_are_not_checked() {
         let wrong = ("ALL_PROXY", "socks5://proxy");
         assert_eq!(refused("http://127.0.0.1:8000/v1", &[wrong]), None);
         assert_eq!(
@@ -144,8 +146,8 @@ mod tests {
             None
         );
         assert_eq!(refused(PLAIN, &[("HTTPS_PROXY", "socks5://proxy")]), None);
-        for except in ["*", "llm.example", ".example, other"] {
-            assert_eq!(refused(PLAIN, &[wrong, ("NO_PROXY", except)]), None);
+        for no_proxy in ["*", "llm.example", ".example, other"] {
+            assert_eq!(refused(PLAIN, &[wrong, ("NO_PROXY", no_proxy)]), None);
         }
         let other = refused(PLAIN, &[wrong, ("NO_PROXY", "other")]);
         assert_eq!(other.as_deref(), Some("ALL_PROXY"));

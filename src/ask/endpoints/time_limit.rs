@@ -81,11 +81,11 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_millis(400);
 
-    /// A pause of the process, as far as its only thread is concerned.
-    const STOPPED: Duration = Duration::from_millis(900);
+    /// Simulated suspension of the process: its only thread sleeps.
+    const SUSPENSION: Duration = Duration::from_millis(900);
 
     #[tokio::test(start_paused = true)]
-    async fn limit_is_exact_without_pause() {
+    async fn limit_is_exact_without_suspension() {
         for limit in [1, 7, 400, 120_000].map(Duration::from_millis) {
             let started = Instant::now();
             assert!(TimeLimit::new(limit).run(pending::<()>()).await.is_none());
@@ -102,37 +102,44 @@ mod tests {
         assert_eq!(limit.suspended(), Duration::ZERO);
     }
 
-    /// The pieces of a reply that arrive one by one.
+    /// Chunks of a reply that arrive one by one.
     #[tokio::test(start_paused = true)]
     async fn short_futures_do_not_outlast_the_limit() {
         let mut limit = TimeLimit::new(LIMIT);
-        let piece = Duration::from_millis(5);
+        let interval = Duration::from_millis(5);
         let mut read = 0;
-        while limit.run(sleep(piece)).await.is_some() {
+        while limit.run(sleep(interval)).await.is_some() {
             read += 1;
-            assert!(read <= LIMIT.as_millis() / piece.as_millis(), "{read}");
+            assert!(read <= LIMIT.as_millis() / interval.as_millis(), "{read}");
         }
-        assert!(limit.run(async {}).await.is_some(), "what is there is read");
+        assert!(
+            limit.run(async {}).await.is_some(),
+            "data that has arrived is read"
+        );
     }
 
     #[tokio::test]
-    async fn pause_does_not_count() {
+    async fn suspension_does_not_count() {
         let mut limit = TimeLimit::new(LIMIT);
         let done = limit.run(async {
             sleep(LIMIT / 4).await;
-            thread::sleep(STOPPED);
+            thread::sleep(SUSPENSION);
             sleep(LIMIT / 4).await;
         });
         assert!(done.await.is_some());
-        assert!(limit.suspended() > STOPPED / 2, "{:?}", limit.suspended());
+        assert!(
+            limit.suspended() > SUSPENSION / 2,
+            "{:?}",
+            limit.suspended()
+        );
     }
 
     #[tokio::test]
-    async fn output_after_pause_comes_before_the_limit() {
-        // A pause in the last step: the future is ready only some polls later, as a socket that another task reads.
+    async fn output_after_suspension_precedes_the_limit() {
+        // Suspension in the last step: the future is ready only some polls later, like a socket that another task reads.
         let mut limit = TimeLimit::new(LIMIT);
         limit.left = MIN_STEP;
-        let stop = tokio::spawn(async { thread::sleep(STOPPED) });
+        let stop = tokio::spawn(async { thread::sleep(SUSPENSION) });
         let ready = async {
             stop.await.unwrap();
             for _ in 0..5 {

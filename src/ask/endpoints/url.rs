@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn secrets_of_the_address_are_not_shown() {
+    fn secrets_in_the_url_are_not_shown() {
         let base = url("https://me:p%40ss@h.example:444/v1?key=s3cr%20t&api-version=2024-10-21");
         assert_eq!(base.to_string(), "https://h.example:444/v1");
         assert_eq!(format!("{base:?}"), "BaseUrl(https://h.example:444/v1)");

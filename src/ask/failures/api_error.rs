@@ -356,7 +356,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_of_every_shape_are_read() {
+    fn errors_of_every_shape_are_parsed() {
         for (body, message, code) in [
             (
                 r#"{"error":{"message":"m","type":"t","code":"c"}}"#,
@@ -408,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_within_errors_and_lists_are_opened() {
+    fn nested_errors_are_parsed() {
         for (body, message, code, param) in [
             (
                 r#"[{"error":{"message":"m","code":429}}]"#,
@@ -434,14 +434,14 @@ mod tests {
                 None,
                 Some("logprobs"),
             ),
-            // Five levels: the fourth is shown as it is.
+            // Five levels: the fourth remains JSON text.
             (
                 r#"{"error":{"message":{"message":{"message":{"message":{"message":"x"}}}}}}"#,
                 r#"{"message":{"message":"x"}}"#,
                 None,
                 None,
             ),
-            // Braces that are no error stay a part of the words.
+            // A JSON object that is not an error remains part of the message.
             (
                 r#"{"error":{"message":"use {\"a\": 1}"}}"#,
                 r#"use {"a": 1}"#,
@@ -457,7 +457,7 @@ mod tests {
     }
 
     #[test]
-    fn waits_and_days_are_read_from_every_shape() {
+    fn waits_and_daily_limits_are_parsed() {
         let gemini = |id: &str| {
             format!(
                 r#"[{{"error":{{"code":429,"message":"You exceeded your current quota.","details":[{{"violations":[{{"quotaId":"{id}"}}]}},{{"@type":"type.googleapis.com/google.rpc.RetryInfo","retryDelay":"45.837906927s"}}]}}}}]"#

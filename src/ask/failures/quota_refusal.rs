@@ -42,16 +42,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_limit_of_waiting_tokens_is_read_from_words() {
-        let of = |code: Option<&str>, message: &str| {
+    fn the_limit_is_parsed_from_the_message() {
+        let parse = |code: Option<&str>, message: &str| {
             let error = serde_json::json!({"code": code, "message": message});
             QuotaRefusal::from_api_error(&ApiError::from_error(&error), &Scrub::default())
         };
-        let words = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
+        let message = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
                      once some in_progress batches have been completed.";
-        assert_eq!(of(None, words).unwrap().limit, Some(90_000));
-        let azure = of(Some("token_limit_exceeded"), "The limit was exceeded");
+        assert_eq!(parse(None, message).unwrap().limit, Some(90_000));
+        let azure = parse(Some("token_limit_exceeded"), "The limit was exceeded");
         assert_eq!(azure.unwrap().limit, None);
-        assert_eq!(of(None, "Rate limit reached. Limit: 30000"), None);
+        assert_eq!(parse(None, "Rate limit reached. Limit: 30000"), None);
     }
 }

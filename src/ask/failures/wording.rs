@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn words_of_servers_have_their_cause() {
+    fn server_errors_have_a_cause() {
         let error = |message: &str| json!({"error": {"message": message}}).to_string();
         let flat = |message: &str| {
             json!({"object": "error", "message": message, "type": "BadRequestError", "code": 400})

@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_names_a_broken_line_once() {
+    fn errors_name_the_line_once() {
         let error = load("\n{\n").unwrap_err().to_string();
         assert!(
             error.ends_with(", line 2: EOF while parsing an object"),

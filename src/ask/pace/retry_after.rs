@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn waits_of_every_form_are_read() {
+    fn waits_of_every_form_are_parsed() {
         let ms = |ms| Some(Duration::from_millis(ms));
         for (pairs, expected) in [
             (vec![("retry-after", "2")], ms(2000)),

@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_read_back() {
+    fn bounds_round_trip() {
         for text in ["1", "32", "4-64"] {
             assert_eq!(text.parse::<ConcurrencyBounds>().unwrap().to_string(), text);
         }
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn the_window_widens_by_one_and_narrows_by_a_third() {
+    async fn the_window_grows_slowly_and_shrinks_fast() {
         let window = Window::new("8-32".parse().unwrap());
         for _ in 0..9 {
             window.record_success(Duration::from_millis(200));
@@ -203,9 +203,9 @@ mod tests {
     }
 
     #[test]
-    fn the_window_stays_if_the_server_only_queues() {
+    fn the_window_stays_while_the_server_queues() {
         let window = Window::new("4-64".parse().unwrap());
-        // The server answers one at a time: a reply waits for all that were sent before it.
+        // The server answers one request at a time: a reply waits for all requests sent before it.
         for _ in 0..2000 {
             window.record_success(Duration::from_millis(100 * window.width() as u64));
         }

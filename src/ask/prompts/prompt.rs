@@ -178,7 +178,7 @@ mod tests {
         }
     }
 
-    fn loaded(files: &[(&str, &str)]) -> Result<Prompts> {
+    fn load(files: &[(&str, &str)]) -> Result<Prompts> {
         let dir = tempfile::tempdir().unwrap();
         for (name, text) in files {
             fs::write(dir.path().join(name), text).unwrap();
@@ -223,9 +223,9 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_replaces_the_prompts_that_it_has() {
+    fn a_folder_replaces_its_prompts_only() {
         let own = "Q: {{ question }}\r\n{% for c in choices %}({{ c.letter }}) {{ c.text }}\r\n{% endfor %}";
-        let prompts = loaded(&[("choice.txt", own), ("README.md", "x"), (".swp", "x")]).unwrap();
+        let prompts = load(&[("choice.txt", own), ("README.md", "x"), (".swp", "x")]).unwrap();
         let asked = question("Red?", &["yes", "no"]);
         assert_eq!(
             prompts.render(View::Image, &asked).unwrap(),
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_folders_are_errors() {
+    fn invalid_folders_are_errors() {
         let choices = "{% for c in choices %}{{ c.text }}{% endfor %}";
         for (files, expected) in [
             (vec![], "neither"),
@@ -260,7 +260,7 @@ mod tests {
             ),
             (vec![("choice.txt", "{% for %}")], "choice.txt"),
         ] {
-            let error = loaded(&files).unwrap_err().to_string();
+            let error = load(&files).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
     }

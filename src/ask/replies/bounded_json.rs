@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn small_values_are_those_of_serde() {
+    fn small_values_match_serde() {
         for text in [
             r#"{"a":[1,-2,3.5,1e300,true,null,"x\n\ud83d\ude00"],"b":{},"c":[[]],"a ":18446744073709551615}"#,
             "[]",
@@ -154,18 +154,18 @@ mod tests {
     }
 
     #[test]
-    fn a_field_behind_a_long_list_is_found() {
+    fn a_field_after_a_long_list_is_found() {
         let items = "{\"a\":1},".repeat(50_000);
         let text = format!("{{\"x\":[{items}1],\"y\":2}}");
         let value = parse(&text).unwrap();
         assert_eq!(value["y"], 2);
         assert_eq!(value["x"].as_array().unwrap().len(), MAX_ITEMS);
-        // What is beyond the bounds must be JSON, too.
+        // Values beyond the bounds must be valid JSON too.
         assert!(parse(&text.replace(",1]", ",]")).is_err());
     }
 
     #[test]
-    fn no_more_values_are_kept_than_the_bound() {
+    fn the_number_of_values_is_bounded() {
         fn count(value: &Value) -> usize {
             match value {
                 Value::Array(items) => 1 + items.iter().map(count).sum::<usize>(),

@@ -163,7 +163,7 @@ mod tests {
     use crate::picture::PayloadFormat;
     use crate::types::Rgb;
 
-    /// The parts of a message with images of 1, 2, … pixels width: words, and the widths of images.
+    /// Parts of a message with images of 1, 2, … pixels width: texts, and the widths of images.
     fn parts([before, after]: [&str; 2], images: usize, places: ImagePlaces) -> Vec<String> {
         let images: Vec<Arc<Payload>> = (1..=images)
             .map(|width| {
@@ -181,14 +181,14 @@ mod tests {
             .parts()
             .into_iter()
             .map(|part| match part {
-                MessagePart::Text(words) => words.to_owned(),
+                MessagePart::Text(text) => text.to_owned(),
                 MessagePart::Image(image) => image.facts().width.to_string(),
             })
             .collect()
     }
 
     #[test]
-    fn images_stand_together_or_at_their_marks() {
+    fn images_are_together_or_at_their_marks() {
         use ImagePlaces::{Marked, Together};
         let text = "Is <image 2> like <image 1>?";
         for (texts, images, places, expected) in [

@@ -201,11 +201,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn limits_are_known_by_host() {
-        let of = |base: &str| ImageLimit::from_access(&Access::new(base.parse().unwrap()));
-        assert_eq!(of("https://api.anthropic.com/v1").side, Some(8000));
-        assert_eq!(of("https://r.openai.azure.com/openai/v1").origin, "Azure");
-        assert_eq!(of("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
+    fn the_host_decides_the_limit() {
+        let limit_at = |base: &str| ImageLimit::from_access(&Access::new(base.parse().unwrap()));
+        assert_eq!(limit_at("https://api.anthropic.com/v1").side, Some(8000));
+        assert_eq!(
+            limit_at("https://r.openai.azure.com/openai/v1").origin,
+            "Azure"
+        );
+        assert_eq!(limit_at("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
     }
 
     /// A PNG file of this many bytes and this width.
@@ -223,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_beyond_the_limit_is_an_error_with_a_remedy() {
+    fn images_beyond_the_limit_are_errors() {
         let limit = ImageLimit::from_access(&Access::new(
             "https://api.anthropic.com/v1".parse().unwrap(),
         ));
@@ -244,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn several_images_in_a_request_have_limits_of_their_own() {
+    fn requests_with_several_images_have_limits() {
         let at = |base: &str| {
             ImageLimit::from_user(1).with_requests_to(&Access::new(base.parse().unwrap()))
         };
@@ -267,13 +270,13 @@ mod tests {
         // 50 images of 300 kB are 20 MB of base64.
         let gemini = at("https://generativelanguage.googleapis.com/v1beta/openai");
         assert_eq!(gemini.may_exceed(50, &image(300_000, 10)), None);
-        let words = gemini.may_exceed(50, &image(300_003, 10)).unwrap();
-        assert!(words.contains("Gemini takes 20 MB"), "{words}");
-        // The stricter of two, and none at a server that is not known.
+        let warning = gemini.may_exceed(50, &image(300_003, 10)).unwrap();
+        assert!(warning.contains("Gemini takes 20 MB"), "{warning}");
+        // The stricter of two limits, and no limit at an unknown server.
         let both = groq.stricter(anthropic);
         assert!(both.check_request(6, None).is_err() && both.check_request(5, Some(&wide)).is_ok());
-        let own = at("http://127.0.0.1:8000/v1");
-        assert!(own.check_request(1000, Some(&wide)).is_ok());
-        assert_eq!(own.may_exceed(1000, &wide), None);
+        let unknown = at("http://127.0.0.1:8000/v1");
+        assert!(unknown.check_request(1000, Some(&wide)).is_ok());
+        assert_eq!(unknown.may_exceed(1000, &wide), None);
     }
 }

@@ -261,7 +261,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_read_back() {
+    fn names_round_trip() {
         for name in ["auto", "max_tokens", "max_completion_tokens", "none"] {
             let field = TokenField::from_str(name, false).unwrap();
             assert_eq!(field.to_string(), name);
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_that_decide_a_reply_change_the_content() {
+    fn settings_that_affect_replies_change_the_content() {
         let base = Parameters::new("m".into());
         let mut others = vec![base.clone(); 15];
         others[0].model = "n".into();
@@ -302,15 +302,15 @@ mod tests {
             ..base.clone()
         };
         assert_eq!(renamed.content(), base.content());
-        let mut grown = base.clone();
-        grown.max_tokens = NonZeroU32::new(4096).unwrap();
-        assert_ne!(grown.content(), base.content());
-        let grown = grown.raised_from(base.max_tokens).unwrap();
-        assert_eq!(grown.content(), base.content());
+        let mut raised = base.clone();
+        raised.max_tokens = NonZeroU32::new(4096).unwrap();
+        assert_ne!(raised.content(), base.content());
+        let raised = raised.raised_from(base.max_tokens).unwrap();
+        assert_eq!(raised.content(), base.content());
         assert_eq!(
-            (grown.limit(), grown.raised_limit()),
+            (raised.limit(), raised.raised_limit()),
             (Some(4096), Some(4096))
         );
-        assert_eq!(base.raised_from(grown.max_tokens), None);
+        assert_eq!(base.raised_from(raised.max_tokens), None);
     }
 }

@@ -67,9 +67,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_come_in_order_and_the_remaining_size_falls() {
-        let piece = Bytes::from_static;
-        let mut body = RequestBody::new([piece(b"ab"), piece(b""), piece(b"cde")]);
+    fn chunks_are_sent_in_order() {
+        let chunk = Bytes::from_static;
+        let mut body = RequestBody::new([chunk(b"ab"), chunk(b""), chunk(b"cde")]);
         let mut context = Context::from_waker(std::task::Waker::noop());
         let mut seen = Vec::new();
         let mut remaining = vec![body.size_hint().exact()];
@@ -80,6 +80,6 @@ mod tests {
         assert_eq!(seen, b"abcde");
         assert_eq!(remaining, [Some(5), Some(3), Some(0)]);
         assert!(body.is_end_stream());
-        assert!(RequestBody::new([piece(b""), piece(b""), piece(b"")]).is_end_stream());
+        assert!(RequestBody::new([chunk(b""), chunk(b""), chunk(b"")]).is_end_stream());
     }
 }

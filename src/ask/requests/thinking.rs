@@ -111,12 +111,12 @@ mod tests {
 
     use super::*;
 
-    fn at(base: &str, thinking: Thinking) -> Result<&'static ThinkingSwitch> {
+    fn switch_for(base: &str, thinking: Thinking) -> Result<&'static ThinkingSwitch> {
         thinking.switch_for(&base.parse().unwrap())
     }
 
     #[test]
-    fn every_server_is_told_in_its_own_words() {
+    fn each_server_has_its_switch() {
         let template = json!({"chat_template_kwargs": {"enable_thinking": false}});
         for (base, effort, body) in [
             ("https://api.openai.com/v1", Some("none"), json!({})),
@@ -137,32 +137,32 @@ mod tests {
             ),
             ("http://127.0.0.1:11434/v1", Some("none"), json!({})),
             ("http://127.0.0.1:8000/v1", None, template.clone()),
-            // The port reveals nothing about another machine, nor a name of another domain.
+            // Ports count only on this machine, and suffixes only as whole domains.
             ("http://gpu7:11434/v1", None, template.clone()),
             ("https://api.openai.com.example/v1", None, template),
         ] {
-            let switch = at(base, Thinking::Off).unwrap();
+            let switch = switch_for(base, Thinking::Off).unwrap();
             assert_eq!(switch.effort.as_deref(), effort, "{base}");
             assert_eq!(json!(switch.body), body, "{base}");
         }
     }
 
     #[test]
-    fn a_switch_that_is_not_known_is_refused() {
+    fn unknown_switches_are_errors() {
         for (base, thinking) in [
             ("https://api.mistral.ai/v1", Thinking::Off),
             ("https://api.openai.com/v1", Thinking::On),
         ] {
-            let error = at(base, thinking).unwrap_err().to_string();
+            let error = switch_for(base, thinking).unwrap_err().to_string();
             assert!(error.contains("--thinking"), "{error}");
             assert!(error.contains("--reasoning-effort"), "{error}");
         }
     }
 
-    /// No switch sets what the program sets, and none says nothing.
+    /// No switch is empty or sets a field of the program.
     #[test]
-    fn the_table_holds_switches_alone() {
-        let own = [
+    fn switches_set_only_thinking_fields() {
+        let program_fields = [
             "model",
             "messages",
             "input",
@@ -172,15 +172,19 @@ mod tests {
             "reasoning_effort",
             "logprobs",
         ];
-        let others = TABLE.server.iter().filter(|row| row.is_fallback());
-        assert_eq!(others.count(), 1);
+        let fallbacks = TABLE.server.iter().filter(|row| row.is_fallback());
+        assert_eq!(fallbacks.count(), 1);
         for row in &TABLE.server {
             for switch in row.off.iter().chain(&row.on) {
                 assert!(
                     switch.effort.is_some() || !switch.body.is_empty(),
                     "{row:?}"
                 );
-                assert!(own.iter().all(|field| !switch.body.contains_key(*field)));
+                assert!(
+                    program_fields
+                        .iter()
+                        .all(|field| !switch.body.contains_key(*field))
+                );
             }
         }
     }

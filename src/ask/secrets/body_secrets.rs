@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn secrets_are_refused_by_field_and_not_shown() {
+    fn secret_fields_are_refused() {
         let body = |body: &Value| {
             refuse_secrets(body.as_object().unwrap()).map_err(|error| error.to_string())
         };

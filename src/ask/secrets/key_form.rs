@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_told_from_names_of_variables() {
+    fn keys_differ_from_variable_names() {
         for name in ["OPENAI_API_KEY", "HF_TOKEN", "none", "key", "my_key_2", "K"] {
             assert!(!looks_like_key(name), "{name}");
         }

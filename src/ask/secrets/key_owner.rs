@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_key_goes_to_its_own_vendor() {
+    fn keys_are_sent_only_to_their_vendor() {
         let rows = tempfile::NamedTempFile::new().unwrap();
         let text = "[[vendor]]\nname = \"Campus\"\nhosts = [\"llm.example\"]\nkey = [\"K\"]\nkey-form = [\"camp-\", \"sk-proj-\"]\n";
         std::fs::write(rows.path(), text).unwrap();
@@ -61,7 +61,7 @@ mod tests {
             );
             assert!(!error.contains("sk-ant"), "{error}");
         }
-        // A table of the user states how more keys look, and which of its hosts may be given another vendor's.
+        // The user's table can add key forms. Its hosts may receive keys of these forms, even if they are another vendor's.
         let gateway = "https://llm.example/v1";
         assert_eq!(check(own, "camp-123", gateway), Ok(()));
         assert_eq!(check(own, "sk-proj-123", gateway), Ok(()));

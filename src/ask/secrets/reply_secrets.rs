@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_text_keeps_both_its_ends() {
+    fn long_texts_lose_their_middle() {
         let kept = "é".repeat(MAX_TEXT / 2);
         assert_eq!(shortened(kept.clone()), kept);
         let long = shortened(format!("start é{} the end", "é".repeat(MAX_TEXT)));
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn names_and_tokens_are_short_and_have_no_key() {
+    fn names_are_short_and_without_keys() {
         let key = "sk-0123456789abcdef";
         let long = "x".repeat(MAX_NAME - 4) + key;
         let reply = Reply {

@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_checked_and_never_shown() {
+    fn invalid_keys_are_refused_and_not_shown() {
         let key = Secret::new(" sk-abc\n", "KEY").unwrap();
         assert_eq!(key.expose(), "sk-abc");
         assert!(!format!("{key:?}").contains("abc"));
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_holds_no_key_is_refused_unseen() {
+    fn files_without_a_key_are_refused() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let read = |text: &[u8]| {
             std::fs::write(file.path(), text).unwrap();
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn secrets_are_removed_before_the_text_is_shortened() {
+    fn secrets_are_removed_before_shortening() {
         let scrub = Scrub::new(["sk-abcdef".to_owned(), "sk-abcdef-long".to_owned()]);
         assert_eq!(
             scrub.line("key \u{1b}[31msk-abc\u{200b}def-long,\r\n\tsk-abcdef"),

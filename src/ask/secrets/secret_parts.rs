@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_in_base64_is_masked_at_any_place() {
+    fn keys_in_base64_are_masked_at_any_offset() {
         for before in ["", "a", "ab", "Bearer ", "user:"] {
             for after in ["", "x", "xy"] {
                 let encoded = STANDARD_NO_PAD.encode(format!("{before}{KEY}{after}"));
@@ -159,7 +159,7 @@ mod tests {
                     panic!("{text}");
                 };
                 let left = head.len() + tail.len() - "It is , ok".len();
-                // What is left encodes the text around it, and at most two bytes of the key.
+                // The rest encodes the surrounding text and at most two bytes of the key.
                 let around = (before.len() + after.len()) * 4 / 3;
                 assert!(left <= around + 5, "{encoded}: {text}");
             }
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_in_parts_is_masked() {
+    fn keys_in_parts_are_masked() {
         for (text, expected) in [
             ("sk-proj-Ab12Cd34 and Ef56Gh78Ij90", "[secret] and [secret]"),
             ("s k - p r o j - A b 1 2 C d 3 4", "[secret]"),
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn other_words_stay() {
+    fn other_text_is_unchanged() {
         for text in [
             "sk-proj",
             "the project Ab12",

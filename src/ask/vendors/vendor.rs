@@ -254,11 +254,11 @@ mod tests {
         let count = hosts.len();
         hosts.sort();
         hosts.dedup();
-        assert_eq!(hosts.len(), count, "a host stands twice");
+        assert_eq!(hosts.len(), count, "a host is listed twice");
     }
 
     #[test]
-    fn a_key_tells_its_vendor() {
+    fn keys_identify_their_vendor() {
         let vendor_name = |key: &str| Vendor::by_key(key).map(|vendor| &*vendor.name);
         assert_eq!(vendor_name("sk-ant-api03-x"), Some("Anthropic"));
         assert_eq!(vendor_name("sk-proj-x"), Some("OpenAI"));
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_needs_the_path_that_its_vendor_has() {
+    fn some_vendors_require_a_path() {
         let check = |text: &str| {
             let base: BaseUrl = text.parse().unwrap();
             Vendor::at_host(base.host()).map(|vendor| vendor.check_address(&base))
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_is_known_by_its_end() {
+    fn hosts_match_by_suffix() {
         assert_eq!(vendor_at("api.openai.com"), Some("OpenAI"));
         assert_eq!(vendor_at("eu.api.openai.com"), Some("OpenAI"));
         assert_eq!(vendor_at("r.openai.azure.com"), Some("Azure"));

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_the_user_are_above_the_built_in_ones() {
+    fn user_rows_have_priority() {
         let table = read(
             "[[vendor]]\nname = \"Mine\"\nhosts = [\"llm.example\", \"api.openai.com\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\n",
         );
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_used_is_named() {
+    fn invalid_tables_are_errors() {
         let row = "[[vendor]]\nname = \"Mine\"\n";
         for (text, part) in [
             ("", "line 1: missing field `vendor`"),

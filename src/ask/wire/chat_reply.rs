@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn contents_of_every_shape_are_read() {
+    fn contents_of_every_shape_are_parsed() {
         for (content, text) in [
             (r#"{"content":"B"}"#, "B"),
             (r#"{"content":null}"#, ""),
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_choice_of_index_zero_is_taken() {
+    fn the_choice_with_index_zero_is_used() {
         let two = r#"{"choices":[{"index":1,"message":{"content":"A"}},{"index":0,"message":{"content":"B"}}]}"#;
         assert_eq!(json(two).unwrap().text, "B");
         let odd = r#"{"choices":[{"index":1,"message":{"content":"A"}},{"index":2,"message":{"content":"B"}}]}"#;
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn optional_fields_are_read_if_present() {
+    fn optional_fields_are_parsed() {
         let whole = "\n\n \r\n{\"model\":\"m-1\",\"choices\":[{\"finish_reason\":\"length\",\"message\":{\"content\":\"\"}}],\"usage\":{\"prompt_tokens\":9,\"completion_tokens\":\"many\"},\"timings\":{}}";
         let reply = json(whole).unwrap();
         assert_eq!(reply.finish, Finish::Length);
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_with_a_status_of_success_are_found() {
+    fn errors_with_a_success_status_are_found() {
         for body in [
             r#"{"error":{"message":"m","code":502},"choices":[{"message":{"content":"B"}}]}"#,
             r#"{"error":"m"}"#,
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_in_the_text_of_a_reply_that_broke_off_is_found() {
+    fn errors_in_the_text_of_incomplete_replies_are_found() {
         let body = |text: &str| {
             format!(
                 r#"{{"choices":[{{"finish_reason":"error","message":{{"content":"{text}"}}}}]}}"#
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_is_not_a_completion_is_described() {
+    fn other_bodies_are_described() {
         let deep = "[".repeat(1000);
         for (body, content_type, expected) in [
             ("", "application/json", "empty"),
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_reply_without_tokens_was_lost() {
+    fn empty_replies_without_tokens_are_lost() {
         let body = |content: &str, finish: &str, usage: &str| {
             format!(
                 r#"{{"choices":[{{"finish_reason":"{finish}","message":{{"content":{content},"refusal":null}}}}],"usage":{usage}}}"#
@@ -299,14 +299,14 @@ mod tests {
         let ended = r#"{"prompt_tokens":300,"completion_tokens":1}"#;
         assert!(
             json(&body("null", "stop", ended)).is_ok(),
-            "the model said nothing"
+            "the model returned no text"
         );
         assert!(json(&body("null", "length", none)).is_ok());
         assert!(json(&body("\"B\"", "stop", none)).is_ok());
     }
 
     #[test]
-    fn tokens_of_a_body_without_a_reply_are_known() {
+    fn bodies_without_a_reply_have_usage() {
         let usage = r#""usage":{"prompt_tokens":300,"completion_tokens":1024}"#;
         for body in [
             format!(r#"{{"choices":[],{usage}}}"#),
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_text_does_not_lose_the_reply() {
+    fn invalid_utf8_is_replaced() {
         let body = b"\xef\xbb\xbf{\"choices\":[{\"message\":{\"content\":\"B \xff\xfe\"}}]}";
         assert_eq!(read(body, "").unwrap().text, "B \u{FFFD}\u{FFFD}");
         assert_eq!(message(r#"{"content":"B \ud83d"}"#).text, "B \u{FFFD}");

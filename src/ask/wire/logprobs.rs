@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn what_says_nothing_is_none() {
+    fn empty_shapes_have_no_positions() {
         for shape in [
             json!(null),
             json!({}),
@@ -205,20 +205,20 @@ mod tests {
             assert_eq!(positions(Some(&shape)), None, "{shape}");
         }
         assert_eq!(positions(None), None);
-        // Two tokens of one text, as a letter and its byte, are not one.
+        // Two tokens with the same text, a letter and its byte, are different.
         let twins = json!([{"token": "A", "logprob": -1.0, "top_logprobs": [
             {"id": 68, "token": "A", "bytes": [65], "logprob": -1.0},
             {"id": 292, "token": "A", "bytes": [65], "logprob": -2.5},
         ]}]);
         let twins = &positions(Some(&twins)).unwrap()[0].likeliest;
         assert_eq!(twins.len(), 2);
-        // A list alone: the chosen token has no number.
+        // The chosen token has no log probability.
         let alone = json!([{"token": "B"}]);
         assert!(positions(Some(&alone)).unwrap()[0].likeliest.is_empty());
     }
 
     #[test]
-    fn reasoning_is_seen_wherever_it_stands() {
+    fn reasoning_is_detected_everywhere() {
         let none = json!({"content": "B", "reasoning_content": "", "reasoning": null});
         let zero = json!({"completion_tokens_details": {"reasoning_tokens": 0}});
         assert_eq!(thought(&none, Some(&zero), "B"), Thought::None);

@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn servers_that_want_another_wire_are_understood() {
+    fn requests_for_another_api_are_recognized() {
         use Wire::{Chat, ChatStream, Responses};
         for (words, expected) in [
             (
@@ -78,7 +78,7 @@ mod tests {
         ] {
             let api_error = ApiError::from_body(words);
             assert_eq!(requested_wire(&api_error, Chat), expected, "{words}");
-            // What was sent already is not the remedy.
+            // The API that was already used is not the remedy.
             if let Some(wire) = expected {
                 assert_eq!(requested_wire(&api_error, wire), None, "{words}");
             }

@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn the_text_of_all_messages_is_read_and_reasoning_is_not() {
+    fn only_messages_become_the_text() {
         let reply = json(
             r#"{"status":"completed","model":"o-1","error":null,"output":[
                 {"type":"reasoning","summary":[{"type":"summary_text","text":"A?"}],"content":[{"type":"reasoning_text","text":"A"}]},
@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn the_status_says_why_the_model_stopped() {
+    fn the_status_becomes_the_finish_reason() {
         for (status, finish) in [
             (r#""status":"completed","#, Finish::Stop),
             ("", Finish::Unknown),
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_whole_response_is_described() {
+    fn incomplete_responses_are_described() {
         for (body, expected) in [
             (r#"{"status":"in_progress","output":[]}"#, "in_progress"),
             (
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_that_nobody_asked_for_is_read_at_its_end() {
+    fn the_last_event_of_a_stream_is_used() {
         let stream = "event: response.output_text.delta\ndata: {\"type\":\"response.output_text.delta\",\"delta\":\"A\"}\n\n\
             event: response.completed\ndata: {\"type\":\"response.completed\",\"response\":{\"status\":\"completed\",\"output\":[{\"type\":\"message\",\"content\":[{\"type\":\"output_text\",\"text\":\"B\"}]}]}}\n\n";
         assert_eq!(json(stream).unwrap().text, "B");

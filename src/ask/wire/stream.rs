@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_become_a_completion() {
+    fn chunks_are_joined() {
         let stream = ": ping\r\n\r\ndata: {\"model\":\"m\",\"choices\":[{\"index\":0,\"delta\":{\"role\":\"assistant\",\"content\":\"\"}}]}\r\n\r\n\
             data:{\"choices\":[{\"index\":1,\"delta\":{\"content\":\"A\"}},{\"index\":0,\"delta\":{\"content\":\"B\",\"reasoning_content\":\"A\"}}]}\n\n\
             event: x\ndata: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\".\"},\"finish_reason\":\"stop\"}]}\n\n\
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn an_incomplete_stream_is_refused() {
+    fn incomplete_streams_are_errors() {
         let piece = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"B\"}}]}\n\n";
         assert_eq!(assemble(piece), Err(None));
         let usage = "data: {\"choices\":[],\"usage\":{\"prompt_tokens\":3}}\n\n";
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn probabilities_and_parts_of_pieces_are_joined() {
+    fn logprobs_and_content_parts_are_joined() {
         let piece = |content: &str, token: &str, finish: &str| {
             format!(
                 "data: {{\"choices\":[{{\"delta\":{{\"content\":{content}}},\"logprobs\":{{\"content\":[{{\"token\":\"{token}\"}}],\"refusal\":null}},\"finish_reason\":{finish}}}]}}\n\n"

@@ -107,7 +107,7 @@ mod tests {
     use super::*;
     use crate::ask::costs::Price;
 
-    /// Usages of seven vendors, with the prompt and the reply that their bill has.
+    /// Usages of several vendors, with the charged prompt and reply tokens.
     fn vendors() -> [(&'static str, Value, [u64; 2]); 8] {
         [
             (
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bill_is_that_of_the_vendor() {
+    fn charged_tokens_match_the_vendors_bill() {
         let price = Price {
             input: 10.0,
             output: 100.0,
@@ -165,13 +165,13 @@ mod tests {
             let read = read(Some(&usage)).unwrap();
             let tokens = (read.prompt_tokens, read.completion_tokens);
             assert_eq!(tokens, (Some(prompt), Some(reply)), "{vendor}");
-            let by_hand = (prompt * 10 + reply * 100) as f64 / 1e6;
-            assert!((price.charged(read) - by_hand).abs() < 1e-12, "{vendor}");
+            let expected = (prompt * 10 + reply * 100) as f64 / 1e6;
+            assert!((price.charged(read) - expected).abs() < 1e-12, "{vendor}");
         }
     }
 
     #[test]
-    fn a_cache_larger_than_the_prompt_is_counted_apart() {
+    fn caches_outside_the_prompt_are_added() {
         let prompt = |usage: Value| read(Some(&usage)).unwrap().prompt_tokens;
         let large =
             json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 2000});
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_is_missing_follows_from_the_total() {
+    fn missing_numbers_follow_from_the_total() {
         let usage = read(Some(&json!({"prompt_tokens": 9, "total_tokens": 12}))).unwrap();
         assert_eq!(usage.completion_tokens, Some(3));
         assert_eq!(usage.total_tokens, Some(12));
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_no_tokens_are_ignored() {
+    fn implausible_numbers_are_ignored() {
         for tokens in [
             json!(u64::MAX),
             json!(-1),
