@@ -29,7 +29,7 @@ fn frames_are_cut_and_compared_with_the_first() {
     let reader = FrameReader::open(&first, options(None)).unwrap();
     let layout = reader.layout;
     assert_eq!((layout.width, layout.height), (300, 300));
-    assert!(reader.left_out().unwrap().contains("301 × 300"));
+    assert!(reader.omission_note().unwrap().contains("301 × 300"));
     let frame = reader.read(&first).unwrap();
     assert_eq!(frame.samples.len(), 300 * 300);
     // The second row begins at site 301.
@@ -53,7 +53,7 @@ fn a_crop_keeps_the_pattern_and_stays_inside() {
     let folder = tempfile::tempdir().unwrap();
     let first = pgm(folder.path(), "first.pgm", [300, 310], 4095);
     let reader = FrameReader::open(&first, options(Some("4,6,256,260"))).unwrap();
-    assert_eq!(reader.left_out(), None);
+    assert_eq!(reader.omission_note(), None);
     let frame = reader.read(&first).unwrap();
     assert_eq!(frame.samples.len(), 256 * 260);
     assert_eq!(frame.samples[0], (6 * 300 + 4) % 256);

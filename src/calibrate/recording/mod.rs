@@ -1,4 +1,4 @@
-//! The files of a recording, by setting and exposure: [`Recording`], found in folders or listed in `frames.csv`.
+//! Files of a recording, by setting and exposure: [`Recording`], from folders or from the list `frames.csv`.
 
 mod files;
 mod folders;
@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 use crate::error::Result;
 pub(crate) use files::Recording;
 use files::TABLE;
-pub(super) use files::{ExposureFiles, LEAST, SettingFiles};
+pub(super) use files::{ExposureFiles, MIN_EXPOSURES, SettingFiles};
 use order::by_numbers;
 
 impl Recording {
-    /// Finds the frames of a folder: by its `frames.csv` if it has one, else by the names of the folders in it.
+    /// Finds the frames of a recording: from the list `frames.csv` if it exists, otherwise by the names of subfolders.
     ///
     /// # Errors
     /// If the folder cannot be read, or a setting has too few frames.
@@ -36,13 +36,12 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The first frame: the first bias frame of the first setting.
+    /// First bias frame of the first setting.
     pub(super) fn first(&self) -> &Path {
-        let first = self
-            .settings
+        self.settings
             .iter()
-            .find_map(|setting| setting.bias.first());
-        first.map_or(Path::new(""), PathBuf::as_path)
+            .find_map(|setting| setting.bias.first())
+            .map_or(Path::new(""), PathBuf::as_path)
     }
 
     /// Number of settings.

@@ -6,7 +6,7 @@ use super::super::hot_pixels::HotPixels;
 use super::super::layout::Layout;
 use super::gather;
 
-/// Sums of the samples of a frame by part of a row, without hot pixels.
+/// Sums of the samples of a frame for each part of a row, without hot pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in super::super) struct PlaneSums {
     layout: Layout,
@@ -50,10 +50,10 @@ impl PlaneSums {
     }
 }
 
-/// The greatest code of each plane of a frame, and how many samples have it.
+/// Maximum code of each plane of a frame, with its number of samples.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in super::super) struct TopCode {
-    /// For each plane: number of samples, greatest code, and number of samples with this code.
+    /// For each plane: number of samples, maximum code, and number of samples with this code.
     pub(in super::super) planes: Vec<(u64, u16, u64)>,
 }
 
@@ -63,7 +63,7 @@ impl TopCode {
         let rows = parts.map_init(Vec::new, |part, plane_row| {
             gather(layout, samples, plane_row, part);
             for (removed, column) in hot.columns(plane_row).enumerate() {
-                // Each removal moves the columns behind it by one.
+                // Each removal shifts the following columns by one.
                 part.remove(column - removed);
             }
             let top = part.iter().copied().max().unwrap_or(0);
@@ -86,8 +86,8 @@ impl TopCode {
         Self { planes }
     }
 
-    /// The greatest code of the frame.
-    pub(in super::super) fn greatest(&self) -> u16 {
+    /// Maximum code of the frame.
+    pub(in super::super) fn max(&self) -> u16 {
         self.planes
             .iter()
             .map(|(_, code, _)| *code)
@@ -95,7 +95,7 @@ impl TopCode {
             .unwrap_or(0)
     }
 
-    /// The plane with the largest share of samples at its greatest code: this share, and the code.
+    /// Largest share of the samples of a plane at its maximum code, and this code.
     pub(in super::super) fn largest_share(&self) -> (f64, u16) {
         self.planes
             .iter()
@@ -105,8 +105,8 @@ impl TopCode {
             })
             .fold(
                 (0.0, 0),
-                |most, plane| {
-                    if plane.0 > most.0 { plane } else { most }
+                |max, plane| {
+                    if plane.0 > max.0 { plane } else { max }
                 },
             )
     }
@@ -137,7 +137,7 @@ mod tests {
     fn samples_at_the_greatest_code_are_counted() {
         let top = TopCode::new(LAYOUT, &SAMPLES, &HotPixels::none(4));
         assert_eq!(top.planes, [(3, 3, 1), (3, 10, 3), (3, 9, 1), (3, 8, 1)]);
-        assert_eq!((top.greatest(), top.largest_share()), (10, (1.0, 10)));
+        assert_eq!((top.max(), top.largest_share()), (10, (1.0, 10)));
         let hot = HotPixels::new(vec![vec![], vec![0, 1], vec![2], vec![]]);
         let top = TopCode::new(LAYOUT, &SAMPLES, &hot);
         assert_eq!(top.planes, [(3, 3, 1), (1, 10, 1), (2, 5, 2), (3, 8, 1)]);
