@@ -89,8 +89,8 @@ fn body_text(body: &Value) -> String {
 /// The reply or the failure in a line.
 fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
     let response = line.get("response").filter(|response| !response.is_null());
-    let status = response.and_then(|response| response.get("status_code")?.as_u64());
-    let status = status.and_then(|status| u16::try_from(status).ok());
+    let status =
+        response.and_then(|response| u16::try_from(response.get("status_code")?.as_u64()?).ok());
     let error = line.get("error").filter(|error| !is_empty(error));
     let fail = |kind, text: &str| {
         let text = scrub.line(text);

@@ -128,11 +128,14 @@ impl BiasFit {
     pub(super) fn offsets(&self, weights: &[f64]) -> Vec<f64> {
         let planes = self.groups.first().map_or(0, |group| group.planes.len());
         let mean = |plane: usize| {
-            let groups = self.groups.iter().zip(weights);
-            let [count, sum] = groups.fold([0.0; 2], |[count, sum], (group, weight)| {
-                let [n, more] = group.planes[plane];
-                [count + weight * n as f64, sum + weight * more as f64]
-            });
+            let [count, sum] =
+                self.groups
+                    .iter()
+                    .zip(weights)
+                    .fold([0.0; 2], |[count, sum], (group, weight)| {
+                        let [n, more] = group.planes[plane];
+                        [count + weight * n as f64, sum + weight * more as f64]
+                    });
             sum / count
         };
         (0..planes).map(mean).collect()

@@ -31,14 +31,16 @@ pub(super) fn order_doubts(settings: &[SettingFit], recording: &Recording) -> Ve
 /// Warnings about settings whose offset is far from the trend over ln K. The trend is a line with the median slope (Theil–Sen estimator),
 /// which is robust to outliers among up to a third of the settings; with at most three settings it is their median.
 fn off_trend(settings: &[SettingFit]) -> Vec<String> {
-    let point = |fit: &SettingFit| {
-        let offsets: f64 = fit.offsets.iter().map(|offset| offset.value).sum();
-        [
-            libm::log(fit.gain.value),
-            offsets / fit.offsets.len() as f64,
-        ]
-    };
-    let points: Vec<[f64; 2]> = settings.iter().map(point).collect();
+    let points: Vec<[f64; 2]> = settings
+        .iter()
+        .map(|fit| {
+            let offsets: f64 = fit.offsets.iter().map(|offset| offset.value).sum();
+            [
+                libm::log(fit.gain.value),
+                offsets / fit.offsets.len() as f64,
+            ]
+        })
+        .collect();
     if points.len() < 2 {
         return Vec::new();
     }

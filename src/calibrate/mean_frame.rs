@@ -205,25 +205,25 @@ impl MeanFrame {
         let sites = (rows / TILES * (columns / TILES)) as f64;
         let error =
             (noise.within / sites + noise.row.max(0.0) / (rows / TILES) as f64) / self.frames();
-        let uneven = sums.chunks(TILES * TILES).map(|tiles| {
-            let means = tiles
-                .iter()
-                .filter(|[count, _]| *count > 0.0)
-                .map(|[count, sum]| sum / count);
-            let [low, high] = means
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
-                    [mean.min(low), mean.max(high)]
-                });
-            Unevenness {
-                difference: high - low,
-                error: error.sqrt(),
-            }
-        });
-        let most = uneven.max_by(|a, b| a.difference.total_cmp(&b.difference));
-        most.unwrap_or(Unevenness {
-            difference: 0.0,
-            error: 0.0,
-        })
+        sums.chunks(TILES * TILES)
+            .map(|tiles| {
+                let [low, high] = tiles
+                    .iter()
+                    .filter(|[count, _]| *count > 0.0)
+                    .map(|[count, sum]| sum / count)
+                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
+                        [mean.min(low), mean.max(high)]
+                    });
+                Unevenness {
+                    difference: high - low,
+                    error: error.sqrt(),
+                }
+            })
+            .max_by(|a, b| a.difference.total_cmp(&b.difference))
+            .unwrap_or(Unevenness {
+                difference: 0.0,
+                error: 0.0,
+            })
     }
 }
 

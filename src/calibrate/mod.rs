@@ -104,11 +104,14 @@ impl CameraFit {
     /// Offsets of the planes of a setting above the black level, in ADU.
     pub(crate) fn bias(&self, setting: &SettingFit) -> Vec<Measured> {
         let black = f64::from(self.black);
-        let above = |offset: &Measured| Measured {
-            value: offset.value - black,
-            ..*offset
-        };
-        setting.offsets.iter().map(above).collect()
+        setting
+            .offsets
+            .iter()
+            .map(|offset| Measured {
+                value: offset.value - black,
+                ..*offset
+            })
+            .collect()
     }
 }
 

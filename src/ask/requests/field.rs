@@ -354,6 +354,6 @@ pub(in crate::ask) fn is_unsupported(api_error: &ApiError) -> bool {
 
 /// True if a text contains a name as a whole word: `max_tokens` is not in `max_tokens_total`.
 fn mentions(text: &str, name: &str) -> bool {
-    let is_name = |c: char| c.is_alphanumeric() || c == '_';
-    text.split(|c: char| !is_name(c)).any(|word| word == name)
+    text.split(|c: char| !c.is_alphanumeric() && c != '_')
+        .any(|word| word == name)
 }

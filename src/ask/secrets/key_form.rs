@@ -9,11 +9,11 @@ const MIN_LENGTH: usize = 20;
 /// True if a text that should be the name of a variable looks like a key: it has the prefix of a key, a character that variable names do
 /// not have, or is a long mixture of letters and digits without an underscore.
 pub(crate) fn looks_like_key(name: &str) -> bool {
-    let is_name_char = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let is_variable_name = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     let is_long_mixture = name.len() >= MIN_LENGTH
         && !name.contains('_')
         && name.contains(|c: char| c.is_ascii_digit());
-    is_secret_value(name) || !name.chars().all(is_name_char) || is_long_mixture
+    is_secret_value(name) || !is_variable_name || is_long_mixture
 }
 
 /// True if a value has the prefix of a key.

@@ -11,7 +11,7 @@ use crate::ask::requests::TokenField;
 use crate::ask::secrets::KeyHeader;
 use crate::error::Error;
 
-/// A vendor that hosts models, and what its endpoints accept. `None` means unknown, unless a field says otherwise.
+/// A vendor that hosts models, and the properties of its endpoints. `None` means unknown, unless a field states otherwise.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Vendor {
@@ -143,7 +143,7 @@ impl Vendor {
             .any(|suffix| matches_host_suffix(host, suffix))
     }
 
-    /// Checks what the types do not: that `hosts` is a non-empty list of host name suffixes.
+    /// Checks that `hosts` is a non-empty list of host name suffixes, which the types do not ensure.
     ///
     /// # Errors
     /// The message names the field.

@@ -58,16 +58,12 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
 
 /// Response in the last event of an unrequested stream; `None` if the stream was truncated.
 fn last_response(stream: &str) -> Option<Value> {
-    stream::events(stream).find_map(|event| {
-        let kind = event.get("type")?.as_str()?;
-        let ends = [
-            "response.completed",
-            "response.incomplete",
-            "response.failed",
-        ];
-        let response = ends.contains(&kind).then(|| event.get("response"));
-        let error = (kind == "error").then_some(&event);
-        response.flatten().or(error).cloned()
+    stream::events(stream).find_map(|event| match event.get("type")?.as_str()? {
+        "response.completed" | "response.incomplete" | "response.failed" => {
+            event.get("response").cloned()
+        }
+        "error" => Some(event),
+        _ => None,
     })
 }
 

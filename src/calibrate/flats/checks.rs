@@ -63,19 +63,27 @@ impl PairFacts {
     /// Ratio of the light of the first frame to that of the second, by plane. The ratio of a plane with little light is unreliable, so it is
     /// limited to twice the allowed difference; without light it is 1.
     pub(super) fn light_ratios(&self, offsets: &[f64]) -> Vec<f64> {
-        let ratio = |(plane, offset): (usize, &f64)| {
-            let tiles = self.tiles.iter().filter(|tile| tile.plane == plane);
-            let [count, a, b] = tiles.fold([0.0; 3], |[count, a, b], tile| {
+        offsets
+            .iter()
+            .enumerate()
+            .map(|(plane, offset)| self.light_ratio(plane, *offset))
+            .collect()
+    }
+
+    fn light_ratio(&self, plane: usize, offset: f64) -> f64 {
+        let [count, a, b] = self
+            .tiles
+            .iter()
+            .filter(|tile| tile.plane == plane)
+            .fold([0.0; 3], |[count, a, b], tile| {
                 [count + tile.count, a + tile.sums[0], b + tile.sums[1]]
             });
-            let [a, b] = [a, b].map(|sum| sum - count * offset);
-            if a > 0.0 && b > 0.0 {
-                (a / b).clamp(1.0 - 2.0 * LIGHT[1], 1.0 + 2.0 * LIGHT[1])
-            } else {
-                1.0
-            }
-        };
-        offsets.iter().enumerate().map(ratio).collect()
+        let [a, b] = [a, b].map(|sum| sum - count * offset);
+        if a > 0.0 && b > 0.0 {
+            (a / b).clamp(1.0 - 2.0 * LIGHT[1], 1.0 + 2.0 * LIGHT[1])
+        } else {
+            1.0
+        }
     }
 }
 

@@ -83,10 +83,12 @@ fn bend(points: &[Point], gain: f64) -> f64 {
             .iter()
             .map(|p| (p.weight, p.signal, p.variance / p.signal)),
     );
-    let signals = points.iter().map(|p| p.signal);
-    let [low, high] = signals.fold([f64::INFINITY, 0.0], |[low, high], s| {
-        [f64::min(low, s), f64::max(high, s)]
-    });
+    let [low, high] = points
+        .iter()
+        .map(|p| p.signal)
+        .fold([f64::INFINITY, 0.0], |[low, high], s| {
+            [f64::min(low, s), f64::max(high, s)]
+        });
     slope * (high - low) / gain
 }
 

@@ -27,8 +27,9 @@ impl Recording {
         };
         recording.settings.sort_by(|a, b| {
             let number = |setting: &SettingFiles| setting.number().unwrap_or(f64::INFINITY);
-            let by_number = number(a).total_cmp(&number(b));
-            by_number.then_with(|| by_numbers(&a.name, &b.name))
+            number(a)
+                .total_cmp(&number(b))
+                .then_with(|| by_numbers(&a.name, &b.name))
         });
         for setting in &mut recording.settings {
             setting.pair_up(folder, &mut recording.notes)?;

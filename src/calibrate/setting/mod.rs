@@ -116,18 +116,20 @@ fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit 
 
 /// Mean signal and variance of each exposure and plane.
 fn means_by_plane(points: &[Point]) -> Vec<[f64; 2]> {
-    let groups = points.chunk_by(|a, b| (a.exposure, a.plane) == (b.exposure, b.plane));
-    let mean = |group: &[Point]| {
-        let [sum, signal, variance] = group.iter().fold([0.0; 3], |[sum, signal, variance], p| {
-            [
-                sum + p.weight,
-                signal + p.weight * p.signal,
-                variance + p.weight * p.variance,
-            ]
-        });
-        [signal / sum, variance / sum]
-    };
-    groups.map(mean).collect()
+    points
+        .chunk_by(|a, b| (a.exposure, a.plane) == (b.exposure, b.plane))
+        .map(|group| {
+            let [sum, signal, variance] =
+                group.iter().fold([0.0; 3], |[sum, signal, variance], p| {
+                    [
+                        sum + p.weight,
+                        signal + p.weight * p.signal,
+                        variance + p.weight * p.variance,
+                    ]
+                });
+            [signal / sum, variance / sum]
+        })
+        .collect()
 }
 
 /// Points of the probability plot at equally spaced logits of the probability, up to one sample in a million at either end.

@@ -16,20 +16,20 @@ pub(in super::super) struct PlaneSums {
 
 impl PlaneSums {
     pub(in super::super) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
-        let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
-        let rows = parts.map_init(Vec::new, |part, plane_row| {
-            gather(layout, samples, plane_row, part);
-            let sum: u64 = part.iter().map(|sample| u64::from(*sample)).sum();
-            hot.columns(plane_row)
-                .map(|column| part[column])
-                .fold([part.len() as u64, sum], |[count, sum], sample| {
-                    [count - 1, sum - u64::from(sample)]
-                })
-        });
-        Self {
-            layout,
-            rows: rows.collect(),
-        }
+        let rows = (0..layout.plane_rows())
+            .into_par_iter()
+            .with_min_len(64)
+            .map_init(Vec::new, |part, plane_row| {
+                gather(layout, samples, plane_row, part);
+                let sum: u64 = part.iter().map(|sample| u64::from(*sample)).sum();
+                hot.columns(plane_row)
+                    .map(|column| part[column])
+                    .fold([part.len() as u64, sum], |[count, sum], sample| {
+                        [count - 1, sum - u64::from(sample)]
+                    })
+            })
+            .collect();
+        Self { layout, rows }
     }
 
     /// Number and sum of the samples of each part of a row.
@@ -59,18 +59,20 @@ pub(in super::super) struct TopCode {
 
 impl TopCode {
     pub(in super::super) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
-        let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
-        let rows = parts.map_init(Vec::new, |part, plane_row| {
-            gather(layout, samples, plane_row, part);
-            for (removed, column) in hot.columns(plane_row).enumerate() {
-                // Each removal shifts the following columns by one.
-                part.remove(column - removed);
-            }
-            let top = part.iter().copied().max().unwrap_or(0);
-            let with_it = part.iter().filter(|sample| **sample == top).count();
-            (part.len() as u64, top, with_it as u64)
-        });
-        let rows: Vec<(u64, u16, u64)> = rows.collect();
+        let rows: Vec<(u64, u16, u64)> = (0..layout.plane_rows())
+            .into_par_iter()
+            .with_min_len(64)
+            .map_init(Vec::new, |part, plane_row| {
+                gather(layout, samples, plane_row, part);
+                for (removed, column) in hot.columns(plane_row).enumerate() {
+                    // Each removal shifts the following columns by one.
+                    part.remove(column - removed);
+                }
+                let top = part.iter().copied().max().unwrap_or(0);
+                let with_it = part.iter().filter(|sample| **sample == top).count();
+                (part.len() as u64, top, with_it as u64)
+            })
+            .collect();
         let mut planes = vec![(0, 0, 0); layout.cfa.planes()];
         for (plane_row, (count, top, with_it)) in rows.into_iter().enumerate() {
             let [row, parity] = layout.place(plane_row);

@@ -87,19 +87,19 @@ impl PairNoise {
 
 impl PairSums {
     pub(in super::super) fn new(layout: Layout, [a, b]: [&[u16]; 2], hot: &HotPixels) -> Self {
-        let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
-        let rows = parts.map_init(
-            || [Vec::new(), Vec::new()],
-            |[part_a, part_b], plane_row| {
-                gather(layout, a, plane_row, part_a);
-                gather(layout, b, plane_row, part_b);
-                PairRow::new(part_a, part_b, hot.columns(plane_row))
-            },
-        );
-        Self {
-            layout,
-            rows: rows.collect(),
-        }
+        let rows = (0..layout.plane_rows())
+            .into_par_iter()
+            .with_min_len(64)
+            .map_init(
+                || [Vec::new(), Vec::new()],
+                |[part_a, part_b], plane_row| {
+                    gather(layout, a, plane_row, part_a);
+                    gather(layout, b, plane_row, part_b);
+                    PairRow::new(part_a, part_b, hot.columns(plane_row))
+                },
+            )
+            .collect();
+        Self { layout, rows }
     }
 
     /// Means of A and of B over all sites.
@@ -124,8 +124,9 @@ impl PairSums {
                 sums[plane].1 += cell.difference();
             }
         }
-        let mean = |(count, sum): (u64, i64)| sum as f64 / count.max(1) as f64;
-        sums.into_iter().map(mean).collect()
+        sums.into_iter()
+            .map(|(count, sum)| sum as f64 / count.max(1) as f64)
+            .collect()
     }
 
     /// Parts of rows with their planes.
