@@ -44,8 +44,8 @@ impl Cfa {
         self.step() * self.step()
     }
 
-    /// Plane of the sites in a row whose column modulo the period is `parity`. Planes 0 to 3 are red, green in red rows, green in blue rows,
-    /// and blue; the only plane of a sensor without filters is 0.
+    /// Plane of the sites in a row whose column modulo the period is `parity`. Planes 0 to 3 are red, green in red rows, green in blue
+    /// rows, and blue; the only plane of a sensor without filters is 0.
     pub(super) fn plane(self, row: usize, parity: usize) -> usize {
         let [first_row, first_column] = match self {
             Self::Mono => return 0,

@@ -57,7 +57,7 @@ pub(super) struct LearnedRate {
     rate: Option<f64>,
     /// Minimum rate, in requests per second.
     floor: f64,
-    /// Highest rate, in requests per second, that the server is known to accept.
+    /// Estimate of the highest rate, in requests per second, that the server accepts.
     ceiling: Option<f64>,
     /// True if the rate comes from a long enough phase; false if it is a guess.
     is_reliable: bool,

@@ -85,7 +85,8 @@ const DECREASE: f64 = 0.7;
 /// Chosen.
 const QUEUEING_RATIO: f64 = 1.5;
 
-/// Window of requests in flight at an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989, Comput. Netw. ISDN Syst. 17:1).
+/// Window of requests in flight at an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989, Comput. Netw. ISDN Syst.
+/// 17:1).
 ///
 /// Each round of successes widens it by one request while replies do not get slower. An overload (429, 503, 529, a timeout)
 /// narrows it by 30 %, once for all requests in flight at that time.

@@ -76,7 +76,8 @@ const MAX_READ: usize = 64 << 10;
 /// would damage ordinary words.
 const MIN_SECRET: usize = 4;
 
-/// Minimum length of a secret to remove from the reply of a model, in bytes. Real keys are longer, and an answer may contain a shorter word.
+/// Minimum length of a secret to remove from the reply of a model, in bytes. Real keys are longer, and an answer may contain a shorter
+/// word.
 const MIN_SECRET_IN_REPLY: usize = 16;
 
 /// Filter that makes the text of a server safe for terminals, logs and tables: removes secrets and control characters, and shortens it.

@@ -60,8 +60,8 @@ impl PairFacts {
         [0, 1].map(|frame| (&*self.names[frame], self.digests[frame]))
     }
 
-    /// Ratio of the light of the first frame to that of the second, by plane. The ratio of a plane with little light is unreliable, so it is
-    /// limited to twice the allowed difference; without light it is 1.
+    /// Ratio of the light of the first frame to that of the second, by plane. The ratio of a plane with little light is unreliable, so it
+    /// is limited to twice the allowed difference; without light it is 1.
     pub(super) fn light_ratios(&self, offsets: &[f64]) -> Vec<f64> {
         offsets
             .iter()

@@ -39,8 +39,8 @@ impl Mosaic {
     /// Reads a file of at most `most_pixels` samples. The content decides the form, not the name.
     ///
     /// # Errors
-    /// If the file cannot be read, is incomplete, or is not a mosaic: a RAW file of a maker, or an image with several channels, 8 bits, or a
-    /// palette.
+    /// If the file cannot be read, is incomplete, or is not a mosaic: a RAW file of a maker, or an image with several channels, 8 bits, or
+    /// a palette.
     pub(super) fn read(path: &Path, most_pixels: u64) -> Result<Self> {
         let bytes = reading::bytes(path)?;
         let decoded = decode(path, &bytes, most_pixels)

@@ -114,8 +114,8 @@ impl NeighbourSums {
         plane.rows += 1.0;
     }
 
-    /// Correlation of neighbours of a plane within rows of A − ratio · B, which is 0 for independent noise. `ratios` are the light of A over
-    /// the light of B, by plane.
+    /// Correlation of neighbours of a plane within rows of A − ratio · B, which is 0 for independent noise. `ratios` are the light of A
+    /// over the light of B, by plane.
     pub(in crate::calibrate) fn correlation(&self, ratios: &[f64]) -> f64 {
         let [mut products, mut squares, mut sites, mut rows] = [0.0; 4];
         for (plane, ratio) in self.planes.iter().zip(ratios) {
