@@ -71,7 +71,7 @@ mod tests {
 
     /// Five groups with known values: the error of their mean is known.
     #[test]
-    fn the_error_of_a_mean_is_that_of_few_values() {
+    fn the_error_of_a_mean_is_unbiased_for_few_values() {
         let values = [1.0, 4.0, 2.0, 8.0, 5.0];
         let mean = values.iter().sum::<f64>() / 5.0;
         let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();

@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_pattern_names_its_first_four_sites() {
+    fn patterns_name_their_first_four_sites() {
         for (cfa, planes) in [
             (Cfa::Rggb, [0, 1, 2, 3]),
             (Cfa::Bggr, [3, 2, 1, 0]),

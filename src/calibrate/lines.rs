@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_fitted_from_three_settings_on() {
+    fn slopes_are_fitted_to_three_settings_or_more() {
         let on_line = |k: f64| [k, 2.0 * k.powf(0.4)];
         let three = NoiseLine::fit(&[0.1, 1.0, 5.0].map(on_line), NoiseKind::Read);
         assert!((three.slope - 0.4).abs() < 1e-12);

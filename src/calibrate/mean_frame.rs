@@ -262,7 +262,7 @@ mod tests {
     };
 
     #[test]
-    fn sites_that_stay_far_out_are_hot() {
+    fn consistently_distant_sites_are_hot() {
         let sites = [5, 64 * 9 + 8, 64 * 63 + 63];
         let hot = mean_of(4, |_, site| if sites.contains(&site) { 30 } else { 0 });
         let found = hot.hot_pixels(NOISE.within);
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn light_and_pattern_are_told_from_noise() {
+    fn light_and_pattern_are_distinguished_from_noise() {
         let none = HotPixels::none(LAYOUT.plane_rows());
         let plain = mean_of(8, |_, _| 0);
         assert!(plain.pattern(&none, NOISE).abs() < 0.05);

@@ -188,7 +188,7 @@ mod tests {
 
     /// The standard error is that of the scatter: V with the deviation (K S + read variance) · √(2 / n).
     #[test]
-    fn the_error_of_the_intercept_is_that_of_the_scatter() {
+    fn the_intercept_error_matches_the_scatter() {
         let mut state = 1_u64;
         let mut normal = || {
             // The sum of twelve uniform numbers.

@@ -127,7 +127,7 @@ mod tests {
     const SAMPLES: [u16; 12] = [1, 10, 2, 10, 3, 10, 5, 7, 5, 7, 9, 8];
 
     #[test]
-    fn planes_are_summed_apart() {
+    fn planes_are_summed_separately() {
         let sums = PlaneSums::new(LAYOUT, &SAMPLES, &HotPixels::none(4));
         assert_eq!(sums.planes(), [[3, 6], [3, 30], [3, 19], [3, 22]]);
         let hot = HotPixels::new(vec![vec![0, 2], vec![], vec![1], vec![]]);
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_at_the_greatest_code_are_counted() {
+    fn samples_at_the_maximum_are_counted() {
         let top = TopCode::new(LAYOUT, &SAMPLES, &HotPixels::none(4));
         assert_eq!(top.planes, [(3, 3, 1), (3, 10, 3), (3, 9, 1), (3, 8, 1)]);
         assert_eq!((top.max(), top.largest_share()), (10, (1.0, 10)));

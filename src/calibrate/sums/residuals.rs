@@ -228,7 +228,7 @@ mod tests {
 
     /// Offsets of planes and of rows leave nothing behind.
     #[test]
-    fn offsets_are_taken_off() {
+    fn offsets_are_subtracted() {
         let none = HotPixels::none(4);
         let flat = [10, 20, 10, 20, 30, 40, 30, 40];
         assert_eq!(residuals(&flat, &none, Centres::RowsAndPlanes), [(0, 8)]);
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_frame_takes_off_its_pattern() {
+    fn a_mean_frame_removes_the_pattern() {
         let none = HotPixels::none(4);
         let pattern = [10, 25, 17, 20, 30, 40, 33, 48];
         let sums: Vec<u32> = pattern.iter().map(|code| 16 * u32::from(*code)).collect();
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn far_residuals_are_counted_too() {
+    fn distant_residuals_are_counted() {
         let mut frame = [100; 8];
         frame[7] = 60_100;
         let found = residuals(&frame, &HotPixels::none(4), Centres::RowsAndPlanes);
