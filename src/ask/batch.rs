@@ -1,17 +1,17 @@
-//! The lines of Batch API files: [`Model::batch_line`](super::Model::batch_line) writes a line, [`BatchLine`] reads one.
+//! Lines of Batch API files: [`Model::batch_line`](super::Model::batch_line) writes input lines, [`BatchLine`] reads output lines.
 
 use serde_json::Value;
 
-use super::failures::{Complaint, UnreadableReply};
+use super::failures::{ApiError, ReplyError};
 use super::replies::bounded_json::parse;
 use super::requests::Constrain;
-use super::requests::constraint::letter_of;
+use super::requests::constraint::constrained_letter;
 use super::secrets::{Scrub, without_secrets};
 use super::wire::{batch_reply, body_usage};
 use crate::types::{Failure, FailureKind, Reply, Usage};
 
-/// One line of an input file: `{"custom_id", "method", "url", "body"}` with a line end; the body is that of a single request.
-pub(super) fn line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
+/// Writes a line of an input file, with a line end: `{"custom_id", "method", "url", "body"}`, with the body of a single request.
+pub(super) fn input_line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
     let (id, url) = (serde_json::to_string(id)?, serde_json::to_string(url)?);
     let head = format!("{{\"custom_id\":{id},\"method\":\"POST\",\"url\":{url},\"body\":");
     Ok([head.as_bytes(), body, b"}\n"].concat())
@@ -20,55 +20,56 @@ pub(super) fn line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_js
 /// One line of an output or error file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct BatchLine {
-    /// The id of the request, which the input line sets.
+    /// Id of the request, from the input line.
     pub id: String,
-    /// The reply, or the reason why there is none.
+    /// The reply or the failure.
     pub result: Result<Reply, Failure>,
-    /// The status and the body of a refused request; `None` for a reply and for other failures. It is classified and not kept, so secrets
-    /// are not removed from it.
+    /// Status and body of a refused request; `None` for a reply and for other failures. They are only classified and not stored, so
+    /// secrets are not removed.
     pub refusal: Option<(u16, String)>,
-    /// The tokens that a failure was charged; `None` for a reply, and if the server does not state it.
+    /// Tokens charged for a failure; `None` for a reply, or if the server does not report them.
     pub charged: Option<Usage>,
 }
 
 impl BatchLine {
-    /// Reads a line of a file that the user names; `None` if the line is not one of such a file. No server is asked for it, so no
-    /// secret is known that could be removed: texts stay as they stand in the user's own file. Lines that a server sent to the program
-    /// are read by [`BatchServer::line`](super::batch_api::BatchServer::line).
+    /// Parses a line of the user's own file; `None` if it has another form. No key is known without a server, so no secret is removed. For
+    /// lines from a server use [`BatchServer::line`](super::batch_api::BatchServer::line).
     #[must_use]
     pub(crate) fn read(line: &str) -> Option<Self> {
-        Self::without_secrets(line, &Scrub::default())
+        Self::read_without_secrets(line, &Scrub::default())
     }
 
-    /// Reads a line, and removes secrets from the reply or the failure; `None` if the line is not one of such a file.
-    pub(super) fn without_secrets(line: &str, scrub: &Scrub) -> Option<Self> {
+    /// Parses a line, and removes secrets from the reply or the failure; `None` if the line has another form.
+    pub(super) fn read_without_secrets(line: &str, scrub: &Scrub) -> Option<Self> {
         let line = parse(line).ok()?;
         let id = line.get("custom_id")?.as_str()?.to_owned();
         let result = result(&line, scrub).map(|reply| without_secrets(reply, scrub));
-        let body = line
+        let charged = match line
             .get("response")
-            .and_then(|response| response.get("body"));
+            .and_then(|response| response.get("body"))
+        {
+            Some(body) if result.is_err() => body_usage(&body_text(body)),
+            _ => None,
+        };
         Some(Self {
             id,
-            charged: body
-                .filter(|_| result.is_err())
-                .and_then(|body| body_usage(&text(body))),
+            charged,
             result,
             refusal: refusal(&line),
         })
     }
 }
 
-/// The status and the body of a refused request.
+/// Status and body of a request that was refused with a 4xx status.
 fn refusal(line: &Value) -> Option<(u16, String)> {
     let response = line.get("response")?;
     let status = response.get("status_code")?.as_u64()?;
     let status = u16::try_from(status).ok()?;
-    let refused = (400..500).contains(&status);
-    refused.then_some((status, text(response.get("body")?)))
+    let is_refused = (400..500).contains(&status);
+    is_refused.then_some((status, body_text(response.get("body")?)))
 }
 
-/// Whether an error states nothing: some servers write one beside each reply.
+/// True for an error without content: some servers add one to every reply.
 fn is_empty(error: &Value) -> bool {
     match error {
         Value::Null | Value::Bool(false) => true,
@@ -79,16 +80,17 @@ fn is_empty(error: &Value) -> bool {
     }
 }
 
-/// A body as text: some servers write that of a failed request as a text, and not as an object.
-fn text(body: &Value) -> String {
+/// A body as JSON text. Some servers write the body of a failed request as a string, not as an object.
+fn body_text(body: &Value) -> String {
     body.as_str()
         .map_or_else(|| body.to_string(), str::to_owned)
 }
 
+/// The reply or the failure in a line.
 fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
     let response = line.get("response").filter(|response| !response.is_null());
-    let status = response.and_then(|response| response.get("status_code")?.as_u64());
-    let status = status.and_then(|status| u16::try_from(status).ok());
+    let status =
+        response.and_then(|response| u16::try_from(response.get("status_code")?.as_u64()?).ok());
     let error = line.get("error").filter(|error| !is_empty(error));
     let fail = |kind, text: &str| {
         let text = scrub.line(text);
@@ -99,14 +101,14 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
         })
     };
     if let Some(error) = error {
-        let complaint = Complaint::from_error(error);
-        let kind = if complaint.has_code(&["batch_expired", "batch_cancelled"]) {
+        let api_error = ApiError::from_error(error);
+        let kind = if api_error.has_code(&["batch_expired", "batch_cancelled"]) {
             FailureKind::Timeout
         } else {
             FailureKind::Request
         };
-        let code = complaint.code.unwrap_or_default();
-        return fail(kind, format!("{code} {}", complaint.message).trim());
+        let code = api_error.code.unwrap_or_default();
+        return fail(kind, format!("{code} {}", api_error.message).trim());
     }
     let Some(body) = response.and_then(|response| response.get("body")) else {
         return fail(
@@ -114,30 +116,32 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
             "a line with neither a response nor an error",
         );
     };
-    let text = text(body);
+    let text = body_text(body);
     match status {
-        None | Some(200..300) => batch_reply(&text).or_else(|unreadable| match unreadable {
-            UnreadableReply::Complaint(complaint) => fail(FailureKind::Server, &complaint.message),
-            UnreadableReply::Other(found) => fail(FailureKind::Response, &found.what),
+        None | Some(200..300) => batch_reply(&text).or_else(|error| match error {
+            ReplyError::Api(api_error) => fail(FailureKind::Server, &api_error.message),
+            ReplyError::Unreadable(unreadable) => {
+                fail(FailureKind::Response, &unreadable.description)
+            }
         }),
         Some(code) => {
-            let complaint = Complaint::from_body(&text);
+            let api_error = ApiError::from_body(&text);
             let kind = match code {
                 429 => FailureKind::RateLimit,
-                // Some servers write 0 if they could not send the request on.
+                // Some servers write 0 if they could not forward the request.
                 0 | 500.. => FailureKind::Server,
                 _ => FailureKind::Request,
             };
-            fail(kind, &format!("{code} {}", complaint.message))
+            fail(kind, &format!("{code} {}", api_error.message))
         }
     }
 }
 
-/// A reply whose text is replaced by the letter in it, if the reply is constrained and has one.
+/// Replaces the text of a constrained reply by its letter, if it has one.
 #[must_use]
 pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) -> Reply {
     Reply {
-        text: letter_of(constrain, choices, &reply.text).unwrap_or(reply.text),
+        text: constrained_letter(constrain, choices, &reply.text).unwrap_or(reply.text),
         finish: reply.finish.shortened(),
         ..reply
     }
@@ -147,7 +151,7 @@ pub(crate) fn with_letter(reply: Reply, constrain: Constrain, choices: usize) ->
 mod tests {
     use super::*;
 
-    /// A key that a server repeats in a line is in no text that a record keeps. Without knowing it, nothing is removed.
+    /// A known key is removed from every recorded text; an unknown one is not.
     #[test]
     fn keys_are_removed_from_replies_and_failures() {
         const KEY: &str = "sk-0123456789abcdef";
@@ -165,7 +169,7 @@ mod tests {
         ];
         for line in lines {
             let line = line.replace("KEY", KEY);
-            let read = BatchLine::without_secrets(&line, &scrub).unwrap();
+            let read = BatchLine::read_without_secrets(&line, &scrub).unwrap();
             let kept = format!("{:?}", read.result);
             assert!(kept.contains("[secret]") && !kept.contains("sk-"), "{kept}");
             let unknown = BatchLine::read(&line).unwrap();

@@ -1,4 +1,4 @@
-//! A vendor's Batch API: [`BatchInterface`].
+//! Properties of a vendor's Batch API: [`BatchInterface`].
 
 use std::num::{NonZeroU64, NonZeroUsize};
 
@@ -6,63 +6,70 @@ use super::endpoints::BaseUrl;
 use super::vendors::{BatchForm, Vendor, VendorBatch};
 use crate::error::{Error, Result};
 
-/// The Batch API at an address; that of OpenAI if the address is not in the table of vendors.
+/// Properties of the Batch API at an address; those of OpenAI if the address is not in the table of vendors.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BatchInterface {
     vendor: Option<&'static Vendor>,
 }
 
-/// The limits of OpenAI and Azure: 200 MB and 50,000 requests a file.
-const FILE_SIZE: NonZeroU64 = NonZeroU64::new(200).unwrap();
-const REQUESTS: NonZeroUsize = NonZeroUsize::new(50_000).unwrap();
+/// Limits of OpenAI and Azure per file: 200 MB and 50,000 requests.
+const MAX_FILE_SIZE: NonZeroU64 = NonZeroU64::new(200).unwrap();
+const MAX_REQUESTS: NonZeroUsize = NonZeroUsize::new(50_000).unwrap();
 
-/// The purpose of OpenAI's input files.
+/// Purpose of OpenAI's input files.
 const PURPOSE: &str = "batch";
 
 impl BatchInterface {
-    /// The Batch API at an address, as messages show it.
+    /// Looks up the Batch API at a base URL.
     pub(crate) fn at(base: &str) -> Self {
         let base = base.parse::<BaseUrl>().ok();
         let vendor = base.and_then(|base| Vendor::at_host(base.host()));
         Self { vendor }
     }
 
-    fn known(self) -> Option<&'static VendorBatch> {
+    /// Entry in the table of vendors.
+    fn entry(self) -> Option<&'static VendorBatch> {
         self.vendor?.batch.as_ref()
     }
 
-    /// The purpose under which files are uploaded.
+    /// Purpose under which files are uploaded.
     pub(crate) fn purpose(self) -> &'static str {
-        let known = self.known().and_then(|known| known.purpose.as_deref());
-        known.unwrap_or(PURPOSE)
+        self.entry()
+            .and_then(|entry| entry.purpose.as_deref())
+            .unwrap_or(PURPOSE)
     }
 
-    /// The largest file, in MB.
+    /// Maximum size of a file, in MB.
     pub(crate) fn file_size(self) -> NonZeroU64 {
-        let known = self.known().and_then(|known| known.file_size);
-        known.unwrap_or(FILE_SIZE)
+        self.entry()
+            .and_then(|entry| entry.file_size)
+            .unwrap_or(MAX_FILE_SIZE)
     }
 
-    /// The most requests in a file.
+    /// Maximum number of requests in a file.
     pub(crate) fn requests(self) -> NonZeroUsize {
-        let known = self.known().and_then(|known| known.requests);
-        known.unwrap_or(REQUESTS)
+        self.entry()
+            .and_then(|entry| entry.requests)
+            .unwrap_or(MAX_REQUESTS)
     }
 
-    /// The path in a line, for requests that the API takes at the path `usual`: the vendor's own for chat completions.
-    pub(crate) fn url(self, usual: &str) -> &str {
-        let chat = usual.ends_with("/chat/completions");
-        let known = self.known().and_then(|known| known.url.as_deref());
-        known.filter(|_| chat).unwrap_or(usual)
+    /// Path in the lines of a file, for requests with OpenAI's path `default`. Some vendors have another path for chat completions.
+    pub(crate) fn url(self, default: &str) -> &str {
+        if !default.ends_with("/chat/completions") {
+            return default;
+        }
+        self.entry()
+            .and_then(|entry| entry.url.as_deref())
+            .unwrap_or(default)
     }
 
-    /// Checks that files can be submitted.
+    /// Checks that batches can be submitted as files.
     ///
     /// # Errors
     /// If the vendor has no Batch API, or one of another form.
     pub(crate) fn require_files(self) -> Result<()> {
         let name = self.vendor.map_or("", |vendor| &*vendor.name);
-        let form = self.known().map_or(BatchForm::Files, |known| known.form);
+        let form = self.entry().map_or(BatchForm::Files, |entry| entry.form);
         let problem = match form {
             BatchForm::Files => return Ok(()),
             BatchForm::Other => format!(
@@ -80,24 +87,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_batch_api_is_known_by_the_address() {
+    fn the_address_decides_the_batch_api() {
         let together = BatchInterface::at("https://api.together.xyz/v1");
         assert_eq!(
             (together.purpose(), together.file_size().get()),
             ("batch-api", 100)
         );
-        let own = BatchInterface::at("http://127.0.0.1:8000/v1");
-        assert_eq!((own.purpose(), own.file_size().get()), ("batch", 200));
-        assert_eq!(own.requests().get(), 50_000);
+        let unknown = BatchInterface::at("http://127.0.0.1:8000/v1");
+        assert_eq!(
+            (unknown.purpose(), unknown.file_size().get()),
+            ("batch", 200)
+        );
+        assert_eq!(unknown.requests().get(), 50_000);
         let azure = BatchInterface::at("https://r.openai.azure.com/openai/v1");
-        let of = |usual| azure.url(usual).to_owned();
-        assert_eq!(of("/v1/chat/completions"), "/chat/completions");
-        assert_eq!(of("/v1/responses"), "/v1/responses");
-        assert_eq!(own.url("/v1/chat/completions"), "/v1/chat/completions");
+        assert_eq!(azure.url("/v1/chat/completions"), "/chat/completions");
+        assert_eq!(azure.url("/v1/responses"), "/v1/responses");
+        assert_eq!(unknown.url("/v1/chat/completions"), "/v1/chat/completions");
     }
 
     #[test]
-    fn a_batch_api_of_another_form_is_refused_by_name() {
+    fn other_batch_apis_are_refused() {
         for (base, expected) in [
             ("https://api.anthropic.com/v1", "Anthropic has another form"),
             ("https://api.mistral.ai/v1", "Mistral has another form"),

@@ -1,11 +1,11 @@
 //! Stage 4, ask: sends a prompt and an image to a model and receives a [`Reply`](crate::types::Reply). The only asynchronous
 //! stage.
 //!
-//! [`Prompts`] turn a question into text, [`Payload`](crate::picture::Payload) an image into the text of a data URL; both are CPU work and done before.
-//! A [`Model`] takes the two as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. The endpoint is one server,
-//! at one or several addresses: each replica has its key, connections and pauses. All models at that server share it. What is known
-//! of vendors is a table, `vendors.toml`. A [`Wire`](wire_kind::Wire) defines the form of requests and replies: files of one API in
-//! `wire/`.
+//! Before this stage, [`Prompts`] turn a question into text and [`Payload`](crate::picture::Payload) encodes an image as a data URL; both
+//! are CPU work. A [`Model`] receives them as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. An endpoint is one
+//! server with one or several replicas, each with its own address, key, connections and rate limiter; all models at the server share it.
+//! The table `vendors.toml` has the properties of vendors. A [`Wire`](wire_kind::Wire) is an API; `wire/` has the form of its requests
+//! and replies.
 
 pub(crate) mod batch;
 pub(crate) mod batch_api;
@@ -28,12 +28,12 @@ pub(crate) use costs::{
     Price, PricedRequest, Prices, ReplyExcess, Reservation, Spending, TokenBound,
 };
 pub use endpoints::{Access, BaseUrl, Endpoint, Sending};
-pub(crate) use endpoints::{AccessArgs, OPENAI_KEY, Server, own_variables, sleep_running};
+pub(crate) use endpoints::{AccessArgs, OPENAI_KEY, Server, sleep_running, vendor_variables};
 pub(crate) use failures::QuotaRefusal;
 pub use failures::{AskError, Reach};
 pub(crate) use models::{Local, LocalAnswer};
 pub use models::{Model, Random, Remote, Script};
-pub(crate) use pace::Bounds;
+pub(crate) use pace::ConcurrencyBounds;
 pub use pace::Quota;
 pub use prompts::Prompts;
 pub use requests::{

@@ -1,25 +1,25 @@
-//! The APIs through which a model is asked ([`Wire`]), and the flag that chooses one ([`WireSetting`]).
+//! APIs for requests to models ([`Wire`]), and the flag that selects one ([`WireSetting`]).
 
 use clap::ValueEnum;
 
 use crate::types::flags::flag_words;
 
-/// An API through which a model is asked.
+/// API for requests to a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Wire {
     /// OpenAI's chat completions, which most servers support.
     Chat,
-    /// Chat completions whose replies come as event streams: some models answer in no other way.
+    /// Chat completions as event streams, which some models require.
     ChatStream,
-    /// OpenAI's Responses API, through which alone some of its models are asked.
+    /// OpenAI's Responses API, which some of its models require.
     Responses,
 }
 
 impl Wire {
-    /// One wire for each path of requests.
+    /// One API for each request path.
     pub(super) const ALL: [Self; 2] = [Self::Chat, Self::Responses];
 
-    /// The path of requests, below the base URL.
+    /// Path of requests, relative to the base URL.
     pub(super) fn path(self) -> &'static str {
         match self {
             Self::Chat | Self::ChatStream => "chat/completions",
@@ -27,7 +27,7 @@ impl Wire {
         }
     }
 
-    /// The path in a line of a Batch API's file.
+    /// Path in the lines of a batch file.
     pub(super) fn batch_url(self) -> &'static str {
         match self {
             Self::Chat | Self::ChatStream => "/v1/chat/completions",
@@ -35,7 +35,7 @@ impl Wire {
         }
     }
 
-    /// The wire of a batch's lines: replies in a file are whole.
+    /// API of the lines in a batch: replies in a file are not streamed.
     pub(super) fn in_batch(self) -> Self {
         match self {
             Self::ChatStream => Self::Chat,
@@ -44,7 +44,7 @@ impl Wire {
     }
 }
 
-/// The setting of the API.
+/// Setting of the API.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum WireSetting {
     /// Chat completions; streamed, or the Responses API, where the server answers that it takes nothing else
@@ -59,8 +59,8 @@ pub enum WireSetting {
 }
 
 impl WireSetting {
-    /// The wire of the first request.
-    pub(super) fn first(self) -> Wire {
+    /// API of the first request.
+    pub(super) fn initial(self) -> Wire {
         match self {
             Self::Auto | Self::Chat => Wire::Chat,
             Self::ChatStream => Wire::ChatStream,
@@ -68,8 +68,7 @@ impl WireSetting {
         }
     }
 
-    /// The name in the content that decides a reply: a streamed reply is the same as a whole one, and what `auto` finds out is not
-    /// known before.
+    /// Name in the content of a model: a streamed reply equals an unstreamed one, and the API that `auto` selects is not known in advance.
     pub(super) fn content(self) -> &'static str {
         match self {
             Self::Auto | Self::Chat | Self::ChatStream => "chat",

@@ -1,7 +1,7 @@
-//! The bias frames of a setting: [`BiasFit`].
+//! Measurement of the bias frames of a setting: [`BiasFit`].
 //!
-//! They are read twice: first for their mean, which shows light, hot pixels and a fixed pattern, then for their noise without the
-//! hot pixels. So only a few frames are in memory at once.
+//! The frames are read twice, so that only a few are in memory at once: first for their mean, which reveals light, hot pixels and a fixed
+//! pattern, then for their noise without the hot pixels.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ use super::recording::SettingFiles;
 use super::sums::{Centres, PairNoise, PairSums, PlaneSums, Residuals};
 use crate::error::{Error, Result};
 
-/// Bias frames of a setting, measured.
+/// Results of the bias frames of a setting.
 #[derive(Debug)]
 pub(super) struct BiasFit {
     /// Number of frames.
@@ -24,20 +24,20 @@ pub(super) struct BiasFit {
     pub(super) hot: HotPixels,
     /// Residuals of all frames, for the probability plot.
     pub(super) residuals: Residuals,
-    /// Read noise by likelihood, before `widened`.
+    /// Read noise by maximum likelihood, not yet multiplied by `widened`.
     pub(super) read: ReadNoise,
-    /// The same by the probability plot, after `widened`.
+    /// Read noise by the probability plot, already multiplied by `widened`.
     pub(super) plot: PlotFit,
-    /// Factor of σ_TL for the noise that a mean frame takes with it.
+    /// Factor of σ_TL that compensates for the noise removed with the mean frame.
     pub(super) widened: f64,
-    /// Sums of the frames, two by two; the last may be of a single frame.
+    /// Sums of pairs of frames; the last group may have a single frame.
     groups: Vec<Group>,
 }
 
-/// Two successive frames; or the last one, if their number is odd.
+/// Two successive frames, or the last frame of an odd number.
 #[derive(Debug)]
 struct Group {
-    /// Number and sum of the samples of each plane, of both frames together.
+    /// Number and sum of the samples of each plane, over all frames of the group.
     planes: Vec<[u64; 2]>,
     /// `None` for a single frame.
     noise: Option<PairNoise>,
@@ -51,10 +51,10 @@ struct GroupWork {
 }
 
 impl BiasFit {
-    /// Measures the bias frames of a setting. Doubts are added to `notes`.
+    /// Measures the bias frames of a setting. Adds warnings to `notes`.
     ///
     /// # Errors
-    /// If a frame cannot be read, or a check refuses the frames.
+    /// If a frame cannot be read, or a check fails.
     pub(super) fn measure(
         reader: &FrameReader,
         files: &SettingFiles,
@@ -70,8 +70,8 @@ impl BiasFit {
         let first = FirstPass::read(reader, &files.bias, inputs)?;
         let check = BiasCheck::new(&first.mean, first.noise()).map_err(refused)?;
         notes.extend(check.notes(files.bias.len()));
-        let takes_pattern = check.takes_off_pattern(files.bias.len());
-        let centres = if takes_pattern {
+        let removes_pattern = check.removes_pattern(files.bias.len());
+        let centres = if removes_pattern {
             Centres::MeanFrame {
                 sums: &first.mean.sums,
                 frames: first.mean.frames(),
@@ -81,8 +81,8 @@ impl BiasFit {
         };
         let works = second_pass(reader, &files.bias, &check.hot, centres)?;
         let frames = files.bias.len() as f64;
-        let widened = if takes_pattern {
-            // A mean of n frames takes 1/n of their variance with it.
+        let widened = if removes_pattern {
+            // Subtracting a mean of n frames removes 1/n of their variance.
             (frames / (frames - 1.0)).sqrt()
         } else {
             1.0
@@ -124,28 +124,31 @@ impl BiasFit {
             .count()
     }
 
-    /// Means of the planes in ADU, if each group counts as often as its weight says.
+    /// Weighted means of the planes in ADU, with one weight for each group.
     pub(super) fn offsets(&self, weights: &[f64]) -> Vec<f64> {
         let planes = self.groups.first().map_or(0, |group| group.planes.len());
         let mean = |plane: usize| {
-            let groups = self.groups.iter().zip(weights);
-            let [count, sum] = groups.fold([0.0; 2], |[count, sum], (group, weight)| {
-                let [n, more] = group.planes[plane];
-                [count + weight * n as f64, sum + weight * more as f64]
-            });
+            let [count, sum] =
+                self.groups
+                    .iter()
+                    .zip(weights)
+                    .fold([0.0; 2], |[count, sum], (group, weight)| {
+                        let [n, more] = group.planes[plane];
+                        [count + weight * n as f64, sum + weight * more as f64]
+                    });
             sum / count
         };
         (0..planes).map(mean).collect()
     }
 
-    /// Variances of the noise within rows and of the row noise in ADU², if each group counts as often as its weight says.
+    /// Weighted variances of the noise within rows and of the row noise in ADU², with one weight for each group.
     pub(super) fn noise(&self, weights: &[f64]) -> PairNoise {
         let groups = self.groups.iter().zip(weights);
         mean_noise(groups.filter_map(|(group, weight)| Some((group.noise?, *weight))))
     }
 }
 
-/// The weighted mean of noises.
+/// Weighted mean of noise variances.
 fn mean_noise(noises: impl Iterator<Item = (PairNoise, f64)>) -> PairNoise {
     let [mut sum, mut within, mut row] = [0.0; 3];
     for (noise, weight) in noises {
@@ -159,10 +162,10 @@ fn mean_noise(noises: impl Iterator<Item = (PairNoise, f64)>) -> PairNoise {
     }
 }
 
-/// The result of the first reading.
+/// Result of reading the frames for the first time.
 struct FirstPass {
     mean: MeanFrame,
-    /// Noise of each pair, hot pixels included: they stand still, so that their offset cancels.
+    /// Noise of each pair. Hot pixels are included, because their constant offset cancels in a difference.
     noises: Vec<PairNoise>,
 }
 
@@ -196,7 +199,7 @@ impl FirstPass {
             |group, result| {
                 let (frames, noise) = result;
                 for (path, frame) in group.iter().zip(&frames) {
-                    inputs.add_once(path, &frame.facts)?;
+                    inputs.add_unique(path, &frame.facts)?;
                     pass.mean.add(&frame.samples);
                 }
                 pass.noises.extend(noise);
@@ -211,7 +214,7 @@ impl FirstPass {
     }
 }
 
-/// Sums and residuals of all groups, without hot pixels.
+/// Computes the sums and residuals of all groups, without hot pixels.
 fn second_pass(
     reader: &FrameReader,
     files: &[PathBuf],

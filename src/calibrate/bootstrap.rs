@@ -3,18 +3,20 @@
 use crate::types::FrameId;
 use darkqa_light::{Component, NoiseKey, Site};
 
-/// Number of draws (chosen: a standard error is then exact to 3 % for itself).
+/// Number of draws (chosen: the relative error of a standard error is then 3 %).
 const DRAWS: usize = 1000;
 
-/// Draws of groups of frames. Of n groups n − 1 are drawn with replacement, so that the variance of a mean over the draws is that of
-/// the mean, for few groups too (Rao and Wu 1988, Journal of the American Statistical Association 83:231).
+/// Bootstrap draws of groups of frames.
+///
+/// A draw has n − 1 of n groups, with replacement, so that the variance of a mean over the draws is unbiased for few groups too (Rao and
+/// Wu 1988, Journal of the American Statistical Association 83:231).
 #[derive(Debug)]
 pub(super) struct Draws {
-    /// Weights of the groups, draw by draw, with the mean 1.
+    /// Weights of the groups in each draw, with mean 1.
     weights: Vec<Vec<f64>>,
 }
 
-/// Kinds of groups, which are drawn apart.
+/// Kind of groups; each kind is drawn independently.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum DrawnGroups {
     Bias,
@@ -22,7 +24,7 @@ pub(super) enum DrawnGroups {
 }
 
 impl Draws {
-    /// Draws of so many groups. A single group has the weight 1 in each draw.
+    /// Draws from this number of groups. A single group has weight 1 in every draw.
     pub(super) fn new(kind: DrawnGroups, groups: usize) -> Self {
         let key = NoiseKey::new(0, &FrameId("calibrate".to_owned()));
         let stream = key.stream(Component::Resamples);
@@ -34,7 +36,7 @@ impl Draws {
             let share = groups as f64 / (groups - 1) as f64;
             for pick in 0..groups - 1 {
                 let site = Site::new(2 * draw + kind as usize, pick);
-                // The upper half of a product of 64 bits is uniform from 0 to n − 1, to n / 2³².
+                // The upper half of the 64-bit product is uniform from 0 to n − 1, except for a bias of n / 2³².
                 let word = u64::from(stream.words(site, 0)[0]);
                 weights[((word * groups as u64) >> 32) as usize] += share;
             }
@@ -45,13 +47,13 @@ impl Draws {
         }
     }
 
-    /// The weights of each draw.
+    /// Weights of each draw.
     pub(super) fn weights(&self) -> impl Iterator<Item = &[f64]> {
         self.weights.iter().map(Vec::as_slice)
     }
 }
 
-/// The standard deviation of values, one for each draw; `None` if there was nothing to draw from.
+/// Standard deviation of values, one for each draw; `None` for fewer than two groups.
 pub(super) fn deviation(values: impl Iterator<Item = f64>, groups: usize) -> Option<f64> {
     if groups < 2 {
         return None;
@@ -69,7 +71,7 @@ mod tests {
 
     /// Five groups with known values: the error of their mean is known.
     #[test]
-    fn the_error_of_a_mean_is_that_of_few_values() {
+    fn the_error_of_a_mean_is_unbiased_for_few_values() {
         let values = [1.0, 4.0, 2.0, 8.0, 5.0];
         let mean = values.iter().sum::<f64>() / 5.0;
         let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();

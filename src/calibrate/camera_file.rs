@@ -1,4 +1,4 @@
-//! The TOML file of a measured camera, as `--noise camera` reads it: [`camera_file`].
+//! TOML file of a measured camera, for `--noise camera`: [`camera_file`].
 
 use std::fmt::Write as _;
 
@@ -6,10 +6,10 @@ use super::{CameraFit, Measured, NoiseLine, SettingFit, SlopeSource};
 use crate::error::{Error, Result};
 use darkqa_light::Calibration;
 
-/// The file of a camera. Its comments hold what the numbers were made from, their standard errors, and every doubt.
+/// Writes the file of a camera. Comments state the source of the numbers, their standard errors and all warnings.
 ///
 /// # Errors
-/// If a number is outside of what a camera file may hold.
+/// If a number is outside the valid range of a camera file.
 pub(crate) fn camera_file(camera: &CameraFit) -> Result<String> {
     let mut text = head(camera);
     let gains: Vec<String> = camera
@@ -35,7 +35,7 @@ pub(crate) fn camera_file(camera: &CameraFit) -> Result<String> {
     for fit in &camera.settings {
         step(&mut text, camera, fit);
     }
-    // What --noise camera would refuse is not written.
+    // Check that --noise camera accepts the file.
     Calibration::parse(&text, "the measured camera").map_err(|e| {
         let problem = format!("{e}; leave out the setting, or see its frames");
         Error::data(&camera.name, problem)
@@ -43,7 +43,7 @@ pub(crate) fn camera_file(camera: &CameraFit) -> Result<String> {
     Ok(text)
 }
 
-/// The comments before the first key.
+/// Writes the comments before the first key.
 fn head(camera: &CameraFit) -> String {
     let version = env!("CARGO_PKG_VERSION");
     let mut text = format!("# Measured by darkqa-eval {version} calibrate");
@@ -72,8 +72,8 @@ fn head(camera: &CameraFit) -> String {
     text
 }
 
-/// The table of a line over so many settings, with what its numbers are worth.
-fn line(text: &mut String, key: &str, line: &NoiseLine, of: usize) {
+/// Writes the table of a line, with its source and uncertainty as comments. `total` is the number of settings of the camera.
+fn line(text: &mut String, key: &str, line: &NoiseLine, total: usize) {
     let through = match line.settings {
         1 => "1 setting".to_owned(),
         n => format!("the mean of {n} settings"),
@@ -85,7 +85,7 @@ fn line(text: &mut String, key: &str, line: &NoiseLine, of: usize) {
         ),
         SlopeSource::NoNoise => "# No setting has noise of this kind.\n".to_owned(),
     };
-    let left_out = match of - line.settings {
+    let left_out = match total - line.settings {
         0 => "",
         _ if line.settings == 0 => "",
         1 => "# 1 setting without visible noise is left out; the line holds for it, too.\n",
@@ -110,7 +110,7 @@ fn line(text: &mut String, key: &str, line: &NoiseLine, of: usize) {
     );
 }
 
-/// The table of a setting.
+/// Writes the table of a setting.
 fn step(text: &mut String, camera: &CameraFit, fit: &SettingFit) {
     let _ = writeln!(
         text,
@@ -126,13 +126,13 @@ fn step(text: &mut String, camera: &CameraFit, fit: &SettingFit) {
         with_error(fit.row_deviation)
     );
     let bias = camera.bias(fit);
-    let of = |plane: usize| {
+    let plane_bias = |plane: usize| {
         bias.get(plane)
             .or(bias.first())
             .map_or(0.0, |bias| bias.value)
     };
-    // Planes are R, G1, G2, B; the columns of a camera file are R, G1, B, G2.
-    let [r, g1, b, g2] = [0, 1, 3, 2].map(|plane| number(of(plane)));
+    // The order of planes is R, G1, G2, B; the order in a camera file is R, G1, B, G2.
+    let [r, g1, b, g2] = [0, 1, 3, 2].map(|plane| number(plane_bias(plane)));
     let _ = writeln!(
         text,
         "gain = {}\nshape = [{}]\nbias = [[{r}, {g1}, {b}, {g2}]]",
@@ -141,7 +141,7 @@ fn step(text: &mut String, camera: &CameraFit, fit: &SettingFit) {
     );
 }
 
-/// A number with its standard error.
+/// Formats a number with its standard error.
 fn with_error(number: Measured) -> String {
     match number.error {
         Some(error) => format!("{:.4} ± {error:.4}", number.value),
@@ -149,7 +149,7 @@ fn with_error(number: Measured) -> String {
     }
 }
 
-/// A number of six significant digits, as TOML reads it.
+/// Formats a number with six significant digits as a TOML float.
 fn number(value: f64) -> String {
     if value == 0.0 {
         return "0.0".to_owned();
@@ -159,7 +159,7 @@ fn number(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A text without line breaks, for a comment.
+/// Replaces line breaks and other control characters by spaces, for a comment.
 fn one_line(text: &str) -> String {
     text.chars()
         .map(|c| if c.is_control() { ' ' } else { c })

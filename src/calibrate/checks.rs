@@ -1,26 +1,27 @@
-//! Checks of the frames of a setting. What makes them useless is refused, what makes them doubtful becomes a note.
+//! Checks of the frames of a setting. Severe problems are errors, others become notes.
 
 use super::hot_pixels::HotPixels;
 use super::mean_frame::MeanFrame;
 use super::sums::PairNoise;
 
-/// Largest share of samples of a bias frame at 0 (chosen).
+/// Maximum share of zeros among the samples of a bias frame (chosen).
 const AT_ZERO: f64 = 1e-3;
-/// Largest share of hot pixels (chosen).
+/// Maximum share of hot pixels (chosen).
 const HOT_PIXELS: f64 = 5e-3;
-/// Largest correlation of neighbours in a difference of frames (chosen; smoothing gives 0.5, noise of single sites 0.004).
+/// Maximum correlation of neighbours in a difference of frames (chosen: smoothing gives 0.5, independent noise 0.004).
 const CORRELATION: f64 = 0.02;
-/// Largest variance of a fixed pattern, as a share of that of the noise (chosen).
+/// Maximum variance of a fixed pattern, as a share of the variance of the noise (chosen).
 const PATTERN: f64 = 0.2;
-/// Least number of bias frames whose mean is taken off as a fixed pattern: the mean of fewer has too much noise of its own (chosen).
+/// Minimum number of bias frames to subtract their mean as a fixed pattern (chosen: the mean of fewer frames is too noisy).
 const FRAMES_FOR_PATTERN: usize = 16;
-/// Light on bias frames: tiles that differ by this share of the deviation of the noise, and by so many standard errors (chosen).
+/// Limits of the difference between the means of tiles, beyond which bias frames had light: in standard deviations of the noise, and in
+/// standard errors (chosen).
 const UNEVEN: [f64; 2] = [0.5, 8.0];
 
-/// Checks the codes of a bias frame by themselves.
+/// Checks the codes of a single bias frame.
 ///
 /// # Errors
-/// If the negative part of the noise was cut off, or the codes were multiplied.
+/// If the negative part of the noise was clipped, or the codes were multiplied.
 pub(super) fn codes(samples: &[u16]) -> Result<(), String> {
     let zeros = samples.iter().filter(|sample| **sample == 0).count();
     let share = zeros as f64 / samples.len().max(1) as f64;
@@ -40,7 +41,7 @@ pub(super) fn codes(samples: &[u16]) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks that noise is that of single sites.
+/// Checks that the noise of neighbouring sites is independent.
 ///
 /// # Errors
 /// If neighbours correlate.
@@ -57,17 +58,17 @@ pub(super) fn correlation(correlation: f64) -> Result<(), String> {
 #[derive(Debug)]
 pub(super) struct BiasCheck {
     pub(super) hot: HotPixels,
-    /// Variance of the fixed pattern, as a share of that of the noise.
+    /// Variance of the fixed pattern, as a share of the variance of the noise.
     pattern: f64,
     /// Number of sites.
     sites: usize,
 }
 
 impl BiasCheck {
-    /// Looks at the mean frame; `noise` is that of one frame.
+    /// Checks the mean frame; `noise` is the noise of one frame.
     ///
     /// # Errors
-    /// If light was on the frames, or too many pixels are hot.
+    /// If the frames had light or no noise, or too many pixels are hot.
     pub(super) fn new(mean: &MeanFrame, noise: PairNoise) -> Result<Self, String> {
         if noise.within <= 0.0 {
             return Err("bias frames without any noise: copies of one frame?".to_owned());
@@ -98,12 +99,12 @@ impl BiasCheck {
         })
     }
 
-    /// Whether the mean of so many frames is taken off, because it shows a fixed pattern.
-    pub(super) fn takes_off_pattern(&self, frames: usize) -> bool {
+    /// True if the mean of this number of frames is subtracted, because it has a fixed pattern.
+    pub(super) fn removes_pattern(&self, frames: usize) -> bool {
         self.pattern > PATTERN && frames >= FRAMES_FOR_PATTERN
     }
 
-    /// Notes on hot pixels and on a fixed pattern in so many frames.
+    /// Notes on hot pixels and on a fixed pattern, for this number of frames.
     pub(super) fn notes(&self, frames: usize) -> Vec<String> {
         let mut notes = Vec::new();
         if self.hot.count() > 0 {
@@ -118,7 +119,7 @@ impl BiasCheck {
                 "a fixed pattern has {:.0} % of the variance of the noise",
                 100.0 * self.pattern
             );
-            let done = if self.takes_off_pattern(frames) {
+            let done = if self.removes_pattern(frames) {
                 "the mean of all bias frames is taken off".to_owned()
             } else {
                 format!(

@@ -1,4 +1,4 @@
-//! Reader of the frames of a recording, all of one size, form and camera: [`FrameReader`].
+//! Reader for the frames of a recording, which must have the same size, form and camera: [`FrameReader`].
 
 use std::path::Path;
 use std::str::FromStr;
@@ -7,21 +7,21 @@ use super::layout::{Cfa, Layout};
 use super::mosaic::{FrameFacts, Mosaic};
 use crate::error::{Error, Result};
 
-/// Least rows and columns of a frame (chosen): row means and the correlation of neighbours need so many.
-const LEAST_SIDE: usize = 256;
+/// Minimum number of rows and of columns of a frame (chosen for row means and the correlation of neighbours).
+const MIN_SIDE: usize = 256;
 
-/// How files are read as frames.
+/// Options for reading files as frames.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReadOptions {
     /// Colour filters of the sensor.
     pub cfa: Cfa,
-    /// The part of each frame that is used; `None` for all of it.
+    /// Part of each frame to use; `None` for the whole frame.
     pub crop: Option<Crop>,
-    /// The maximum number of samples of a file.
+    /// Maximum number of samples of a file.
     pub most_pixels: u64,
 }
 
-/// A part of a frame, in sites of the sensor.
+/// Part of a frame, in sites of the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Crop {
     x: usize,
@@ -50,14 +50,14 @@ impl FromStr for Crop {
     }
 }
 
-/// A frame whose size is that of the layout.
+/// A frame with the size of the layout.
 #[derive(Debug)]
 pub(super) struct Frame {
     pub(super) samples: Vec<u16>,
     pub(super) facts: FrameFacts,
 }
 
-/// Reader of frames that are like the first.
+/// Reader that requires all frames to match the first one.
 #[derive(Debug)]
 pub(super) struct FrameReader {
     pub(super) layout: Layout,
@@ -65,7 +65,7 @@ pub(super) struct FrameReader {
     first: FirstFrame,
 }
 
-/// Properties that all other frames must share with the first.
+/// First frame, which all other frames must match.
 #[derive(Debug)]
 struct FirstFrame {
     place: String,
@@ -74,10 +74,10 @@ struct FirstFrame {
 }
 
 impl FrameReader {
-    /// Reads the first frame, whose size, form and camera the others must have.
+    /// Reads the first frame.
     ///
     /// # Errors
-    /// If it cannot be read, the crop is not inside it, or it is too small.
+    /// If the frame cannot be read or is too small, or the crop is not inside it.
     pub(super) fn open(path: &Path, options: ReadOptions) -> Result<Self> {
         let mosaic = Mosaic::read(path, options.most_pixels)?;
         let size = [mosaic.width, mosaic.height];
@@ -93,8 +93,8 @@ impl FrameReader {
         })
     }
 
-    /// A sentence on rows or columns that are left out; `None` if all are used.
-    pub(super) fn left_out(&self) -> Option<String> {
+    /// Note on rows or columns that are left out; `None` if all are used.
+    pub(super) fn omission_note(&self) -> Option<String> {
         let [width, height] = self.first.size;
         let Layout {
             width: used_width,
@@ -107,21 +107,21 @@ impl FrameReader {
         })
     }
 
-    /// Camera of the recording, as the files name it.
+    /// Name of the camera in the files.
     pub(super) fn camera(&self) -> Option<&str> {
         self.first.facts.camera.as_deref()
     }
 
-    /// Bytes of memory that a frame takes while it is read: the file, its samples, and the samples that are used.
+    /// Memory for reading a frame, in bytes: the file, its samples, and the cropped samples.
     pub(super) fn bytes_of_frame(&self) -> usize {
         let [width, height] = self.first.size;
         6 * width * height
     }
 
-    /// Reads a frame, cut to the crop.
+    /// Reads and crops a frame.
     ///
     /// # Errors
-    /// If it cannot be read, or differs from the first frame.
+    /// If the frame cannot be read, or does not match the first frame.
     pub(super) fn read(&self, path: &Path) -> Result<Frame> {
         let mosaic = Mosaic::read(path, self.options.most_pixels)?;
         if let Some(problem) = self.difference(&mosaic) {
@@ -132,8 +132,11 @@ impl FrameReader {
         let samples = if [width, height] == self.first.size {
             mosaic.samples
         } else {
-            let rows = mosaic.samples.chunks_exact(mosaic.width).skip(y);
-            rows.take(height)
+            mosaic
+                .samples
+                .chunks_exact(mosaic.width)
+                .skip(y)
+                .take(height)
                 .map(|row| &row[x..x + width])
                 .collect::<Vec<_>>()
                 .concat()
@@ -144,7 +147,7 @@ impl FrameReader {
         })
     }
 
-    /// The first thing in which a frame differs from the first frame; `None` if they are alike.
+    /// Describes the first difference from the first frame; `None` if the frames match.
     fn difference(&self, mosaic: &Mosaic) -> Option<String> {
         let FirstFrame { place, size, facts } = &self.first;
         let [width, height] = size;
@@ -171,7 +174,7 @@ impl FrameReader {
     }
 }
 
-/// The layout of frames of this width and height.
+/// Layout of frames with this width and height, after cropping.
 fn layout(options: ReadOptions, [width, height]: [usize; 2]) -> Result<Layout, String> {
     let ReadOptions { cfa, crop, .. } = options;
     let step = cfa.step();
@@ -192,12 +195,12 @@ fn layout(options: ReadOptions, [width, height]: [usize; 2]) -> Result<Layout, S
         }
     }
     let (width, height) = crop.map_or((width, height), |crop| (crop.width, crop.height));
-    if width < LEAST_SIDE || height < LEAST_SIDE {
+    if width < MIN_SIDE || height < MIN_SIDE {
         return Err(format!(
-            "{width} × {height} sites are too few for row noise: at least {LEAST_SIDE} × {LEAST_SIDE} are needed, 512 × 512 are better"
+            "{width} × {height} sites are too few for row noise: at least {MIN_SIDE} × {MIN_SIDE} are needed, 512 × 512 are better"
         ));
     }
-    // The last row or column of an odd side belongs to no whole group of filters.
+    // The last row or column of an odd side is not part of a complete filter pattern.
     Ok(Layout {
         cfa,
         width: width - width % step,

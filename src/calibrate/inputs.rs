@@ -1,4 +1,4 @@
-//! The files that a calibration was made from: [`Inputs`].
+//! Input files of a calibration: [`Inputs`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,14 +7,14 @@ use super::mosaic::FrameFacts;
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
-/// All frames that were read, in the order of the recording.
+/// All frames read so far, in the order of the recording.
 #[derive(Debug, Default)]
 pub(super) struct Inputs {
     /// Path and digest of each frame.
     list: Vec<(String, Digest)>,
-    /// The bias frame, flat or dark frame of each digest.
+    /// Path of the bias, flat or dark frame with each digest.
     places: BTreeMap<Digest, String>,
-    /// The first and the last date that the files state.
+    /// First and last date in the files.
     dates: Option<[String; 2]>,
 }
 
@@ -35,21 +35,21 @@ impl Inputs {
         }
     }
 
-    /// Adds a frame of which no copy may be used, for another purpose neither.
+    /// Adds a frame that may be used only once.
     ///
     /// # Errors
-    /// See [`once`](Self::once).
-    pub(super) fn add_once(&mut self, path: &Path, facts: &FrameFacts) -> Result<()> {
-        self.once(&path.display().to_string(), facts.digest)?;
+    /// See [`check_unique`](Self::check_unique).
+    pub(super) fn add_unique(&mut self, path: &Path, facts: &FrameFacts) -> Result<()> {
+        self.check_unique(&path.display().to_string(), facts.digest)?;
         self.add(path, facts);
         Ok(())
     }
 
-    /// Checks that the frame at a place is no copy of another one. Overexposed frames are not checked: they may well be equal.
+    /// Checks that a frame is not a copy of an earlier one. Overexposed frames need no check, because they may be identical.
     ///
     /// # Errors
-    /// If the same frame was used before: copies have no noise between them.
-    pub(super) fn once(&mut self, place: &str, digest: Digest) -> Result<()> {
+    /// If the same frame was used before: copies have no independent noise.
+    pub(super) fn check_unique(&mut self, place: &str, digest: Digest) -> Result<()> {
         match self.places.insert(digest, place.to_owned()) {
             Some(first) => Err(Error::data(
                 place,
@@ -66,10 +66,10 @@ impl Inputs {
         self.list.len()
     }
 
-    /// The digest of the names of all frames, from `folder`, and of their contents.
+    /// Digest of the paths of all frames, relative to `folder`, and of their contents.
     ///
     /// # Errors
-    /// None for texts; the type of the digest allows for numbers that cannot be written.
+    /// Never for strings; only numbers that are not finite have no canonical form.
     pub(super) fn digest(&self, folder: &Path) -> Result<Digest> {
         let prefix = folder.display().to_string();
         let list: Vec<(String, String)> = self
@@ -84,7 +84,7 @@ impl Inputs {
         Digest::canonical("darkqa.calibration-frames/1", &list)
     }
 
-    /// The first and the last date of the frames, as the files state them.
+    /// First and last date in the files.
     pub(super) fn dates(&self) -> Option<&[String; 2]> {
         self.dates.as_ref()
     }

@@ -1,4 +1,4 @@
-//! The colour filters of a sensor ([`Cfa`]) and the planes, rows and tiles of its frames ([`Layout`]).
+//! Colour filters of a sensor ([`Cfa`]), and the planes, rows and tiles of its frames ([`Layout`]).
 
 use std::ops::Range;
 
@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use crate::types::flags::flag_words;
 
-/// Tiles of a plane along each side (chosen): photon transfer is fitted to tiles, so that light that falls off towards the
-/// corners adds points, not variance.
+/// Number of tiles of a plane along each side (chosen). Photon transfer is fitted to tiles, so that the fall-off of light towards the
+/// corners adds points and not variance.
 pub(super) const TILES: usize = 8;
 
 /// The colours of the four sites at the upper left corner of a frame, row by row.
@@ -34,7 +34,7 @@ pub(crate) enum Cfa {
 flag_words!(Cfa);
 
 impl Cfa {
-    /// Colour planes that share a row; also the number of kinds of rows.
+    /// Period of the pattern in rows and columns: the number of planes in a row.
     pub(super) fn step(self) -> usize {
         if self == Self::Mono { 1 } else { 2 }
     }
@@ -44,8 +44,8 @@ impl Cfa {
         self.step() * self.step()
     }
 
-    /// Plane of the sites of a row whose columns have the remainder `parity`: red, green in the rows of red, green in the rows of
-    /// blue, blue are 0 to 3; the one plane of a sensor without filters is 0.
+    /// Plane of the sites in a row whose column modulo the period is `parity`. Planes 0 to 3 are red, green in red rows, green in blue
+    /// rows, and blue; the only plane of a sensor without filters is 0.
     pub(super) fn plane(self, row: usize, parity: usize) -> usize {
         let [first_row, first_column] = match self {
             Self::Mono => return 0,
@@ -57,7 +57,7 @@ impl Cfa {
         2 * ((row + first_row) % 2) + (parity + first_column) % 2
     }
 
-    /// Names of the planes, in their order.
+    /// Names of the planes, in order.
     pub(crate) fn plane_names(self) -> &'static [&'static str] {
         match self {
             Self::Mono => &["all"],
@@ -80,18 +80,18 @@ impl Layout {
         [self.height, self.width].map(|side| side / self.cfa.step())
     }
 
-    /// Number of parts of rows that belong to one plane: their order is row by row, in a row by the remainder of the columns.
+    /// Number of parts of rows, each with the sites of one plane in one row. They are numbered row by row, and by parity within a row.
     pub(super) fn plane_rows(self) -> usize {
         self.height * self.cfa.step()
     }
 
-    /// Row and remainder of the columns of a part of a row.
+    /// Row and column parity of a part of a row.
     pub(super) fn place(self, plane_row: usize) -> [usize; 2] {
         let step = self.cfa.step();
         [plane_row / step, plane_row % step]
     }
 
-    /// Columns of a plane, or rows, that belong to a tile.
+    /// Rows or columns of a tile, for a plane with `side` rows or columns.
     pub(super) fn tile(side: usize, tile: usize) -> Range<usize> {
         tile * side / TILES..(tile + 1) * side / TILES
     }
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_pattern_names_its_first_four_sites() {
+    fn patterns_name_their_first_four_sites() {
         for (cfa, planes) in [
             (Cfa::Rggb, [0, 1, 2, 3]),
             (Cfa::Bggr, [3, 2, 1, 0]),

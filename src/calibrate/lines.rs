@@ -1,26 +1,26 @@
-//! How a deviation depends on K: [`NoiseLine`], ln σ = slope · ln K + intercept.
+//! Dependence of a noise deviation σ on the gain K: [`NoiseLine`], ln σ = slope · ln K + intercept.
 
 use serde::Serialize;
 
 use darkqa_light::Calibration;
 
-/// Least number of settings whose line has a slope of its own.
-const LEAST: usize = 3;
+/// Minimum number of settings to fit a slope.
+const MIN_SETTINGS: usize = 3;
 
-/// The line of a deviation σ over the settings.
+/// Line of a deviation σ over the settings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct NoiseLine {
     pub slope: f64,
     /// ln σ at K = 1.
     pub intercept: f64,
-    /// Standard deviation of ln σ about the line.
+    /// Standard deviation of ln σ around the line.
     pub deviation: f64,
-    /// Number of settings that it was fitted to.
+    /// Number of fitted settings.
     pub settings: usize,
     pub slope_from: SlopeSource,
 }
 
-/// Where a slope is from.
+/// Source of a slope.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum SlopeSource {
@@ -28,11 +28,11 @@ pub(crate) enum SlopeSource {
     Settings,
     /// The value of the preset `sony-a7s2`, because there are fewer than three settings.
     Preset,
-    /// None: no setting has such noise.
+    /// No slope: no setting has this kind of noise.
     NoNoise,
 }
 
-/// Which deviation a line is of.
+/// Kind of noise of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NoiseKind {
     Read,
@@ -40,7 +40,7 @@ pub(super) enum NoiseKind {
 }
 
 impl NoiseLine {
-    /// The line through points (K, σ); points without noise are left out.
+    /// Fits a line through points (K, σ); points without noise are left out.
     pub(super) fn fit(points: &[[f64; 2]], kind: NoiseKind) -> Self {
         let logs: Vec<[f64; 2]> = points
             .iter()
@@ -49,7 +49,7 @@ impl NoiseLine {
             .collect();
         let n = logs.len() as f64;
         if logs.is_empty() {
-            // e^−20 ADU: the least that a camera file may hold.
+            // e^−20 ADU: the minimum in a camera file.
             return Self {
                 slope: 0.0,
                 intercept: -20.0,
@@ -61,28 +61,28 @@ impl NoiseLine {
         let [x, y] = [0, 1].map(|i| logs.iter().map(|log| log[i]).sum::<f64>() / n);
         let products: f64 = logs.iter().map(|log| (log[0] - x) * (log[1] - y)).sum();
         let squares: f64 = logs.iter().map(|log| (log[0] - x).powi(2)).sum();
-        let fits = logs.len() >= LEAST && squares > 0.0;
-        let slope = if fits {
+        let fits_slope = logs.len() >= MIN_SETTINGS && squares > 0.0;
+        let slope = if fits_slope {
             products / squares
         } else {
             preset_slope(kind)
         };
-        let left: f64 = logs
+        let residual: f64 = logs
             .iter()
             .map(|log| (log[1] - y - slope * (log[0] - x)).powi(2))
             .sum();
-        // Numbers that are fitted: the intercept, and the slope if it is.
-        let free = n - if fits { 2.0 } else { 1.0 };
+        // Degrees of freedom: the intercept is fitted, and possibly the slope.
+        let free = n - if fits_slope { 2.0 } else { 1.0 };
         Self {
             slope,
             intercept: y - slope * x,
             deviation: if free > 0.0 {
-                (left / free).sqrt()
+                (residual / free).sqrt()
             } else {
                 0.0
             },
             settings: logs.len(),
-            slope_from: if fits {
+            slope_from: if fits_slope {
                 SlopeSource::Settings
             } else {
                 SlopeSource::Preset
@@ -90,7 +90,7 @@ impl NoiseLine {
         }
     }
 
-    /// The relative standard error of the deviation, 1 / √(2 · degrees of freedom); `None` without any.
+    /// Relative standard error of the deviation, 1 / √(2 · degrees of freedom); `None` without degrees of freedom.
     pub(crate) fn deviation_error(&self) -> Option<f64> {
         let fitted = match self.slope_from {
             SlopeSource::Settings => 2,
@@ -101,12 +101,13 @@ impl NoiseLine {
         Some(1.0 / (2.0 * free as f64).sqrt())
     }
 
-    /// σ on the line at a gain, in ADU.
+    /// Value of the line at a gain: σ in ADU.
     pub(crate) fn at(&self, gain: f64) -> f64 {
         libm::exp(self.slope * libm::log(gain) + self.intercept)
     }
 }
 
+/// Slope of the preset `sony-a7s2`.
 fn preset_slope(kind: NoiseKind) -> f64 {
     let preset = Calibration::preset("sony-a7s2");
     preset.map_or(0.5, |preset| match kind {
@@ -120,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_fitted_from_three_settings_on() {
+    fn slopes_are_fitted_to_three_settings_or_more() {
         let on_line = |k: f64| [k, 2.0 * k.powf(0.4)];
         let three = NoiseLine::fit(&[0.1, 1.0, 5.0].map(on_line), NoiseKind::Read);
         assert!((three.slope - 0.4).abs() < 1e-12);

@@ -1,4 +1,4 @@
-//! The mean of all bias frames of a setting, and what it shows: [`MeanFrame`].
+//! Mean of all bias frames of a setting, with its hot pixels, fixed pattern and unevenness: [`MeanFrame`].
 
 use rayon::prelude::*;
 
@@ -6,24 +6,24 @@ use super::hot_pixels::HotPixels;
 use super::layout::{Layout, TILES};
 use super::sums::PairNoise;
 
-/// A site is hot if its mean is further from the median of its plane than this many deviations of the read noise, and each of its
-/// samples is further, on the same side, than half as many (chosen). A single sample far out is noise with long tails.
-const HOT: f64 = 10.0;
+/// Minimum distance of the mean of a hot pixel from the median of its plane, in standard deviations of the read noise (chosen). Each of
+/// its samples must also be at half this distance on the same side, because a single distant sample is long-tailed noise.
+const HOT_DISTANCE: f64 = 10.0;
 
-/// The sum of frames at each site.
+/// Sum of frames at each site.
 #[derive(Debug)]
 pub(super) struct MeanFrame {
     layout: Layout,
     pub(super) sums: Vec<u32>,
-    /// The least and the greatest sample at each site.
+    /// Minimum and maximum sample at each site.
     extremes: Vec<[u16; 2]>,
     frames: u32,
 }
 
-/// How far the means of tiles differ over a plane, in ADU.
+/// Difference between the means of the tiles of a plane, in ADU.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unevenness {
-    /// The greatest mean of a tile less the smallest.
+    /// Maximum minus minimum of the tile means.
     pub(super) difference: f64,
     /// Standard error of the mean of a tile.
     pub(super) error: f64,
@@ -33,7 +33,7 @@ pub(super) struct Unevenness {
 #[derive(Debug, Clone, Copy)]
 struct Site {
     plane_row: usize,
-    /// Column of its plane.
+    /// Column within the plane.
     column: usize,
     /// Mean of all frames, in ADU.
     mean: f64,
@@ -52,14 +52,15 @@ impl MeanFrame {
     /// Adds a frame.
     pub(super) fn add(&mut self, samples: &[u16]) {
         let width = self.layout.width;
-        let rows = self.sums.par_chunks_mut(width);
-        let rows = rows.zip(self.extremes.par_chunks_mut(width));
-        rows.zip(samples.par_chunks(width))
+        self.sums
+            .par_chunks_mut(width)
+            .zip(self.extremes.par_chunks_mut(width))
+            .zip(samples.par_chunks(width))
             .for_each(|((sums, extremes), row)| {
-                for ((sum, [least, greatest]), sample) in sums.iter_mut().zip(extremes).zip(row) {
+                for ((sum, [min, max]), sample) in sums.iter_mut().zip(extremes).zip(row) {
                     *sum += u32::from(*sample);
-                    *least = (*least).min(*sample);
-                    *greatest = (*greatest).max(*sample);
+                    *min = (*min).min(*sample);
+                    *max = (*max).max(*sample);
                 }
             });
         self.frames += 1;
@@ -70,10 +71,10 @@ impl MeanFrame {
         f64::from(self.frames)
     }
 
-    /// The values of the sites of a part of a row.
-    fn part<'a, T>(&self, of: &'a [T], plane_row: usize) -> impl Iterator<Item = &'a T> {
+    /// Values of the sites in a part of a row, from the values of all sites.
+    fn part<'a, T>(&self, values: &'a [T], plane_row: usize) -> impl Iterator<Item = &'a T> {
         let [row, parity] = self.layout.place(plane_row);
-        let row = &of[row * self.layout.width..][..self.layout.width];
+        let row = &values[row * self.layout.width..][..self.layout.width];
         row[parity..].iter().step_by(self.layout.cfa.step())
     }
 
@@ -83,56 +84,55 @@ impl MeanFrame {
         self.layout.cfa.plane(row, parity)
     }
 
-    /// The sites whose mean is far from the median of their plane; `within` is the variance of the read noise.
+    /// Finds the sites whose mean is far from the median of their plane; `within` is the variance of the read noise.
     pub(super) fn hot_pixels(&self, within: f64) -> HotPixels {
         let medians = self.medians();
-        let limit = HOT * within.sqrt();
-        let parts = (0..self.layout.plane_rows())
+        let limit = HOT_DISTANCE * within.sqrt();
+        let columns = (0..self.layout.plane_rows())
             .into_par_iter()
-            .with_min_len(64);
-        let columns = parts.map(|plane_row| {
-            let median = f64::from(medians[self.plane(plane_row)]) / self.frames();
-            let extremes = self.part(&self.extremes, plane_row);
-            let sites = self.part(&self.sums, plane_row).zip(extremes);
-            sites
-                .enumerate()
-                .filter(|(_, (sum, [least, greatest]))| {
-                    let mean = f64::from(**sum) / self.frames() - median;
-                    let (above, below) =
-                        (f64::from(*least) - median, median - f64::from(*greatest));
-                    mean.abs() > limit && above.max(below) > 0.5 * limit
-                })
-                .map(|(column, _)| column as u32)
-                .collect()
-        });
-        HotPixels::new(columns.collect())
+            .with_min_len(64)
+            .map(|plane_row| {
+                let median = f64::from(medians[self.plane(plane_row)]) / self.frames();
+                self.part(&self.sums, plane_row)
+                    .zip(self.part(&self.extremes, plane_row))
+                    .enumerate()
+                    .filter(|(_, (sum, [min, max]))| {
+                        let mean = f64::from(**sum) / self.frames() - median;
+                        let (above, below) = (f64::from(*min) - median, median - f64::from(*max));
+                        mean.abs() > limit && above.max(below) > 0.5 * limit
+                    })
+                    .map(|(column, _)| column as u32)
+                    .collect()
+            })
+            .collect();
+        HotPixels::new(columns)
     }
 
-    /// The median sum of each plane; the upper one of two.
+    /// Median sum of each plane; the upper one of two middle sums.
     fn medians(&self) -> Vec<u32> {
-        let planes = (0..self.layout.cfa.planes()).into_par_iter();
-        planes
+        (0..self.layout.cfa.planes())
+            .into_par_iter()
             .map(|plane| {
-                let sums = (0..self.layout.plane_rows())
+                let mut sums: Vec<u32> = (0..self.layout.plane_rows())
                     .filter(|part| self.plane(*part) == plane)
-                    .flat_map(|part| self.part(&self.sums, part));
-                let mut sums: Vec<u32> = sums.copied().collect();
+                    .flat_map(|part| self.part(&self.sums, part))
+                    .copied()
+                    .collect();
                 let middle = sums.len() / 2;
                 *sums.select_nth_unstable(middle).1
             })
             .collect()
     }
 
-    /// Sums of parts of rows, to which `add` adds each site that is not hot, in the order of the rows.
-    fn by_part<const N: usize>(
+    /// Sums for each part of a row, in order. `add` adds one site to the sums; hot pixels are skipped.
+    fn sums_by_part<const N: usize>(
         &self,
         hot: &HotPixels,
         add: impl Fn(&mut [f64; N], Site) + Sync,
     ) -> Vec<[f64; N]> {
-        let parts = (0..self.layout.plane_rows())
+        (0..self.layout.plane_rows())
             .into_par_iter()
-            .with_min_len(64);
-        parts
+            .with_min_len(64)
             .map(|plane_row| {
                 let mut hot = hot.columns(plane_row).peekable();
                 let mut sums = [0.0; N];
@@ -151,13 +151,13 @@ impl MeanFrame {
             .collect()
     }
 
-    /// The variance of the fixed pattern: that of the mean frame about the means of its planes, less what noise of this size
-    /// leaves in a mean, in ADU². It may be below 0 by chance.
+    /// Variance of the fixed pattern in ADU²: the variance of the mean frame around the means of its planes, minus the contribution of the
+    /// noise. It may be negative by chance.
     pub(super) fn pattern(&self, hot: &HotPixels, noise: PairNoise) -> f64 {
-        // About the medians, so that the squares are small.
+        // Relative to the medians, to keep the squares small.
         let medians = self.medians();
         let median = |plane_row: usize| f64::from(medians[self.plane(plane_row)]) / self.frames();
-        let parts = self.by_part(hot, |sums: &mut [f64; 3], site| {
+        let parts = self.sums_by_part(hot, |sums: &mut [f64; 3], site| {
             let d = site.mean - median(site.plane_row);
             sums[0] += 1.0;
             sums[1] += d;
@@ -172,13 +172,14 @@ impl MeanFrame {
                 .for_each(|(sum, more)| *sum += more);
         }
         let count: f64 = planes.iter().map(|[count, ..]| count).sum();
-        let about = |[count, sum, squares]: &[f64; 3]| squares - sum * sum / count.max(1.0);
-        let squares: f64 = planes.iter().map(about).sum();
+        let squares_about_mean =
+            |[count, sum, squares]: &[f64; 3]| squares - sum * sum / count.max(1.0);
+        let squares: f64 = planes.iter().map(squares_about_mean).sum();
         let free = count - planes.len() as f64;
         squares / free - (noise.within + noise.row) / self.frames()
     }
 
-    /// The unevenness of the plane whose tiles differ most. Row noise of this variance shifts the rows of a tile together.
+    /// Unevenness of the plane whose tiles differ most. Row noise contributes to its error, because it shifts all sites of a row together.
     pub(super) fn unevenness(&self, hot: &HotPixels, noise: PairNoise) -> Unevenness {
         let [rows, columns] = self.layout.plane_size();
         let tile_of = |column: usize| {
@@ -186,8 +187,8 @@ impl MeanFrame {
             tile.unwrap_or(TILES - 1)
         };
         let tiles: Vec<usize> = (0..columns).map(tile_of).collect();
-        // Number and sum of each tile column.
-        let parts = self.by_part(hot, |sums: &mut [f64; 2 * TILES], site| {
+        // Number of sites and sum of means for each tile column.
+        let parts = self.sums_by_part(hot, |sums: &mut [f64; 2 * TILES], site| {
             let tile = 2 * tiles[site.column];
             sums[tile] += 1.0;
             sums[tile + 1] += site.mean;
@@ -204,25 +205,25 @@ impl MeanFrame {
         let sites = (rows / TILES * (columns / TILES)) as f64;
         let error =
             (noise.within / sites + noise.row.max(0.0) / (rows / TILES) as f64) / self.frames();
-        let uneven = sums.chunks(TILES * TILES).map(|tiles| {
-            let means = tiles
-                .iter()
-                .filter(|[count, _]| *count > 0.0)
-                .map(|[count, sum]| sum / count);
-            let [low, high] = means
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
-                    [mean.min(low), mean.max(high)]
-                });
-            Unevenness {
-                difference: high - low,
-                error: error.sqrt(),
-            }
-        });
-        let most = uneven.max_by(|a, b| a.difference.total_cmp(&b.difference));
-        most.unwrap_or(Unevenness {
-            difference: 0.0,
-            error: 0.0,
-        })
+        sums.chunks(TILES * TILES)
+            .map(|tiles| {
+                let [low, high] = tiles
+                    .iter()
+                    .filter(|[count, _]| *count > 0.0)
+                    .map(|[count, sum]| sum / count)
+                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
+                        [mean.min(low), mean.max(high)]
+                    });
+                Unevenness {
+                    difference: high - low,
+                    error: error.sqrt(),
+                }
+            })
+            .max_by(|a, b| a.difference.total_cmp(&b.difference))
+            .unwrap_or(Unevenness {
+                difference: 0.0,
+                error: 0.0,
+            })
     }
 }
 
@@ -261,7 +262,7 @@ mod tests {
     };
 
     #[test]
-    fn sites_that_stay_far_out_are_hot() {
+    fn consistently_distant_sites_are_hot() {
         let sites = [5, 64 * 9 + 8, 64 * 63 + 63];
         let hot = mean_of(4, |_, site| if sites.contains(&site) { 30 } else { 0 });
         let found = hot.hot_pixels(NOISE.within);
@@ -281,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn light_and_pattern_are_told_from_noise() {
+    fn light_and_pattern_are_distinguished_from_noise() {
         let none = HotPixels::none(LAYOUT.plane_rows());
         let plain = mean_of(8, |_, _| 0);
         assert!(plain.pattern(&none, NOISE).abs() < 0.05);

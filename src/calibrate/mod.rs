@@ -1,5 +1,5 @@
-//! A camera from its own frames: [`calibrate`] measures gain, read noise, row noise and offsets of a sensor at each setting of its
-//! gain, from bias frames and pairs of flats, and [`camera_file()`] writes them for `--noise camera`.
+//! Calibration of a camera from its own frames: [`calibrate`] measures the gain, read noise, row noise and offsets of a sensor at each
+//! setting of its gain, from bias frames and pairs of flats. [`camera_file()`] writes them for `--noise camera`.
 //!
 //! ```text
 //! bias frames ─ mean ──► offsets, light, hot pixels, fixed pattern
@@ -9,8 +9,8 @@
 //! settings ──► ln σ over ln K
 //! ```
 //!
-//! Frames are read a few at a time, so that a recording of any size fits in memory. Sums over sites are of whole numbers, so that the
-//! result does not depend on the number of threads.
+//! Only a few frames are in memory at once, whatever the size of the recording. Sums over sites are integers, so that the result does not
+//! depend on the number of threads.
 //!
 //! Sources: Wei et al., "Physics-based noise modeling for extreme low-light photography" (ELD); Janesick, *Photon Transfer*; EMVA
 //! 1288 release 4 Linear.
@@ -50,36 +50,36 @@ use crate::types::Digest;
 use frames::FrameReader;
 use inputs::Inputs;
 use lines::NoiseKind;
-use setting::Measuring;
+use setting::MeasureContext;
 
 /// Settings of a calibration.
 #[derive(Debug, Clone)]
 pub(crate) struct CalibrateSettings {
-    /// How files are read as frames.
+    /// Options for reading files as frames.
     pub read: ReadOptions,
-    /// The black level in ADU; `None` for the whole number nearest to the offsets.
+    /// Black level in ADU; `None` for the mean offset, rounded.
     pub black: Option<u16>,
-    /// The code of white; `None` for that of the frames in `white/`.
+    /// Code of white; `None` to measure it from the frames in `white/`.
     pub white: Option<u16>,
     /// Name of the camera.
     pub name: String,
 }
 
-/// A sensor, measured.
+/// Measured properties of a camera.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct CameraFit {
     pub schema: &'static str,
     pub name: String,
-    /// Camera, as the files name it.
+    /// Name of the camera in the files.
     pub camera: Option<String>,
     pub cfa: Cfa,
-    /// Width and height of the frames that were measured, in sites.
+    /// Width and height of the measured frames, in sites.
     pub size: [usize; 2],
     /// Black level in ADU.
     pub black: u16,
     /// Code of white.
     pub white: u16,
-    /// The settings, in ascending order of K.
+    /// Settings, in ascending order of K.
     pub settings: Vec<SettingFit>,
     /// σ_TL over K.
     pub read_scale: NoiseLine,
@@ -87,11 +87,11 @@ pub(crate) struct CameraFit {
     pub row_deviation: NoiseLine,
     /// Number of frames.
     pub frames: usize,
-    /// The digest of the names and contents of all frames.
+    /// Digest of the names and contents of all frames.
     pub frames_digest: Digest,
-    /// First and last date of the frames, as the files state them.
+    /// First and last date in the files.
     pub dates: Option<[String; 2]>,
-    /// Everything that is doubtful or was left out.
+    /// Warnings and omissions.
     pub warnings: Vec<String>,
 }
 
@@ -101,21 +101,24 @@ impl CameraFit {
         f64::from(self.white) - f64::from(self.black)
     }
 
-    /// Offsets of a setting above the black level in ADU, plane by plane.
+    /// Offsets of the planes of a setting above the black level, in ADU.
     pub(crate) fn bias(&self, setting: &SettingFit) -> Vec<Measured> {
         let black = f64::from(self.black);
-        let above = |offset: &Measured| Measured {
-            value: offset.value - black,
-            ..*offset
-        };
-        setting.offsets.iter().map(above).collect()
+        setting
+            .offsets
+            .iter()
+            .map(|offset| Measured {
+                value: offset.value - black,
+                ..*offset
+            })
+            .collect()
     }
 }
 
-/// Measures a camera from its recording in `folder`. `step` is called when a setting is done.
+/// Measures a camera from its recording in `folder`. Calls `step` after each setting.
 ///
 /// # Errors
-/// If a frame cannot be read or differs from the others, or a check refuses the recording.
+/// If a frame cannot be read or differs from the others, or a check fails.
 pub(crate) fn calibrate(
     folder: &Path,
     recording: &Recording,
@@ -125,7 +128,7 @@ pub(crate) fn calibrate(
     let reader = FrameReader::open(recording.first(), settings.read)?;
     let mut inputs = Inputs::default();
     let mut warnings = recording.notes.clone();
-    warnings.extend(reader.left_out());
+    warnings.extend(reader.omission_note());
     let white = match settings.white {
         Some(white) => {
             if recording
@@ -141,28 +144,31 @@ pub(crate) fn calibrate(
     };
     let mut fits = Vec::new();
     for files in &recording.settings {
-        let mut with = Measuring {
+        let mut context = MeasureContext {
             reader: &reader,
             white,
             inputs: &mut inputs,
             warnings: &mut warnings,
         };
-        fits.push(setting::measure(files, &mut with)?);
+        fits.push(setting::measure(files, &mut context)?);
         step();
     }
     warnings.extend(consistency::order_doubts(&fits, recording));
     fits.sort_by(|a, b| a.gain.value.total_cmp(&b.gain.value));
     let black = match settings.black {
         Some(black) => black,
-        None => black(&fits),
+        None => black_level(&fits),
     };
     if black >= white {
         let problem = format!("the black level {black} is not below white, {white}");
         return Err(Error::usage("--black", problem));
     }
-    let line = |kind: NoiseKind, of: fn(&SettingFit) -> f64| {
-        let points = fits.iter().map(|fit| [fit.gain.value, of(fit)]);
-        NoiseLine::fit(&points.collect::<Vec<_>>(), kind)
+    let line = |kind: NoiseKind, deviation: fn(&SettingFit) -> f64| {
+        let points: Vec<_> = fits
+            .iter()
+            .map(|fit| [fit.gain.value, deviation(fit)])
+            .collect();
+        NoiseLine::fit(&points, kind)
     };
     Ok(CameraFit {
         schema: "darkqa.calibration/1",
@@ -182,11 +188,13 @@ pub(crate) fn calibrate(
     })
 }
 
-/// The whole number nearest to the mean offset of all planes of all settings.
-fn black(fits: &[SettingFit]) -> u16 {
-    let offsets = fits.iter().flat_map(|fit| &fit.offsets);
-    let [count, sum] = offsets.fold([0.0; 2], |[count, sum], offset| {
-        [count + 1.0, sum + offset.value]
-    });
+/// Black level in ADU: the mean offset of all planes of all settings, rounded.
+fn black_level(fits: &[SettingFit]) -> u16 {
+    let [count, sum] = fits
+        .iter()
+        .flat_map(|fit| &fit.offsets)
+        .fold([0.0; 2], |[count, sum], offset| {
+            [count + 1.0, sum + offset.value]
+        });
     (sum / f64::max(count, 1.0)).round() as u16
 }

@@ -1,4 +1,4 @@
-//! The code of white, from overexposed frames: [`white_code`].
+//! Code of white from overexposed frames: [`white_code`].
 
 use std::path::PathBuf;
 
@@ -8,13 +8,13 @@ use super::inputs::Inputs;
 use super::recording::Recording;
 use crate::error::{Error, Result};
 
-/// Least share of the samples of an overexposed frame at its greatest code (chosen).
-const AT_WHITE: f64 = 0.5;
+/// Minimum share of the samples of an overexposed frame at its maximum code (chosen).
+const MIN_AT_WHITE: f64 = 0.5;
 
-/// The greatest code of all overexposed frames.
+/// Maximum code of all overexposed frames.
 ///
 /// # Errors
-/// If there are none, one is not overexposed, or they end at different codes.
+/// If no such frame exists, a frame is not overexposed, or their maximum codes differ.
 pub(super) fn white_code(
     reader: &FrameReader,
     recording: &Recording,
@@ -36,11 +36,11 @@ pub(super) fn white_code(
             .filter(|sample| **sample == top)
             .count();
         let share = with_it as f64 / frame.samples.len() as f64;
-        if share < AT_WHITE {
+        if share < MIN_AT_WHITE {
             let problem = format!(
                 "{:.1} % of the samples are at the greatest code, {top}, and a frame in white/ needs {:.0} %: overexpose it more, or state the code of white with --white",
                 100.0 * share,
-                100.0 * AT_WHITE
+                100.0 * MIN_AT_WHITE
             );
             return Err(Error::data(path.display(), problem));
         }

@@ -107,11 +107,11 @@ impl Dispatcher<'_> {
             .models
             .iter()
             .filter_map(|model| model.server.as_ref())
-            .map(|server| server.most_in_flight())
+            .map(|server| server.max_in_flight())
             .max();
         CircuitBreaker::new(
             self.models,
-            most.unwrap_or(self.settings.concurrency.most()),
+            most.unwrap_or(self.settings.concurrency.max()),
             self.settings.money.max_failures,
         )
         .failing_fast(self.settings.money.fail_fast)
@@ -170,7 +170,7 @@ enum Said {
 
 impl<I: Item> ReplySink<'_, I> {
     async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
-        let concurrency = self.dispatcher.settings.concurrency.most();
+        let concurrency = self.dispatcher.settings.concurrency.max();
         let mut lanes = Lanes::<I>::new(self.dispatcher.models, concurrency);
         lanes.keep_within_open_files(self.dispatcher.settings.loading.threads);
         let mut in_flight = JoinSet::<Finished<I>>::new();

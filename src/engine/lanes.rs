@@ -95,7 +95,7 @@ impl<'a, I> Lanes<'a, I> {
         {
             lane.max_in_flight = (requests / addresses * lane.addresses).max(1);
             let server = self.models[lane.models[0]].server.as_ref();
-            most += server.map_or(0, |server| server.most_in_flight());
+            most += server.map_or(0, |server| server.max_in_flight());
         }
         if most > requests {
             tracing::warn!(

@@ -93,7 +93,7 @@ impl ModelUnderTest {
         stimulus: &Stimulus,
     ) -> Record<I::Detail> {
         Record {
-            max_tokens: self.model.grown_limit(),
+            max_tokens: self.model.raised_limit(),
             ..I::blank(trial, stimulus, &self.name)
         }
     }

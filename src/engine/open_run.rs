@@ -494,7 +494,7 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
         .into_iter()
         .filter_map(|server| {
             let stated = server.sending.max_image;
-            let stated = stated.map(|megabytes| ImageLimit::stated((megabytes * 1e6) as usize));
+            let stated = stated.map(|megabytes| ImageLimit::from_user((megabytes * 1e6) as usize));
             let known = server.replicas.iter().map(ImageLimit::from_access);
             stated.or_else(|| known.reduce(ImageLimit::stricter))
         })
@@ -540,7 +540,7 @@ pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> H
 pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> HashSet<TrialKey> {
     let limits: HashMap<&str, u32> = models
         .iter()
-        .filter_map(|model| Some((&*model.name, model.model.grown_limit()?)))
+        .filter_map(|model| Some((&*model.name, model.model.raised_limit()?)))
         .collect();
     let is_truncated = |trial: &&StoredTrial| {
         let limit = limits.get(trial.model.as_str());

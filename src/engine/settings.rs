@@ -9,7 +9,7 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use crate::ask::{AccessArgs, Bounds, Constrain, Parameters, RequestArgs, Sending};
+use crate::ask::{AccessArgs, ConcurrencyBounds, Constrain, Parameters, RequestArgs, Sending};
 use crate::engine::costs::{MoneyArgs, MoneySettings};
 use crate::engine::models::{
     AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline,
@@ -142,7 +142,7 @@ pub(crate) struct JobSettings {
     /// Longest side of an image as sent, in pixels; `None` for no limit.
     pub max_side: Option<NonZeroU32>,
     /// Bounds of the number of requests in flight.
-    pub concurrency: Bounds,
+    pub concurrency: ConcurrencyBounds,
     /// Limits of cost and failures.
     pub money: MoneySettings,
     /// Shard of the run that this process runs.

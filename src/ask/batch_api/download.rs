@@ -1,4 +1,4 @@
-//! Removal of keys from a file that a server sent: [`remove_secrets`].
+//! Removal of keys from a downloaded file: [`remove_secrets`].
 
 use std::fs;
 use std::io::{self, BufRead as _, BufReader, BufWriter, Write as _};
@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::ask::secrets::Scrub;
 use crate::files::{create_new, reading};
 
-/// Removes keys from the lines of a file. A file without any of them is not written again.
+/// Removes keys from the JSON lines of a file. A file without keys is not rewritten.
 pub(super) fn remove_secrets(path: &Path, scrub: &Scrub) -> io::Result<()> {
     if scrub.is_empty() || !has_secrets(path, scrub)? {
         return Ok(());
@@ -22,6 +22,7 @@ pub(super) fn remove_secrets(path: &Path, scrub: &Scrub) -> io::Result<()> {
     fs::rename(&cleaned, path)
 }
 
+/// True if a line of the file contains a key.
 fn has_secrets(path: &Path, scrub: &Scrub) -> io::Result<bool> {
     let mut found = false;
     for_each_line(path, |line| {
@@ -32,12 +33,12 @@ fn has_secrets(path: &Path, scrub: &Scrub) -> io::Result<bool> {
     Ok(found)
 }
 
-/// Calls `take` with each line of a file and its line end.
-fn for_each_line(path: &Path, mut take: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
+/// Calls `visit` with each line of a file, including its line end.
+fn for_each_line(path: &Path, mut visit: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
     let mut file = BufReader::new(reading::open(path)?);
     let mut line = Vec::new();
     while file.read_until(b'\n', &mut line)? > 0 {
-        take(&line)?;
+        visit(&line)?;
         line.clear();
     }
     Ok(())
@@ -48,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_removed_and_all_else_stays_byte_by_byte() {
+    fn only_keys_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("part.download");
         let scrub = Scrub::new(["sk-0123456789abcdef".to_owned()]);
@@ -61,7 +62,7 @@ mod tests {
             after(b"{\"a\": 1}\r\n\n{\"key\": \"sk-0123456789abcdef\"}"),
             b"{\"a\": 1}\r\n\n{\"key\": \"[secret]\"}"
         );
-        // Parts of a key within a string are removed; strings stay apart, and so do ids.
+        // Parts of a key within one string are removed, but not across strings or in ids.
         assert_eq!(
             after(br#"{"custom_id": "abc0123456789abcdef", "b": ["0123", "4567"], "c": "\u0030123 4567 89a"}"#),
             br#"{"custom_id": "abc0123456789abcdef", "b": ["0123", "4567"], "c": "[secret]"}"#

@@ -1,6 +1,6 @@
-//! The files and batches of a server, by OpenAI's interface: [`BatchServer`].
+//! Client of OpenAI's Files and Batch APIs: [`BatchServer`].
 //!
-//! Each call is sent once. Whether it is repeated is decided by the caller, who knows what may have happened at the server.
+//! Each call is sent once. The caller decides whether to repeat it, because a failed call may have had an effect at the server.
 
 mod download;
 mod objects;
@@ -14,9 +14,9 @@ use reqwest::{Method, RequestBuilder};
 use serde_json::{Value, json};
 
 use super::batch::BatchLine;
-use super::endpoints::{Connection, Deadline, HttpReply};
-use super::failures::{AskError, Complaint, QuotaRefusal};
-use super::pace::asked_wait;
+use super::endpoints::{Connection, Deadline, HttpResponse};
+use super::failures::{ApiError, AskError, QuotaRefusal};
+use super::pace::retry_after;
 use super::replies::bounded_json::parse;
 use crate::types::FailureKind;
 
@@ -25,16 +25,16 @@ use objects::MARK;
 pub(crate) use objects::{BatchState, Readiness, RemoteBatch, RemoteFile};
 use upload::FileForm;
 
-/// The slowest upload that is waited for, in bytes per second; chosen.
-const SLOWEST: u64 = 50_000;
+/// Minimum speed of an upload, in bytes per second, for its time limit; chosen.
+const MIN_UPLOAD_SPEED: u64 = 50_000;
 
-/// The most pages of a list that are read; chosen: 10,000 files or batches.
-const MOST_PAGES: usize = 100;
+/// Maximum number of pages of a list to request; chosen: 10,000 files or batches.
+const MAX_PAGES: usize = 100;
 
-/// The result of a call. Callers use the message, status, wait, effect and quota of its error alone.
+/// Result of a call. Callers use only the message, status, wait, effect and quota of the error.
 pub(crate) type ApiResult<T> = Result<T, AskError>;
 
-/// A server with files and batches.
+/// Client of the Files and Batch APIs of a server.
 #[derive(Debug)]
 pub(crate) struct BatchServer {
     connection: Connection,
@@ -42,21 +42,21 @@ pub(crate) struct BatchServer {
     timeout: Duration,
 }
 
-/// The parts of a new batch.
+/// Parameters of a new batch.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct NewBatch<'a> {
-    /// The server's name of the input file.
+    /// Id of the input file.
     pub file: &'a str,
-    /// The path of the requests, as `/v1/chat/completions`.
+    /// Path of the requests, such as `/v1/chat/completions`.
     pub url: &'a str,
-    /// The time within which the batch is worked on, as `24h`.
+    /// Completion window, such as `24h`.
     pub window: &'a str,
-    /// The mark by which the batch is found again.
+    /// Mark in the metadata, by which the program finds the batch again.
     pub mark: &'a str,
 }
 
 impl BatchServer {
-    /// The server behind these connections; nothing is sent yet.
+    /// Creates a client that uses these connections; nothing is sent yet.
     pub(super) fn new(connection: Connection, headers: HeaderMap, timeout: Duration) -> Self {
         Self {
             connection,
@@ -72,7 +72,7 @@ impl BatchServer {
         name: &str,
         purpose: &str,
     ) -> ApiResult<RemoteFile> {
-        // No line of a file of requests has this text: a line is one JSON object, and the text follows no line end in it.
+        // The boundary cannot occur in a file of requests: every line is one JSON object.
         let boundary = format!("darkqa-{name}").replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let boundary: String = boundary.chars().take(70).collect();
         let form = FileForm::open(path, name, purpose, &boundary).map_err(|e| AskError {
@@ -80,57 +80,60 @@ impl BatchServer {
             ..self.unreadable(&format!("{} could not be read: {e}", path.display()))
         })?;
         let bytes = path.metadata().map_or(0, |file| file.len());
-        let kind = format!("multipart/form-data; boundary={boundary}");
+        let content_type = format!("multipart/form-data; boundary={boundary}");
         let request = self
             .request(Method::POST, "files", &[])
-            .header(CONTENT_TYPE, kind)
+            .header(CONTENT_TYPE, content_type)
             .body(reqwest::Body::wrap(form));
-        let time = self.timeout + Duration::from_secs(bytes / SLOWEST);
-        let answer = self.send_within(request, time).await?;
-        let object = self.read_object(&answer)?;
-        RemoteFile::read(&object).ok_or_else(|| self.unreadable("a file without an id"))
+        let timeout = self.timeout + Duration::from_secs(bytes / MIN_UPLOAD_SPEED);
+        let response = self.send_within(timeout, request).await?;
+        let object = self.parse_json(&response)?;
+        RemoteFile::from_json(&object).ok_or_else(|| self.unreadable("a file without an id"))
     }
 
-    /// The file with this id.
+    /// Requests the file object with this id.
     pub(crate) async fn file(&self, id: &str) -> ApiResult<RemoteFile> {
-        let request = self.request(Method::GET, &format!("files/{}", segment(id)), &[]);
-        let object = self.object(request).await?;
-        RemoteFile::read(&object).ok_or_else(|| self.unreadable("a file without an id"))
+        let request = self.request(Method::GET, &format!("files/{}", path_segment(id)), &[]);
+        let object = self.request_json(request).await?;
+        RemoteFile::from_json(&object).ok_or_else(|| self.unreadable("a file without an id"))
     }
 
-    /// All files of a purpose.
+    /// Lists all files of a purpose.
     pub(crate) async fn files(&self, purpose: &str) -> ApiResult<Vec<RemoteFile>> {
         let items = self.list("files", &[("purpose", purpose)]).await?;
-        Ok(items.iter().filter_map(RemoteFile::read).collect())
+        Ok(items.iter().filter_map(RemoteFile::from_json).collect())
     }
 
-    /// Writes the content of a file to a path, at most this number of bytes, without keys that the server repeats in it.
-    pub(crate) async fn download(&self, id: &str, to: &Path, most: u64) -> ApiResult<()> {
-        let path = format!("files/{}/content", segment(id));
+    /// Downloads a file of at most `max_bytes` bytes to a path, and removes keys that the server repeats in it.
+    pub(crate) async fn download(&self, id: &str, to: &Path, max_bytes: u64) -> ApiResult<()> {
+        let path = format!("files/{}/content", path_segment(id));
         let request = self.request(Method::GET, &path, &[]);
-        let sent = self.connection.save(request, to, most).await;
-        let answer = sent.map_err(not_answered)?;
-        self.succeeded(answer)?;
+        let response = self
+            .connection
+            .download(request, to, max_bytes)
+            .await
+            .map_err(with_possible_effect)?;
+        self.check_status(response)?;
         remove_secrets(to, &self.connection.scrub).map_err(|e| {
             let message = format!("{}: keys in it could not be removed: {e}", to.display());
             AskError::new(FailureKind::Request, message)
         })
     }
 
-    /// Reads a line of a file that this server sent; `None` if the line is not one of a file of replies. Keys that are sent to the server
-    /// are removed from it.
+    /// Parses a line of an output or error file of this server, and removes the keys sent to the server. `None` if the line has another
+    /// form.
     #[must_use]
     pub(crate) fn line(&self, line: &str) -> Option<BatchLine> {
-        BatchLine::without_secrets(line, &self.connection.scrub)
+        BatchLine::read_without_secrets(line, &self.connection.scrub)
     }
 
     /// Deletes a file.
     pub(crate) async fn delete(&self, id: &str) -> ApiResult<()> {
-        let request = self.request(Method::DELETE, &format!("files/{}", segment(id)), &[]);
+        let request = self.request(Method::DELETE, &format!("files/{}", path_segment(id)), &[]);
         self.send(request).await.map(drop)
     }
 
-    /// Makes a batch.
+    /// Creates a batch.
     pub(crate) async fn create(&self, new: NewBatch<'_>) -> ApiResult<RemoteBatch> {
         let body = json!({
             "input_file_id": new.file, "endpoint": new.url, "completion_window": new.window,
@@ -140,50 +143,58 @@ impl BatchServer {
             .request(Method::POST, "batches", &[])
             .header(CONTENT_TYPE, "application/json")
             .body(body.to_string());
-        self.read_batch(request).await
+        self.request_batch(request).await
     }
 
-    /// The batch with this id.
+    /// Requests the batch with this id.
     pub(crate) async fn batch(&self, id: &str) -> ApiResult<RemoteBatch> {
-        let path = format!("batches/{}", segment(id));
-        self.read_batch(self.request(Method::GET, &path, &[])).await
+        let path = format!("batches/{}", path_segment(id));
+        self.request_batch(self.request(Method::GET, &path, &[]))
+            .await
     }
 
-    /// All batches.
+    /// Lists all batches.
     pub(crate) async fn batches(&self) -> ApiResult<Vec<RemoteBatch>> {
         let items = self.list("batches", &[]).await?;
-        let read = |item| RemoteBatch::read(item, &self.connection.scrub);
-        Ok(items.iter().filter_map(read).collect())
+        Ok(items
+            .iter()
+            .filter_map(|item| RemoteBatch::from_json(item, &self.connection.scrub))
+            .collect())
     }
 
     /// Asks the server to cancel a batch.
     pub(crate) async fn cancel(&self, id: &str) -> ApiResult<()> {
-        let path = format!("batches/{}/cancel", segment(id));
+        let path = format!("batches/{}/cancel", path_segment(id));
         self.send(self.request(Method::POST, &path, &[]))
             .await
             .map(drop)
     }
 
-    async fn read_batch(&self, request: RequestBuilder) -> ApiResult<RemoteBatch> {
-        let object = self.object(request).await?;
-        RemoteBatch::read(&object, &self.connection.scrub)
+    /// Sends a request whose response is a batch.
+    async fn request_batch(&self, request: RequestBuilder) -> ApiResult<RemoteBatch> {
+        let object = self.request_json(request).await?;
+        RemoteBatch::from_json(&object, &self.connection.scrub)
             .ok_or_else(|| self.unreadable("a batch without id or status"))
     }
 
-    /// All items of a list, page by page.
+    /// Requests all items of a list, page by page.
     async fn list(&self, path: &str, query: &[(&str, &str)]) -> ApiResult<Vec<Value>> {
         let mut items = Vec::new();
         let mut after: Option<String> = None;
-        for _ in 0..MOST_PAGES {
+        for _ in 0..MAX_PAGES {
             let mut query = query.to_vec();
             query.push(("limit", "100"));
             query.extend(after.as_deref().map(|after| ("after", after)));
-            let page = self.object(self.request(Method::GET, path, &query)).await?;
-            // Together sends the list alone.
+            let page = self
+                .request_json(self.request(Method::GET, path, &query))
+                .await?;
+            // Together sends the list without an object around it.
             let data = page.get("data").unwrap_or(&page);
             let data = data.as_array().cloned().unwrap_or_default();
-            let last = data.last().and_then(|item| item.get("id")?.as_str());
-            let last = last.map(str::to_owned);
+            let last = data
+                .last()
+                .and_then(|item| item.get("id")?.as_str())
+                .map(str::to_owned);
             items.extend(data);
             let has_more = page.get("has_more").and_then(Value::as_bool) == Some(true);
             match last {
@@ -194,68 +205,77 @@ impl BatchServer {
         Ok(items)
     }
 
+    /// Builds a request with the headers of the account.
     fn request(&self, method: Method, path: &str, query: &[(&str, &str)]) -> RequestBuilder {
         self.connection
             .request(method, path, query)
             .headers(self.headers.clone())
     }
 
-    /// The JSON object in the response to a request.
-    async fn object(&self, request: RequestBuilder) -> ApiResult<Value> {
-        self.read_object(&self.send(request).await?)
+    /// Sends a request whose response is JSON.
+    async fn request_json(&self, request: RequestBuilder) -> ApiResult<Value> {
+        self.parse_json(&self.send(request).await?)
     }
 
-    fn read_object(&self, answer: &HttpReply) -> ApiResult<Value> {
-        let text = String::from_utf8_lossy(&answer.body);
+    fn parse_json(&self, response: &HttpResponse) -> ApiResult<Value> {
+        let text = String::from_utf8_lossy(&response.body);
         parse(&text).map_err(|_| self.unreadable("no JSON"))
     }
 
-    /// The response to a request that succeeded.
-    async fn send(&self, request: RequestBuilder) -> ApiResult<HttpReply> {
-        self.send_within(request, self.timeout).await
+    /// Sends a request, and checks the status of the response.
+    async fn send(&self, request: RequestBuilder) -> ApiResult<HttpResponse> {
+        self.send_within(self.timeout, request).await
     }
 
-    /// The response to a request that succeeded within a time.
-    async fn send_within(&self, request: RequestBuilder, time: Duration) -> ApiResult<HttpReply> {
-        let sent = self.connection.exchange(request, Deadline::whole(time));
-        self.succeeded(sent.await.map_err(not_answered)?)
+    /// Sends a request with this timeout, and checks the status of the response.
+    async fn send_within(
+        &self,
+        timeout: Duration,
+        request: RequestBuilder,
+    ) -> ApiResult<HttpResponse> {
+        let response = self
+            .connection
+            .exchange(request, Deadline::total(timeout))
+            .await
+            .map_err(with_possible_effect)?;
+        self.check_status(response)
     }
 
-    /// The response itself, if its status states that the call succeeded.
-    fn succeeded(&self, answer: HttpReply) -> ApiResult<HttpReply> {
-        if answer.status.is_success() {
-            return Ok(answer);
+    /// Returns the response if it has a success status, otherwise the error in it.
+    fn check_status(&self, response: HttpResponse) -> ApiResult<HttpResponse> {
+        if response.status.is_success() {
+            return Ok(response);
         }
-        let status = answer.status.as_u16();
-        let complaint = Complaint::from_body(&String::from_utf8_lossy(&answer.body));
+        let status = response.status.as_u16();
+        let api_error = ApiError::from_body(&String::from_utf8_lossy(&response.body));
         let (base, scrub) = (&self.connection.base, &self.connection.scrub);
-        let text = scrub.line(&complaint.message);
+        let text = scrub.line(&api_error.message);
         let separator = if text.is_empty() { "" } else { ": " };
         let message = format!("{base} answered {status}{separator}{text}");
         let mut failed = AskError::new(FailureKind::Request, message);
         failed.failure.status = Some(status);
         failed.may_have_effect = status >= 500;
-        failed.wait = asked_wait(&answer.headers, SystemTime::now()).max(complaint.wait);
-        failed.quota = QuotaRefusal::from_complaint(&complaint, scrub).map(Box::new);
+        failed.wait = retry_after(&response.headers, SystemTime::now()).max(api_error.wait);
+        failed.quota = QuotaRefusal::from_api_error(&api_error, scrub).map(Box::new);
         Err(failed)
     }
 
-    /// The failure of a call that the server answered with something else.
+    /// Error of a call whose response has another form than expected.
     fn unreadable(&self, what: &str) -> AskError {
         let message = format!("{} answered with {what}", self.connection.base);
         AskError::new(FailureKind::Response, message)
     }
 }
 
-/// The failure of a call without a complete response.
-fn not_answered(failed: AskError) -> AskError {
+/// Marks the error of a call without a complete response: the call may have had an effect.
+fn with_possible_effect(error: AskError) -> AskError {
     AskError {
         may_have_effect: true,
-        ..failed
+        ..error
     }
 }
 
-/// An id as a segment of a path.
-fn segment(id: &str) -> String {
+/// An id, percent-encoded as a segment of a path.
+fn path_segment(id: &str) -> String {
     percent_encoding::utf8_percent_encode(id, percent_encoding::NON_ALPHANUMERIC).to_string()
 }

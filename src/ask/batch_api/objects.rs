@@ -2,36 +2,36 @@
 
 use serde_json::Value;
 
-use crate::ask::failures::{Complaint, QuotaRefusal};
+use crate::ask::failures::{ApiError, QuotaRefusal};
 use crate::ask::secrets::Scrub;
 
 /// A file at a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct RemoteFile {
-    /// The server's name of the file.
+    /// Id of the file at the server.
     pub id: String,
-    /// The name under which it was uploaded; empty if the server does not state it.
+    /// Name under which it was uploaded; empty if the server does not report it.
     pub name: String,
-    /// The number of bytes; `None` if the server does not state it.
+    /// Size in bytes; `None` if the server does not report it.
     pub bytes: Option<u64>,
-    /// Whether a batch may be made of it.
+    /// Whether a batch can be created from it.
     pub readiness: Readiness,
 }
 
-/// Whether a batch may be made of a file.
+/// Whether a batch can be created from a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Readiness {
-    /// It may.
+    /// A batch can be created.
     Ready,
-    /// The server is still reading the file, as Azure does after an upload.
+    /// The server is still processing the file, as Azure does after an upload.
     Pending,
     /// The server could not read the file.
     Refused,
 }
 
 impl RemoteFile {
-    /// The file in a server's object; `None` if the object has no id.
-    pub(super) fn read(object: &Value) -> Option<Self> {
+    /// Parses a file object; `None` if it has no id.
+    pub(super) fn from_json(object: &Value) -> Option<Self> {
         let status = object.get("status").and_then(Value::as_str);
         let readiness = match status.unwrap_or_default().to_lowercase().as_str() {
             "pending" | "running" | "uploading" | "processing" => Readiness::Pending,
@@ -47,26 +47,26 @@ impl RemoteFile {
     }
 }
 
-/// The state of a batch.
+/// State of a batch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum BatchState {
-    /// The server works on it; in the server's word.
+    /// The server is working on it; with the server's name of the state.
     Working(String),
-    /// The server has ended it, with replies to all or some requests.
+    /// Completed, with replies to all or some requests.
     Completed,
-    /// The server could not begin it.
+    /// The server could not start it.
     Failed,
-    /// Its time is over; there may be replies to some requests.
+    /// Its completion window has ended; some requests may have replies.
     Expired,
-    /// It was cancelled; there may be replies to some requests.
+    /// Cancelled; some requests may have replies.
     Cancelled,
-    /// A word that is not known; the batch may still be worked on.
+    /// An unknown state; the server may still be working on it.
     Unknown(String),
 }
 
 impl BatchState {
-    /// The states of OpenAI's batches in any case, and the words that other servers have for them.
-    pub(super) fn read(word: &str) -> Self {
+    /// Parses the name of a state, of OpenAI or of another server, ignoring case.
+    pub(super) fn from_name(word: &str) -> Self {
         match word.to_lowercase().as_str() {
             working @ ("validating" | "queued" | "pending" | "running" | "in_progress"
             | "finalizing" | "cancelling" | "canceling") => Self::Working(working.to_owned()),
@@ -78,7 +78,7 @@ impl BatchState {
         }
     }
 
-    /// The word for the state.
+    /// Name of the state.
     pub(crate) fn word(&self) -> &str {
         match self {
             Self::Working(word) | Self::Unknown(word) => word,
@@ -90,20 +90,20 @@ impl BatchState {
     }
 }
 
-/// The numbers of requests in a batch.
+/// Numbers of requests in a batch.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct RequestCounts {
     /// Requests with a reply.
     pub answered: u64,
     /// Requests with a reply or a failure.
     pub done: u64,
-    /// All requests; 0 while the server has not counted them.
+    /// All requests; 0 until the server has counted them.
     pub total: u64,
 }
 
 impl RequestCounts {
-    /// Whether the server has counted anything.
-    pub(crate) fn is_stated(self) -> bool {
+    /// True if the server reports counts.
+    pub(crate) fn is_known(self) -> bool {
         self.total > 0 || self.done > 0
     }
 }
@@ -111,67 +111,68 @@ impl RequestCounts {
 /// A batch at a server.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct RemoteBatch {
-    /// The server's name of the batch.
+    /// Id of the batch at the server.
     pub id: String,
-    /// The state of the batch.
+    /// State of the batch.
     pub state: BatchState,
-    /// The file of replies; `None` if there is none.
+    /// Id of the file of replies; `None` if it does not exist.
     pub output_file: Option<String>,
-    /// The file of failed requests; `None` if there is none.
+    /// Id of the file of failed requests; `None` if it does not exist.
     pub error_file: Option<String>,
-    /// The numbers of requests.
+    /// Numbers of requests.
     pub counts: RequestCounts,
-    /// The first error of a batch that failed, with its line; empty if there is none.
+    /// First error of a failed batch, with its line; empty without one.
     pub problem: String,
-    /// The refusal of a batch that failed because too many tokens wait; `None` if it failed for another reason.
+    /// Refusal because too many tokens are enqueued; `None` if the batch did not fail or failed for another reason.
     pub quota: Option<QuotaRefusal>,
-    /// The mark that the program gave the batch; empty if it has none.
+    /// Mark of the program in the metadata; empty if it has none.
     pub mark: String,
 }
 
 impl RemoteBatch {
-    /// The batch in a server's object; `None` if the object has no id or no state.
-    pub(super) fn read(object: &Value, scrub: &Scrub) -> Option<Self> {
-        let errors = object.get("errors").and_then(|errors| {
-            let list = errors.get("data").unwrap_or(errors);
-            list.as_array().cloned()
-        });
-        let errors = errors.unwrap_or_default();
+    /// Parses a batch object; `None` if it has no id or no state.
+    pub(super) fn from_json(object: &Value, scrub: &Scrub) -> Option<Self> {
+        let errors = object
+            .get("errors")
+            .and_then(|errors| errors.get("data").unwrap_or(errors).as_array())
+            .map_or(&[][..], Vec::as_slice);
         let counts = object.get("request_counts");
-        let count = |name| counts.and_then(|counts| counts.get(name)?.as_u64());
+        let count = |name| {
+            counts
+                .and_then(|counts| counts.get(name)?.as_u64())
+                .unwrap_or(0)
+        };
         let mark = object.get("metadata").and_then(|data| text(data, MARK));
         Some(Self {
             id: text(object, "id")?,
-            state: BatchState::read(&scrub.line(&text(object, "status")?)),
+            state: BatchState::from_name(&scrub.line(&text(object, "status")?)),
             output_file: text(object, "output_file_id"),
             error_file: text(object, "error_file_id"),
             counts: RequestCounts {
-                answered: count("completed").unwrap_or(0),
-                done: count("completed")
-                    .unwrap_or(0)
-                    .saturating_add(count("failed").unwrap_or(0)),
-                total: count("total").unwrap_or(0),
+                answered: count("completed"),
+                done: count("completed").saturating_add(count("failed")),
+                total: count("total"),
             },
             problem: errors
                 .first()
                 .map_or_else(String::new, |e| problem(e, scrub)),
             quota: errors.iter().find_map(|error| {
-                let complaint = Complaint::from_error(error);
-                QuotaRefusal::from_complaint(&complaint, scrub)
+                let api_error = ApiError::from_error(error);
+                QuotaRefusal::from_api_error(&api_error, scrub)
             }),
             mark: mark.unwrap_or_default(),
         })
     }
 }
 
-/// The field of a batch's metadata that holds the mark of the program.
+/// Field of a batch's metadata with the mark of the program.
 pub(super) const MARK: &str = "darkqa";
 
-/// An error of a batch, with the line of the input file that it is about.
+/// Message of a batch error, with the line number in the input file.
 fn problem(error: &Value, scrub: &Scrub) -> String {
-    let complaint = Complaint::from_error(error);
-    let text = scrub.line(&complaint.message);
-    let text = match &complaint.code {
+    let api_error = ApiError::from_error(error);
+    let text = scrub.line(&api_error.message);
+    let text = match &api_error.code {
         Some(code) => format!("{text} ({})", scrub.line(code)),
         None => text,
     };
@@ -181,7 +182,7 @@ fn problem(error: &Value, scrub: &Scrub) -> String {
     }
 }
 
-/// A field that is a text with at least one character.
+/// A non-empty string in a field of an object.
 fn text(object: &Value, field: &str) -> Option<String> {
     let text = object.get(field)?.as_str()?;
     (!text.is_empty()).then(|| text.to_owned())
@@ -193,7 +194,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn states_are_read_in_any_case_and_unknown_ones_are_kept() {
+    fn states_are_parsed_in_any_case() {
         for (word, state) in [
             ("in_progress", BatchState::Working("in_progress".into())),
             ("IN_PROGRESS", BatchState::Working("in_progress".into())),
@@ -203,15 +204,15 @@ mod tests {
             ("FAILED", BatchState::Failed),
             ("dreaming", BatchState::Unknown("dreaming".into())),
         ] {
-            assert_eq!(BatchState::read(word), state, "{word}");
+            assert_eq!(BatchState::from_name(word), state, "{word}");
         }
     }
 
     #[test]
-    fn a_failed_batch_names_its_line_or_its_quota() {
+    fn a_failed_batch_has_its_line_or_quota() {
         let read = |errors: Value| {
             let object = json!({"id": "b", "status": "failed", "errors": errors});
-            RemoteBatch::read(&object, &Scrub::default()).unwrap()
+            RemoteBatch::from_json(&object, &Scrub::default()).unwrap()
         };
         let line = read(json!({"object": "list", "data": [
             {"code": "invalid_json_line", "message": "not JSON", "param": null, "line": 7},

@@ -1,4 +1,4 @@
-//! The body of an upload: [`FileForm`], a form with a file that is read while it is sent.
+//! Body of an upload: [`FileForm`], a multipart form with a file that is read while it is sent.
 
 use std::fs::File;
 use std::io::{self, Read as _};
@@ -11,20 +11,20 @@ use hyper::body::{Body, Frame, SizeHint};
 
 use crate::files::reading;
 
-/// The number of bytes that are read at once; chosen.
+/// Number of bytes to read at once; chosen.
 const CHUNK: usize = 256 * 1024;
 
-/// A form of type `multipart/form-data` (RFC 7578) with one text field and one file. The file is never in memory as a whole.
+/// A `multipart/form-data` body (RFC 7578) with one text field and one file, which is never in memory as a whole.
 pub(super) struct FileForm {
     head: Bytes,
     file: File,
-    /// Bytes of the file that are still to be sent.
+    /// Number of bytes of the file that are not yet sent.
     left: u64,
     tail: Bytes,
 }
 
 impl FileForm {
-    /// A form with the field `purpose` and the file `file`, under this name.
+    /// Creates a form with the field `purpose` and the file `file` under this name.
     ///
     /// # Errors
     /// If the file cannot be opened.
@@ -45,8 +45,8 @@ impl FileForm {
         })
     }
 
-    /// The next piece; `None` at the end.
-    fn next(&mut self) -> io::Result<Option<Bytes>> {
+    /// Reads the next chunk; `None` at the end.
+    fn next_chunk(&mut self) -> io::Result<Option<Bytes>> {
         if !self.head.is_empty() {
             return Ok(Some(std::mem::take(&mut self.head)));
         }
@@ -69,7 +69,11 @@ impl Body for FileForm {
         mut self: Pin<&mut Self>,
         _: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, io::Error>>> {
-        Poll::Ready(self.next().map(|piece| piece.map(Frame::data)).transpose())
+        Poll::Ready(
+            self.next_chunk()
+                .map(|chunk| chunk.map(Frame::data))
+                .transpose(),
+        )
     }
 
     fn is_end_stream(&self) -> bool {
@@ -78,8 +82,8 @@ impl Body for FileForm {
 
     /// The exact size, so that the request has a `Content-Length`.
     fn size_hint(&self) -> SizeHint {
-        let texts = self.head.len() + self.tail.len();
-        SizeHint::with_exact(texts as u64 + self.left)
+        let head_and_tail = self.head.len() + self.tail.len();
+        SizeHint::with_exact(head_and_tail as u64 + self.left)
     }
 }
 
@@ -88,25 +92,25 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_is_framed_and_the_size_is_exact() {
+    fn the_form_has_an_exact_size() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let content = b"{\"custom_id\":1}\n".repeat(40_000);
         std::fs::write(file.path(), &content).unwrap();
         let mut form = FileForm::open(file.path(), "a.jsonl", "batch", "XX").unwrap();
         let size = form.size_hint().exact().unwrap();
-        let (mut sent, mut pieces) = (Vec::new(), 0);
-        while let Some(piece) = form.next().unwrap() {
-            assert!(piece.len() <= CHUNK);
-            sent.extend_from_slice(&piece);
-            pieces += 1;
+        let (mut sent, mut chunks) = (Vec::new(), 0);
+        while let Some(chunk) = form.next_chunk().unwrap() {
+            assert!(chunk.len() <= CHUNK);
+            sent.extend_from_slice(&chunk);
+            chunks += 1;
         }
         assert!(form.is_end_stream());
         assert_eq!(sent.len() as u64, size);
-        assert!(pieces > 3, "{pieces}");
+        assert!(chunks > 3, "{chunks}");
         let text = String::from_utf8(sent).unwrap();
-        let begin =
+        let start =
             "--XX\r\nContent-Disposition: form-data; name=\"purpose\"\r\n\r\nbatch\r\n--XX\r\n";
-        assert!(text.starts_with(begin), "{}", &text[..200]);
+        assert!(text.starts_with(start), "{}", &text[..200]);
         assert!(text.ends_with("\n\r\n--XX--\r\n"));
         assert!(text.contains("filename=\"a.jsonl\""));
     }

@@ -1,7 +1,7 @@
-//! The number of tokens that a model counts for an image: [`image_tokens`].
+//! Number of tokens that a model counts for an image: [`image_tokens`].
 //!
-//! It is used only for estimates before anything is sent; the server states what a reply was charged. The families and the sources
-//! of their rules are in `image_tokens.toml`.
+//! It is used only for estimates before a request is sent; afterwards the server reports the charged tokens. The model families and the
+//! sources of their rules are in `image_tokens.toml`.
 
 use std::sync::LazyLock;
 
@@ -9,13 +9,13 @@ use serde::Deserialize;
 
 use crate::ask::requests::ImageDetail;
 
-/// The table that comes with the program.
+/// The built-in table.
 static TABLE: LazyLock<Table> = LazyLock::new(|| {
     let text = include_str!("../image_tokens.toml");
     toml::from_str(text).unwrap_or_else(|e| unreachable!("a test reads image_tokens.toml: {e}"))
 });
 
-/// The families of models, with the date of the table.
+/// Table of model families, with its date.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct Table {
@@ -24,16 +24,16 @@ struct Table {
     family: Vec<Family>,
 }
 
-/// Models that count in the same way.
+/// Models with the same rule.
 #[derive(Debug, Deserialize)]
 struct Family {
-    /// Beginnings of their names.
+    /// Prefixes of their names.
     begins: Vec<String>,
     #[serde(flatten)]
     rule: Rule,
 }
 
-/// The rule by which a family of models counts the tokens of an image; `image_tokens.toml` states what each is.
+/// Rule by which a family of models counts the tokens of an image; explained in `image_tokens.toml`.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(
     deny_unknown_fields,
@@ -48,7 +48,7 @@ enum Rule {
     },
     FittedPatches {
         most: f64,
-        #[serde(default = "any")]
+        #[serde(default = "unlimited")]
         side: f64,
         high_most: Option<f64>,
         high_side: Option<f64>,
@@ -70,17 +70,17 @@ enum Rule {
     },
     Merged {
         patch: f64,
-        #[serde(default = "any")]
+        #[serde(default = "unlimited")]
         side: f64,
     },
 }
 
-/// No limit on a side.
-fn any() -> f64 {
+/// Default of a maximum side.
+fn unlimited() -> f64 {
     f64::MAX
 }
 
-/// The number of tokens that a model counts for an image of this size in pixels; `None` if its family is unknown.
+/// Number of tokens that a model counts for an image of this size in pixels; `None` for an unknown family.
 pub(in crate::ask) fn image_tokens(
     model: &str,
     detail: Option<ImageDetail>,
@@ -96,6 +96,7 @@ pub(in crate::ask) fn image_tokens(
 }
 
 impl Rule {
+    /// Number of tokens of an image of this size in pixels.
     fn count(self, detail: Option<ImageDetail>, width: f64, height: f64) -> u64 {
         let (longer, shorter) = (width.max(height), width.min(height));
         let count = match self {
@@ -116,21 +117,24 @@ impl Rule {
                 original_side,
                 factor,
             } => {
-                let (own_side, own_most) = match detail {
+                let (detail_side, detail_most) = match detail {
                     Some(ImageDetail::High) => (high_side, high_most),
                     Some(ImageDetail::Original) => (original_side, original_most),
                     _ => (None, None),
                 };
-                let (side, most) = (own_side.unwrap_or(side), own_most.unwrap_or(most));
-                fitted(width, height, side, most) * factor
+                let side = detail_side.unwrap_or(side);
+                let most = detail_most.unwrap_or(most);
+                patches_after_fit(width, height, side, most) * factor
             }
-            Self::Patches { patch, side, most } => largest([width, height], patch, side, most),
+            Self::Patches { patch, side, most } => {
+                max_patches_within(width, height, patch, PatchLimits { side, most })
+            }
             Self::Crops if longer <= 384.0 => 258.0,
             Self::Crops => {
                 let unit = (shorter / 1.5).floor().max(1.0);
                 258.0 * (width / unit).ceil() * (height / unit).ceil()
             }
-            Self::Resized { patch } => resized(width, height, patch),
+            Self::Resized { patch } => patches_after_resize(width, height, patch),
             Self::Merged { patch, side } => {
                 let scale = (side / longer).min(1.0);
                 let patches = |length: f64| (length * scale / patch).round().max(1.0);
@@ -141,61 +145,67 @@ impl Rule {
     }
 }
 
-/// The number of patches that cover an image scaled by a factor. A side that is a millionth of a patch too long is rounding.
-fn cover(width: f64, height: f64, patch: f64, scale: f64) -> f64 {
+/// Number of patches that cover an image scaled by a factor. Up to a millionth of a patch per side is ignored as a rounding error.
+fn count_patches(width: f64, height: f64, patch: f64, scale: f64) -> f64 {
     let patches = |side: f64| ((side * scale / patch * 1e6).round() / 1e6).ceil().max(1.0);
     patches(width) * patches(height)
 }
 
-/// The number of patches of 32 × 32 that cover an image after it is reduced to a longer side and to at most `most` patches. The scale
-/// makes the sides whole numbers of patches (OpenAI).
-fn fitted(width: f64, height: f64, side: f64, most: f64) -> f64 {
+/// Number of 32 × 32 patches after an image is reduced to a maximum side and to at most `most` patches. The scale is chosen so that the
+/// sides are whole numbers of patches (OpenAI).
+fn patches_after_fit(width: f64, height: f64, side: f64, most: f64) -> f64 {
     let scale = (side / width.max(height)).min(1.0);
-    if cover(width, height, 32.0, scale) <= most {
-        return cover(width, height, 32.0, scale);
+    let count = count_patches(width, height, 32.0, scale);
+    if count <= most {
+        return count;
     }
     let scale = (32.0 * 32.0 * most / (width * height)).sqrt();
     let whole = |side: f64| (side * scale / 32.0).floor().max(1.0) / (side * scale / 32.0);
-    cover(width, height, 32.0, scale * whole(width).min(whole(height))).min(most)
+    count_patches(width, height, 32.0, scale * whole(width).min(whole(height))).min(most)
 }
 
-/// The number of patches that cover the largest size of the same aspect within both limits (Anthropic), by bisection of the scale.
-fn largest([width, height]: [f64; 2], patch: f64, side: f64, most: f64) -> f64 {
-    let at = |scale: f64| cover(width, height, patch, scale);
-    let top = (side / width.max(height)).min(1.0);
-    if at(top) <= most {
-        return at(top);
+/// Limits of an image: maximum side in pixels, and maximum number of patches.
+#[derive(Clone, Copy)]
+struct PatchLimits {
+    side: f64,
+    most: f64,
+}
+
+/// Number of patches of the largest image with the same aspect ratio within both limits (Anthropic), by bisection of the scale.
+fn max_patches_within(width: f64, height: f64, patch: f64, limits: PatchLimits) -> f64 {
+    let count_at = |scale: f64| count_patches(width, height, patch, scale);
+    let max_scale = (limits.side / width.max(height)).min(1.0);
+    if count_at(max_scale) <= limits.most {
+        return count_at(max_scale);
     }
-    let (mut low, mut high) = (0.0, top);
+    let (mut low, mut high) = (0.0, max_scale);
     for _ in 0..60 {
         let middle = f64::midpoint(low, high);
-        if at(middle) <= most {
+        if count_at(middle) <= limits.most {
             low = middle;
         } else {
             high = middle;
         }
     }
-    at(low)
+    count_at(low)
 }
 
-/// The number of patches after Qwen's smart_resize.
-fn resized(width: f64, height: f64, patch: f64) -> f64 {
-    const LEAST: f64 = 4.0;
-    const MOST: f64 = 16_384.0;
-    let sides = |of: fn(f64) -> f64, scale: f64| {
-        let patches = |side: f64| of(side * scale / patch).max(1.0);
+/// Number of patches after Qwen's smart_resize.
+fn patches_after_resize(width: f64, height: f64, patch: f64) -> f64 {
+    const MIN: f64 = 4.0;
+    const MAX: f64 = 16_384.0;
+    let count = |round: fn(f64) -> f64, scale: f64| {
+        let patches = |side: f64| round(side * scale / patch).max(1.0);
         patches(width) * patches(height)
     };
-    let (plain, area) = (
-        sides(f64::round_ties_even, 1.0),
-        width * height / (patch * patch),
-    );
-    if plain > MOST {
-        sides(f64::floor, (MOST / area).sqrt())
-    } else if plain < LEAST {
-        sides(f64::ceil, (LEAST / area).sqrt())
+    let unscaled = count(f64::round_ties_even, 1.0);
+    let area = width * height / (patch * patch);
+    if unscaled > MAX {
+        count(f64::floor, (MAX / area).sqrt())
+    } else if unscaled < MIN {
+        count(f64::ceil, (MIN / area).sqrt())
     } else {
-        plain
+        unscaled
     }
 }
 
@@ -204,7 +214,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_match_the_published_ones() {
+    fn counts_match_published_ones() {
         let high = Some(ImageDetail::High);
         for (model, detail, width, height, tokens) in [
             // platform.openai.com/docs/guides/images-vision
@@ -224,11 +234,11 @@ mod tests {
             ("gemini-2.5-flash", None, 384, 384, 258),
             ("gemini-2.5-flash", None, 960, 540, 1548),
             ("gemini-3-flash", None, 2560, 1440, 1120),
-            // platform.claude.com/docs, vision: the two sizes that it states, and one at the limit
+            // platform.claude.com/docs, vision: the two documented sizes, and one at the limit
             ("claude-opus-4-7", None, 1000, 1000, 1296),
             ("claude-opus-5-5", None, 1920, 1080, 2691),
             ("anthropic/claude-sonnet-5", None, 2560, 1440, 4784),
-            // users' counts with the words: 1558 to 1561
+            // counts reported by users, including the text: 1558 to 1561
             ("claude-sonnet-4-5", None, 2560, 1440, 1560),
             ("Qwen/Qwen2.5-VL-7B-Instruct", None, 1288, 728, 1196),
             ("Qwen/Qwen2.5-VL-7B-Instruct", None, 2560, 1440, 4641),
@@ -240,33 +250,33 @@ mod tests {
             let counted = image_tokens(model, detail, width, height);
             assert_eq!(counted, Some(tokens), "{model} {width} × {height}");
         }
-        // 1800 × 2400 is more than 1536 patches: 33 × 44 of them.
+        // 1800 × 2400 pixels are reduced to at most 1536 patches: 33 × 44.
         assert_eq!(image_tokens("gpt-4.1-mini", None, 1800, 2400), Some(2353));
         assert_eq!(image_tokens("my-model", None, 640, 480), None);
     }
 
     #[test]
-    fn no_family_hides_behind_a_shorter_name_before_it() {
-        let mut before: Vec<&String> = Vec::new();
+    fn no_prefix_is_hidden_by_an_earlier_one() {
+        let mut earlier: Vec<&String> = Vec::new();
         for begin in TABLE.family.iter().flat_map(|family| &family.begins) {
-            let hides = before
+            let hidden_by = earlier
                 .iter()
-                .find(|earlier| begin.starts_with(earlier.as_str()));
-            assert_eq!(hides, None, "{begin} is never reached");
-            before.push(begin);
+                .find(|prefix| begin.starts_with(prefix.as_str()));
+            assert_eq!(hidden_by, None, "{begin} is never reached");
+            earlier.push(begin);
         }
-        assert!(before.len() > 30);
+        assert!(earlier.len() > 30);
     }
 
     #[test]
-    fn more_pixels_never_count_fewer_tokens_beyond_rounding() {
+    fn counts_grow_with_the_size() {
         for family in &TABLE.family {
             let count = |side: f64| family.rule.count(None, side, side);
             let counts: Vec<u64> = (1..40).map(|step| count(f64::from(step) * 100.0)).collect();
-            let falls = counts
+            let decrease = counts
                 .windows(2)
                 .find(|pair| (pair[1] as f64) < 0.9 * pair[0] as f64);
-            assert_eq!(falls, None, "{:?}", family.begins);
+            assert_eq!(decrease, None, "{:?}", family.begins);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Costs of requests: prices, counted tokens, and the sum that a run may spend.
+//! Costs of requests: prices, token counts, and the spending limit of a run.
 
 mod image_tokens;
 mod prices;

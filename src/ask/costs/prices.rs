@@ -12,15 +12,15 @@ use crate::files::reading;
 use crate::types::Usage;
 use crate::types::text::TomlFault;
 
-/// The price of a model, in dollars per million tokens.
+/// Price of a model, in US dollars per million tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Price {
-    /// The price of prompts, images included, in dollars per million tokens.
+    /// Price of prompt tokens, including images, in US dollars per million.
     pub input: f64,
-    /// The price of replies, hidden reasoning included, in dollars per million tokens.
+    /// Price of reply tokens, including hidden reasoning, in US dollars per million.
     pub output: f64,
-    /// The price of cached prompt tokens, in dollars per million tokens; `None` if they cost as much as `input`.
+    /// Price of cached prompt tokens, in US dollars per million; `None` if they cost as much as `input`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cached_input: Option<f64>,
     /// Tokens per image; `None` to use the rule of the model's family.
@@ -29,20 +29,20 @@ pub(crate) struct Price {
 }
 
 impl Price {
-    /// The cost of this many prompt and reply tokens, in dollars.
+    /// Cost of this many prompt and reply tokens, in US dollars.
     #[must_use]
     pub(crate) fn cost(&self, prompt: f64, reply: f64) -> f64 {
         (prompt * self.input + reply * self.output) / 1e6
     }
 
-    /// The maximum cost of a request within a token bound, in dollars.
+    /// Maximum cost of a request within a token bound, in US dollars.
     #[must_use]
     pub(crate) fn max_cost(&self, bound: TokenBound) -> f64 {
         let input = self.input.max(self.cached_input.unwrap_or(self.input));
         (bound.prompt as f64 * input + bound.reply as f64 * self.output) / 1e6
     }
 
-    /// The cost of a request from its reported usage, in dollars. A token count that the server did not report counts as 0.
+    /// Cost of a request from its reported usage, in US dollars. A token count that the server did not report counts as 0.
     #[must_use]
     pub(crate) fn charged(&self, usage: Usage) -> f64 {
         let or_zero = |tokens: Option<u64>| tokens.unwrap_or(0) as f64;
@@ -58,12 +58,12 @@ impl Price {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(crate) struct Prices {
-    /// The date of the prices.
+    /// Date of the prices.
     pub as_of: String,
-    /// The price in the Batch API, as a share of the normal price.
+    /// Price in the Batch API, as a share of the normal price.
     pub batch: f64,
     models: BTreeMap<String, Price>,
-    /// True for a table of the user (`--prices`).
+    /// True for a table from `--prices`.
     #[serde(skip)]
     is_custom: bool,
 }
@@ -114,10 +114,10 @@ impl Prices {
         })
     }
 
-    /// The key under which the settings of a manifest store a custom table.
+    /// Key of a custom table in the settings of a manifest.
     pub(crate) const SETTING: &str = "prices";
 
-    /// The table as a manifest stores it; `None` for the built-in table.
+    /// The table in the form of a manifest; `None` for the built-in table.
     pub(crate) fn setting(&self) -> Option<Value> {
         self.is_custom.then(|| serde_json::json!(self))
     }
@@ -138,7 +138,7 @@ impl Prices {
         })
     }
 
-    /// The source of the prices as a phrase that follows "at".
+    /// Source of the prices, as a phrase that follows "at".
     pub(crate) fn source(&self) -> String {
         let date = &self.as_of;
         if self.is_custom {
@@ -148,8 +148,8 @@ impl Prices {
         }
     }
 
-    /// The price of a model; `None` if the table has none. Looks up the full name, then the name after the provider prefix
-    /// (`openai/gpt-4o`). Each is tried exactly first, then without its version suffix (`gpt-4o-2024-08-06`).
+    /// Finds the price of a model: by its full name, then by the name after the provider prefix (`openai/gpt-4o`), each first exactly and
+    /// then without a version suffix (`gpt-4o-2024-08-06`).
     #[must_use]
     pub(crate) fn find(&self, model: &str) -> Option<Price> {
         let bare = model.rsplit('/').next().unwrap_or(model);
@@ -161,7 +161,7 @@ impl Prices {
         })
     }
 
-    /// The price of the model whose name is `name` without its version suffix.
+    /// Price of the model whose name is `name` without a version suffix.
     fn find_unversioned(&self, name: &str) -> Option<&Price> {
         self.models
             .iter()
@@ -174,8 +174,8 @@ fn is_finite_and_not_negative(number: f64) -> bool {
     number.is_finite() && number >= 0.0
 }
 
-/// True if the suffix of a model name is a version: a date, `latest` or `preview`, with or without a date. `preview-tts` is another
-/// model with another price.
+/// True if the suffix of a model name is a version: a date, `latest`, or `preview` with or without a date. `preview-tts` is another model
+/// with another price.
 fn is_version(suffix: &str) -> bool {
     suffix.strip_prefix(['-', '@']).is_some_and(|version| {
         let date = version.strip_prefix("preview").unwrap_or(version);

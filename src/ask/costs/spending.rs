@@ -1,5 +1,7 @@
-//! US dollars that the requests of a run cost, or may cost: [`Spending`]. Each request holds a [`Reservation`] at its upper bound until
-//! its real charge is known, so that the sum stays below the limit in any order of replies.
+//! Cost of the requests of a run in US dollars, and its limit: [`Spending`].
+//!
+//! Each request has a [`Reservation`] of its maximum cost until its real charge is known, so that the sum stays below the limit in any
+//! order of replies.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -10,41 +12,42 @@ use super::prices::Price;
 use super::token_bound::TokenBound;
 use crate::types::{LostAttempts, Usage};
 
-/// Share of the limit by which a sum may exceed it, because of rounding.
-const ROUNDING: f64 = 1e-9;
+/// Tolerance of the limit for rounding errors, as a share of the limit.
+const TOLERANCE: f64 = 1e-9;
 
-/// Factor by which a reply may exceed its limit further than any before; chosen.
-const FURTHER: u64 = 4;
+/// Assumed ratio of the excess of the next reply to the largest excess so far; chosen.
+const EXCESS_FACTOR: u64 = 4;
 
 /// Charge for one request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Charge {
-    /// Nothing: it was refused, or never sent.
+    /// Nothing: the request was refused or never sent.
     Nothing,
-    /// For the tokens that the server stated.
+    /// The tokens that the server reported.
     Stated(Usage),
-    /// Unknown: the server may have worked on it, and stated no tokens.
+    /// Unknown: the server may have worked on the request, but reported no tokens.
     Unknown,
 }
 
-/// Replies of a model that were charged more tokens than the token limit of their requests.
+/// Statistics of the replies of a model that were charged more tokens than their token limit.
 #[derive(Debug, Default)]
 pub(crate) struct ReplyExcess {
-    /// Tokens of the longest such reply; 0 if there was none.
+    /// Tokens of the longest such reply; 0 without one.
     longest: AtomicU64,
-    /// The most tokens by which one exceeded its limit.
-    most: AtomicU64,
+    /// Maximum number of tokens beyond the limit.
+    max_excess: AtomicU64,
+    /// Number of such replies.
     replies: AtomicU64,
 }
 
 impl ReplyExcess {
-    /// The tokens to reserve for a reply with this limit: more if the server has exceeded a limit before.
+    /// Tokens to reserve for a reply with this limit: more than the limit if the server has exceeded a limit before.
     fn bound(&self, limit: u64) -> u64 {
-        let most = self.most.load(Ordering::Relaxed);
-        limit.saturating_add(FURTHER.saturating_mul(most))
+        let max_excess = self.max_excess.load(Ordering::Relaxed);
+        limit.saturating_add(EXCESS_FACTOR.saturating_mul(max_excess))
     }
 
-    /// Tokens of the longest reply beyond a limit; 0 if there was none.
+    /// Tokens of the longest reply beyond its limit; 0 without one.
     pub(crate) fn longest(&self) -> u64 {
         self.longest.load(Ordering::Relaxed)
     }
@@ -54,33 +57,33 @@ impl ReplyExcess {
         self.replies.load(Ordering::Relaxed)
     }
 
-    fn note(&self, tokens: u64, limit: u64) {
+    fn record(&self, tokens: u64, limit: u64) {
         self.replies.fetch_add(1, Ordering::Relaxed);
         self.longest.fetch_max(tokens, Ordering::Relaxed);
-        self.most.fetch_max(tokens - limit, Ordering::Relaxed);
+        self.max_excess.fetch_max(tokens - limit, Ordering::Relaxed);
     }
 }
 
-/// US dollars spent and reserved, and the limit of both.
+/// US dollars spent and reserved, and the limit of their sum.
 #[derive(Debug)]
 pub(crate) struct Spending {
     /// Limit in US dollars; `None` for no limit.
     limit: Option<f64>,
-    /// US dollars that batches may cost until they have ended.
-    elsewhere: f64,
+    /// Maximum cost in US dollars of batches that have not ended.
+    pending_batches: f64,
     dollars: Mutex<Dollars>,
-    /// Notified when less is reserved than before.
+    /// Notified when the reserved sum decreases.
     released: Notify,
 }
 
 #[derive(Debug)]
 struct Dollars {
     spent: f64,
-    /// Dollars of all reservations.
+    /// Sum of all reservations.
     reserved: f64,
     /// Number of reservations.
     reservations: usize,
-    /// Number of requests that wait until they can be sent again; no other request is begun before them.
+    /// Number of retries that wait for a reservation. New requests get none before them.
     waiting: usize,
 }
 
@@ -92,7 +95,7 @@ impl Dollars {
 
     fn release(&mut self, dollars: f64) {
         self.reservations -= 1;
-        // Exact if nothing is reserved.
+        // Exactly zero without reservations, despite rounding.
         self.reserved = match self.reservations {
             0 => 0.0,
             _ => self.reserved - dollars,
@@ -100,17 +103,17 @@ impl Dollars {
     }
 }
 
-/// A request that a reservation is made for.
+/// Price and token bound of a request to reserve money for.
 #[derive(Debug, Clone)]
 pub(crate) struct PricedRequest {
     pub(crate) price: Price,
     pub(crate) bound: TokenBound,
-    /// Replies of the model beyond the token limit.
+    /// Replies of the model beyond their token limit.
     pub(crate) excess: Arc<ReplyExcess>,
 }
 
 impl PricedRequest {
-    /// The bound, with a longer reply if the model's server has exceeded the token limit before.
+    /// Token bound; the bound of the reply is higher if the server has exceeded a token limit before.
     pub(crate) fn current_bound(&self) -> TokenBound {
         TokenBound {
             reply: self.excess.bound(self.bound.reply),
@@ -118,18 +121,18 @@ impl PricedRequest {
         }
     }
 
-    /// The most that the request can cost, in US dollars.
-    pub(crate) fn most(&self) -> f64 {
+    /// Maximum cost of the request, in US dollars.
+    pub(crate) fn max_cost(&self) -> f64 {
         self.price.max_cost(self.current_bound())
     }
 }
 
 impl Spending {
-    /// Spending with a limit, if there is one, of which this much is spent; both in US dollars.
+    /// Creates the spending of a run with an optional limit, of which `spent` is already spent; both in US dollars.
     pub(crate) fn new(limit: Option<f64>, spent: f64) -> Self {
         Self {
             limit,
-            elsewhere: 0.0,
+            pending_batches: 0.0,
             dollars: Mutex::new(Dollars {
                 spent,
                 reserved: 0.0,
@@ -140,9 +143,12 @@ impl Spending {
         }
     }
 
-    /// The same spending, with batches that may cost this much in US dollars until they have ended.
-    pub(crate) fn with_elsewhere(self, elsewhere: f64) -> Self {
-        Self { elsewhere, ..self }
+    /// Sets the maximum cost, in US dollars, of batches that have not ended.
+    pub(crate) fn with_pending_batches(self, pending_batches: f64) -> Self {
+        Self {
+            pending_batches,
+            ..self
+        }
     }
 
     /// Limit in US dollars; `None` for no limit.
@@ -150,11 +156,11 @@ impl Spending {
         self.limit
     }
 
-    /// Whether this much more is within the limit, beside all that is spent and reserved.
-    fn fits(&self, dollars: &Dollars, more: f64) -> bool {
-        let all = dollars.spent + dollars.reserved + self.elsewhere + more;
+    /// True if `additional` dollars fit into the limit, on top of all spent and reserved dollars.
+    fn fits(&self, dollars: &Dollars, additional: f64) -> bool {
+        let sum = dollars.spent + dollars.reserved + self.pending_batches + additional;
         self.limit
-            .is_none_or(|limit| all <= limit * (1.0 + ROUNDING))
+            .is_none_or(|limit| sum <= limit * (1.0 + TOLERANCE))
     }
 
     /// US dollars spent so far.
@@ -167,25 +173,25 @@ impl Spending {
         self.dollars().reserved
     }
 
-    /// US dollars by which the limit is exceeded; 0 if it is not.
+    /// US dollars spent beyond the limit; 0 within the limit.
     pub(crate) fn overrun(&self) -> f64 {
         let over = self.limit.map_or(0.0, |limit| self.spent() - limit);
-        if over > self.limit.unwrap_or(0.0) * ROUNDING {
+        if over > self.limit.unwrap_or(0.0) * TOLERANCE {
             over
         } else {
             0.0
         }
     }
 
-    /// A reservation for a request, if the limit allows it beside all others.
+    /// Reserves the maximum cost of a request; `None` if the limit does not allow it.
     pub(crate) fn reserve(self: &Arc<Self>, request: PricedRequest) -> Option<Reservation> {
         let bound = request.current_bound();
-        let most = request.price.max_cost(bound);
+        let max_cost = request.price.max_cost(bound);
         let mut dollars = self.dollars();
-        if dollars.waiting > 0 || !self.fits(&dollars, most) {
+        if dollars.waiting > 0 || !self.fits(&dollars, max_cost) {
             return None;
         }
-        dollars.reserve(most);
+        dollars.reserve(max_cost);
         drop(dollars);
         Some(Reservation {
             spending: Arc::clone(self),
@@ -197,7 +203,7 @@ impl Spending {
         })
     }
 
-    /// Waits until less is reserved than now.
+    /// Waits until the reserved sum decreases.
     pub(crate) async fn released(&self) {
         self.released.notified().await;
     }
@@ -207,7 +213,7 @@ impl Spending {
     }
 }
 
-/// The part of [`Spending`] that one question may cost: one request at a time, with its retries after each other.
+/// Money reserved for one question: for one request at a time, including its retries.
 #[derive(Debug)]
 pub(crate) struct Reservation {
     spending: Arc<Spending>,
@@ -218,30 +224,30 @@ pub(crate) struct Reservation {
 #[derive(Debug)]
 struct Attempts {
     held: Held,
-    /// All requests that were charged, or may have been.
+    /// All requests that were or may have been charged.
     charged: LostAttempts,
 }
 
-/// Dollars that a question holds.
+/// Reservation of a question, by the state of its current request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Held {
-    /// None: no request is in flight or about to be sent.
+    /// No request is in flight or about to be sent.
     Nothing,
-    /// Dollars of a request that is not sent yet.
+    /// The request is not sent yet.
     Reserved(TokenBound),
-    /// Dollars of a request in flight.
+    /// The request is in flight.
     Sent(TokenBound),
 }
 
 impl Reservation {
-    /// Holds the dollars of the next request. Waits for other requests to end if the limit does not allow it now; false if nothing is
-    /// left to wait for.
-    pub(crate) async fn hold(&self) -> bool {
+    /// Reserves the maximum cost of the next request, unless it is already reserved. If the limit does not allow it, waits for other
+    /// requests to end; false if there are none.
+    pub(crate) async fn reserve(&self) -> bool {
         let mut waiting = None;
         loop {
             let released = self.spending.released.notified();
             tokio::pin!(released);
-            // From here on, no release is missed.
+            // Registers for notifications now, so that no release is missed.
             released.as_mut().enable();
             {
                 let mut attempts = self.attempts();
@@ -249,10 +255,10 @@ impl Reservation {
                     return true;
                 }
                 let bound = self.request.current_bound();
-                let most = self.request.price.max_cost(bound);
+                let max_cost = self.request.price.max_cost(bound);
                 let mut dollars = self.spending.dollars();
-                if self.spending.fits(&dollars, most) {
-                    dollars.reserve(most);
+                if self.spending.fits(&dollars, max_cost) {
+                    dollars.reserve(max_cost);
                     attempts.held = Held::Reserved(bound);
                     return true;
                 }
@@ -268,16 +274,16 @@ impl Reservation {
         }
     }
 
-    /// Notes that the request is sent: from here on it may be charged.
-    pub(crate) fn sent(&self) {
+    /// Records that the request is sent, so that it may be charged.
+    pub(crate) fn mark_sent(&self) {
         let mut attempts = self.attempts();
         if let Held::Reserved(bound) = attempts.held {
             attempts.held = Held::Sent(bound);
         }
     }
 
-    /// Notes the charge of the request that was sent, and releases the rest.
-    pub(crate) fn ended(&self, charge: Charge) {
+    /// Replaces the reservation of the sent request by its charge.
+    pub(crate) fn settle(&self, charge: Charge) {
         let mut attempts = self.attempts();
         let Held::Sent(bound) = attempts.held else {
             return;
@@ -289,6 +295,7 @@ impl Reservation {
             Charge::Unknown => (Usage::default(), bound),
             Charge::Stated(usage) => (usage, bound.missing_from(usage)),
         };
+        // The server did not report all tokens: the missing ones count at their bound.
         if missing != TokenBound::default() {
             attempts.charged.unstated = attempts.charged.unstated.plus(missing.unstated());
         }
@@ -296,19 +303,20 @@ impl Reservation {
         let reply = stated.completion_tokens.unwrap_or(0);
         let limit = self.request.bound.reply;
         if reply > limit {
-            self.request.excess.note(reply, limit);
+            self.request.excess.record(reply, limit);
         }
         let charged = price.charged(stated) + price.max_cost(missing);
-        self.settle(bound, charged);
+        self.release(bound, charged);
     }
 
-    /// All requests that were charged, or may have been. A request in flight is one of them.
+    /// Ends the reservation, and returns all requests that were or may have been charged, including one in flight.
     pub(crate) fn charged(&self) -> LostAttempts {
-        self.ended(Charge::Unknown);
+        self.settle(Charge::Unknown);
         self.attempts().charged
     }
 
-    fn settle(&self, bound: TokenBound, charged: f64) {
+    /// Releases the reservation of this bound, and adds `charged` US dollars to the spent sum.
+    fn release(&self, bound: TokenBound, charged: f64) {
         let mut dollars = self.spending.dollars();
         dollars.release(self.request.price.max_cost(bound));
         dollars.spent += charged;
@@ -322,23 +330,23 @@ impl Reservation {
 }
 
 impl Drop for Reservation {
-    /// A request that is in flight may be charged; one that was not sent is not.
+    /// A request in flight may be charged; a request that was not sent is not.
     fn drop(&mut self) {
-        self.ended(Charge::Unknown);
+        self.settle(Charge::Unknown);
         let held = self.attempts().held;
         if let Held::Reserved(bound) = held {
-            self.settle(bound, 0.0);
+            self.release(bound, 0.0);
         }
     }
 }
 
-/// A request that waits until it can be sent again, as [`Spending`] counts it.
+/// Counts a waiting retry in [`Spending`] until dropped.
 struct Waiting<'a>(&'a Spending);
 
 impl Drop for Waiting<'_> {
     fn drop(&mut self) {
         self.0.dollars().waiting -= 1;
-        // Others may be begun again.
+        // New requests may get reservations again.
         self.0.released.notify_waiters();
     }
 }
@@ -377,33 +385,33 @@ mod tests {
     }
 
     #[test]
-    fn requests_reserve_the_most_they_can_cost() {
+    fn requests_reserve_their_maximum_cost() {
         let spending = spending();
         let first = spending.reserve(request()).unwrap();
         let second = spending.reserve(request()).unwrap();
         assert!(spending.reserve(request()).is_none());
         for (reservation, reply) in [(&first, 5), (&second, 90)] {
-            reservation.sent();
-            reservation.ended(usage(10, reply));
+            reservation.mark_sent();
+            reservation.settle(usage(10, reply));
         }
         assert!((spending.spent() - 115.0).abs() < 1e-9);
         assert!(spending.reserve(request()).is_some());
     }
 
     #[test]
-    fn a_request_that_was_never_sent_costs_nothing() {
+    fn unsent_requests_cost_nothing() {
         let spending = spending();
         drop(spending.reserve(request()));
         assert_eq!(spending.spent().to_bits(), 0.0_f64.to_bits());
         let sent = spending.reserve(request()).unwrap();
-        sent.sent();
+        sent.mark_sent();
         drop(sent);
         assert!((spending.spent() - 100.0).abs() < 1e-9, "it may be charged");
         assert_eq!(spending.reserved().to_bits(), 0.0_f64.to_bits());
     }
 
     #[test]
-    fn tokens_that_are_not_stated_count_at_their_bound() {
+    fn unreported_tokens_count_at_their_bound() {
         for (charge, dollars, unstated) in [
             (Charge::Nothing, 0.0, 0),
             (Charge::Unknown, 100.0, 100),
@@ -414,10 +422,10 @@ mod tests {
             let reservation = Arc::new(Spending::new(None, 0.0))
                 .reserve(request())
                 .unwrap();
-            reservation.sent();
-            reservation.ended(charge);
-            let own = reservation.spending.spent();
-            assert!((own - dollars).abs() < 1e-9, "{charge:?}: {own}");
+            reservation.mark_sent();
+            reservation.settle(charge);
+            let spent = reservation.spending.spent();
+            assert!((spent - dollars).abs() < 1e-9, "{charge:?}: {spent}");
             let charged = reservation.charged().unstated;
             let tokens = charged.prompt_tokens + charged.completion_tokens;
             assert_eq!(tokens, unstated, "{charge:?}");
@@ -425,31 +433,31 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_retry_waits_for_others_and_goes_before_new_requests() {
+    async fn retries_have_priority_over_new_requests() {
         let spending = spending();
         let retried = spending.reserve(request()).unwrap();
         let other = spending.reserve(request()).unwrap();
-        retried.sent();
-        retried.ended(usage(10, 90));
-        other.sent();
-        let (is_held, ()) = tokio::join!(retried.hold(), async {
+        retried.mark_sent();
+        retried.settle(usage(10, 90));
+        other.mark_sent();
+        let (is_held, ()) = tokio::join!(retried.reserve(), async {
             tokio::task::yield_now().await;
             assert!(spending.reserve(request()).is_none(), "a retry waits");
-            other.ended(usage(10, 5));
+            other.settle(usage(10, 5));
         });
         assert!(is_held);
-        retried.sent();
-        retried.ended(usage(10, 90));
-        assert!(!retried.hold().await, "nothing is left to wait for");
+        retried.mark_sent();
+        retried.settle(usage(10, 90));
+        assert!(!retried.reserve().await, "nothing is left to wait for");
     }
 
     #[test]
-    fn replies_beyond_their_limit_raise_the_bound() {
+    fn long_replies_raise_the_bound() {
         let request = request();
         let spending = Arc::new(Spending::new(None, 0.0));
         let reservation = spending.reserve(request.clone()).unwrap();
-        reservation.sent();
-        reservation.ended(usage(10, 91));
+        reservation.mark_sent();
+        reservation.settle(usage(10, 91));
         assert_eq!(request.current_bound().reply, 94);
         assert_eq!(
             (request.excess.longest(), request.excess.replies()),

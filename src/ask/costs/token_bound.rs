@@ -1,8 +1,8 @@
-//! Upper bounds of the tokens of a request: [`TokenBound`].
+//! Upper bound on the tokens of a request: [`TokenBound`].
 
 use crate::types::{Unstated, Usage};
 
-/// Upper bounds of the tokens of one request.
+/// Upper bound on the tokens of one request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct TokenBound {
     pub(crate) prompt: u64,
@@ -11,7 +11,7 @@ pub(crate) struct TokenBound {
 }
 
 impl TokenBound {
-    /// One request with these tokens, none of which the server stated.
+    /// One request with this many tokens that the server did not report.
     pub(crate) fn unstated(self) -> Unstated {
         Unstated {
             requests: 1,
@@ -20,8 +20,8 @@ impl TokenBound {
         }
     }
 
-    /// The part of the bound that a server leaves open with these stated tokens. A server that states no token of a prompt does not
-    /// count tokens.
+    /// Bound on the tokens that the server did not report: zero for reported counts. A server that reports no prompt tokens does not
+    /// count tokens at all, so its zero reply tokens are not a report.
     pub(crate) fn missing_from(self, usage: Usage) -> Self {
         let prompt = usage.prompt_tokens.filter(|tokens| *tokens > 0);
         let reply = match (prompt, usage.completion_tokens) {

@@ -11,8 +11,8 @@ use rustls::crypto::ring::default_provider;
 use rustls::pki_types::CertificateDer;
 use rustls::pki_types::pem::PemObject as _;
 
-use super::own_certificate::client_config;
-use super::own_headers::CustomHeaders;
+use super::custom_certificates::client_config;
+use super::custom_headers::CustomHeaders;
 use super::proxy::check_proxy;
 use super::url::BaseUrl;
 use crate::ask::secrets::{KeyHeader, Scrub, Secret};
@@ -21,27 +21,27 @@ use crate::ask::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// The maximum time to open a connection; chosen.
-const CONNECT: Duration = Duration::from_secs(10);
+/// Maximum time to open a connection; chosen.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// The address of an endpoint with everything that is needed to connect to it.
+/// Address of an endpoint, with everything that is needed to connect to it.
 #[derive(Debug, Clone)]
 pub struct Access {
     /// The base URL of the endpoint.
     pub base: BaseUrl,
-    /// The API key; `None` if no header with a key is sent.
+    /// API key; `None` to send no header with a key.
     pub key: Option<Secret>,
     /// The header that carries the key.
     pub key_header: KeyHeader,
-    /// Further headers that name the account and are not secret: `OpenAI-Organization`, `OpenAI-Project`.
+    /// Headers that name the account and are not secret, such as `OpenAI-Organization` and `OpenAI-Project`.
     pub account: Vec<(String, String)>,
-    /// Facts about the vendor; `None` for hosts that no table lists.
+    /// Vendor of the host; `None` if no table lists it.
     pub vendor: Option<&'static Vendor>,
-    /// Headers that the user adds.
+    /// Headers from `--header` and `--header-env`.
     pub headers: CustomHeaders,
-    /// Certificate authorities that are trusted in addition to those of the system.
+    /// Certificate authorities to trust in addition to those of the system.
     pub authorities: Authorities,
-    /// Whether a key may be sent unencrypted to another machine.
+    /// True if a key may be sent unencrypted to another machine.
     pub allow_http: bool,
 }
 
@@ -61,18 +61,18 @@ impl Access {
         }
     }
 
-    /// The filter that removes keys and passwords from the server's texts.
+    /// Filter that removes the keys and passwords of this endpoint from text of the server.
     pub(super) fn scrub(&self) -> Scrub {
         let key = self.key.as_ref().map(|key| key.expose().to_owned());
-        let own = self.headers.secrets().iter().cloned();
-        Scrub::new(self.base.secrets().into_iter().chain(key).chain(own))
+        let custom = self.headers.secrets().iter().cloned();
+        Scrub::new(self.base.secrets().into_iter().chain(key).chain(custom))
     }
 
-    /// Refuses settings that would send a key unencrypted, or send two keys.
+    /// Checks that no key is sent unencrypted, and that at most one key is sent.
     pub(super) fn check(&self, scrub: &Scrub) -> Result<()> {
         let base = &self.base;
-        let secret = self.key.is_some() || !scrub.is_empty();
-        if secret && base.is_plain() && !base.is_loopback() && !self.allow_http {
+        let has_secret = self.key.is_some() || !scrub.is_empty();
+        if has_secret && base.is_plain() && !base.is_loopback() && !self.allow_http {
             return Err(Error::usage(
                 "--base-url",
                 format_args!(
@@ -91,43 +91,44 @@ impl Access {
         Ok(())
     }
 
-    /// The headers of every request to an API.
+    /// Headers of every request through this API.
     pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
-        let form = match self.key_header {
+        let key_header = match self.key_header {
             KeyHeader::Auto => self.vendor.map_or(KeyHeader::Bearer, Vendor::key_header),
-            named => named,
+            explicit => explicit,
         };
-        let mut headers = wire.headers(self.key.as_ref(), form)?;
+        let mut headers = wire.headers(self.key.as_ref(), key_header)?;
         for (name, text) in &self.account {
-            let invalid = |_| {
+            let value = HeaderValue::try_from(text).map_err(|_| {
                 Error::usage(
                     name.as_str(),
                     "the value has characters that an HTTP header cannot carry",
                 )
-            };
-            let value = HeaderValue::try_from(text).map_err(invalid)?;
+            })?;
             let name = HeaderName::try_from(name).map_err(|_| {
                 Error::usage(name.as_str(), "this is not a valid name of an HTTP header")
             })?;
             headers.insert(name, value);
         }
-        self.headers.extend(&mut headers)?;
+        self.headers.add_to(&mut headers)?;
         Ok(headers)
     }
 
-    /// The HTTP client of all requests, with a limit of the time to connect alone. It follows no redirects, because a POST would become a GET and the key would be sent
-    /// elsewhere. Proxies come from the environment (`HTTPS_PROXY`, `NO_PROXY`, …); there is none for this machine.
+    /// HTTP client for all requests, with a time limit for connecting only.
+    ///
+    /// It follows no redirects: a POST would become a GET, and the key would be sent to another address. Proxies come from the
+    /// environment (`HTTPS_PROXY`, `NO_PROXY`, …); requests to this machine use none.
     pub(super) fn client(&self, timeout: Duration, scrub: &Scrub) -> Result<Client> {
-        // An error means that a provider is installed already.
+        // An error means that a crypto provider is already installed.
         let _ = default_provider().install_default();
         let mut client = Client::builder()
             .user_agent(concat!("darkqa-eval/", env!("CARGO_PKG_VERSION")))
             .redirect(redirect::Policy::none())
-            .connect_timeout(connect_limit(timeout));
+            .connect_timeout(connect_timeout(timeout));
         let trusted = &self.authorities.0;
         if !trusted.is_empty() {
-            let config = client_config(trusted, Arc::new(default_provider()));
-            let config = config.map_err(|e| Error::usage("--ca-file", e.to_string()))?;
+            let config = client_config(trusted, Arc::new(default_provider()))
+                .map_err(|e| Error::usage("--ca-file", e.to_string()))?;
             client = client.tls_backend_preconfigured(config);
         }
         check_proxy(&self.base, |name| std::env::var_os(name))?;
@@ -141,7 +142,7 @@ impl Access {
     }
 }
 
-/// Custom certificate authorities, as of a private CA.
+/// Additional certificate authorities, for example a private CA.
 #[derive(Debug, Clone, Default)]
 pub struct Authorities(Vec<CertificateDer<'static>>);
 
@@ -149,13 +150,13 @@ impl Authorities {
     /// Reads a PEM file of one or more certificates.
     ///
     /// # Errors
-    /// If it cannot be read or has no certificate.
+    /// If the file cannot be read or has no valid certificate.
     pub fn load(path: &Path) -> Result<Self> {
         let pem = reading::settings(path)?;
-        let found = CertificateDer::pem_slice_iter(pem.as_bytes());
-        let found: Vec<CertificateDer<'static>> =
-            found.collect::<Result<_, _>>().unwrap_or_default();
-        if found.is_empty() {
+        let certificates: Vec<_> = CertificateDer::pem_slice_iter(pem.as_bytes())
+            .collect::<Result<_, _>>()
+            .unwrap_or_default();
+        if certificates.is_empty() {
             return Err(Error::usage(
                 "--ca-file",
                 format_args!(
@@ -164,16 +165,16 @@ impl Authorities {
                 ),
             ));
         }
-        Ok(Self(found))
+        Ok(Self(certificates))
     }
 }
 
-/// The maximum time to open a connection for tries of this time.
-pub(super) fn connect_limit(timeout: Duration) -> Duration {
-    CONNECT.min(timeout)
+/// Maximum time to open a connection, for attempts with this timeout.
+pub(super) fn connect_timeout(timeout: Duration) -> Duration {
+    CONNECT_TIMEOUT.min(timeout)
 }
 
-/// The text of an error with its causes: reqwest's own text says only that something failed.
+/// Text of an error with all its causes; reqwest's own text lacks them.
 pub(super) fn with_causes(error: &reqwest::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
@@ -197,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_key_is_sent_in_the_header_that_the_server_expects() {
+    fn the_vendor_decides_the_key_header() {
         let azure = "https://r.openai.azure.com/openai/v1/";
         for (base, header, name, value) in [
             (azure, KeyHeader::Auto, "api-key", "sk-0123"),

@@ -1,4 +1,4 @@
-//! The connections to one server: [`Connection::post`] sends one request.
+//! HTTP connections to one server: [`Connection`].
 
 use std::io::Write as _;
 use std::path::Path;
@@ -10,133 +10,138 @@ use reqwest::header::{CONTENT_TYPE, HeaderMap};
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use tokio::time::Instant;
 
-use super::access::{Access, connect_limit, with_causes};
+use super::access::{Access, connect_timeout, with_causes};
 use super::connection_fault::{UNKNOWN_HOST, is_unknown_host, lacks_open_files, permanent_cause};
 use super::time_limit::TimeLimit;
 use super::url::BaseUrl;
-use crate::ask::failures::{Again, AskError, Reach};
+use crate::ask::failures::{AskError, Reach, Retry};
 use crate::ask::replies::bounded_json::parse;
-use crate::ask::requests::{Parameters, Parts};
+use crate::ask::requests::{Parameters, RequestBody};
 use crate::ask::secrets::Scrub;
 use crate::error::Result;
 use crate::files;
 use crate::types::FailureKind;
 
-/// The maximum size of a decompressed reply, in bytes; chosen. A reply of a few tokens is far smaller, and a server must not
-/// fill the memory.
-const MAX_REPLY: usize = 16 << 20;
+/// Maximum size of a decompressed response, in bytes; chosen. A reply of a few tokens is far smaller, and a server must not exhaust the
+/// memory.
+const MAX_RESPONSE: usize = 16 << 20;
 
-/// The maximum time of a stream, as a multiple of the timeout; chosen: a server that keeps a connection open by comments alone must
-/// not hold a run for ever.
+/// Maximum time of a stream, as a multiple of the timeout; chosen: a server that only sends comments to keep a connection open must not
+/// block a run forever.
 const STREAM_TIMEOUTS: u32 = 30;
 
-/// The longest time that a file of replies may take; chosen.
-const LONGEST_DOWNLOAD: Duration = Duration::from_hours(1);
+/// Maximum time to download a file of replies; chosen.
+const MAX_DOWNLOAD: Duration = Duration::from_hours(1);
 
-/// The time limits of one try, each of the time in which the process runs.
+/// Time limits of one attempt. Only time in which the process runs counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::ask) struct Deadline {
-    /// From the first byte sent to the last byte received.
-    whole: Duration,
-    /// Between two pieces of the response; `None` if only the whole try is limited.
-    silence: Option<Duration>,
+    /// Limit from the first byte sent to the last byte received.
+    total: Duration,
+    /// Limit between two chunks of the response; `None` for no such limit.
+    idle: Option<Duration>,
 }
 
 impl Deadline {
-    /// The deadline of a try whose response is one piece.
-    pub(in crate::ask) fn whole(timeout: Duration) -> Self {
+    /// Limits for a response in one piece.
+    pub(in crate::ask) fn total(timeout: Duration) -> Self {
         Self {
-            whole: timeout,
-            silence: None,
+            total: timeout,
+            idle: None,
         }
     }
 
-    /// The deadline of a try whose response is a stream.
+    /// Limits for a streamed response.
     pub(super) fn stream(timeout: Duration) -> Self {
         Self {
-            whole: timeout.saturating_mul(STREAM_TIMEOUTS),
-            silence: Some(timeout),
+            total: timeout.saturating_mul(STREAM_TIMEOUTS),
+            idle: Some(timeout),
         }
     }
 
-    /// The deadline of a download.
+    /// Limits for the download of a file.
     pub(super) fn download(timeout: Duration) -> Self {
         Self {
-            whole: LONGEST_DOWNLOAD,
-            silence: Some(timeout),
+            total: MAX_DOWNLOAD,
+            idle: Some(timeout),
         }
     }
 }
 
-/// The time that a try has left.
+/// Enforces the [`Deadline`] of one attempt.
 #[derive(Debug)]
-struct TryTime {
+struct AttemptTimer {
     deadline: Deadline,
-    whole: TimeLimit,
+    total: TimeLimit,
 }
 
-impl TryTime {
+impl AttemptTimer {
     fn new(deadline: Deadline) -> Self {
         Self {
             deadline,
-            whole: TimeLimit::new(deadline.whole),
+            total: TimeLimit::new(deadline.total),
         }
     }
 
-    /// The output of one step of the try, or the limit that is reached first.
-    async fn step<T>(&mut self, step: impl Future<Output = T>) -> Result<T, TimeOut> {
-        let silence = self.deadline.silence;
+    /// Runs one step of the attempt.
+    ///
+    /// # Errors
+    /// The limit that is reached before the step ends.
+    async fn run<T>(&mut self, step: impl Future<Output = T>) -> Result<T, ReachedLimit> {
+        let idle = self.deadline.idle;
         let step = async {
-            match silence {
+            match idle {
                 None => Some(step.await),
-                Some(silence) => TimeLimit::new(silence).run(step).await,
+                Some(idle) => TimeLimit::new(idle).run(step).await,
             }
         };
-        match self.whole.run(step).await {
-            None => Err(TimeOut::Whole(self.deadline.whole)),
-            Some(None) => Err(TimeOut::Silence(silence.unwrap_or_default())),
+        match self.total.run(step).await {
+            None => Err(ReachedLimit::Total(self.deadline.total)),
+            Some(None) => Err(ReachedLimit::Idle(idle.unwrap_or_default())),
             Some(Some(output)) => Ok(output),
         }
     }
 }
 
-/// The limit that a try reached.
+/// Time limit that an attempt reached.
 #[derive(Debug, Clone, Copy)]
-enum TimeOut {
-    Whole(Duration),
-    Silence(Duration),
+enum ReachedLimit {
+    Total(Duration),
+    Idle(Duration),
 }
 
-/// Pooled connections to a server, and the filter for secrets in its texts.
+/// Pooled connections to a server, and the filter that removes secrets from its texts.
 #[derive(Debug, Clone)]
 pub(in crate::ask) struct Connection {
     pub(in crate::ask) base: BaseUrl,
     pub(in crate::ask) scrub: Scrub,
     client: Client,
     timeout: Duration,
-    /// True after the first response: an unknown host name is then an outage of the name server and no mistyped address.
+    /// True after the first response: from then on an unknown host name is a DNS outage, not a mistyped address.
     has_answered: Arc<AtomicBool>,
 }
 
-/// The response to one request.
-pub(in crate::ask) struct HttpReply {
+/// Response to one request.
+pub(in crate::ask) struct HttpResponse {
     pub(in crate::ask) status: StatusCode,
     pub(in crate::ask) headers: HeaderMap,
     pub(in crate::ask) body: Vec<u8>,
-    /// The time from sending the request to the last byte of the response.
-    pub(super) took: Duration,
+    /// Time from sending the request to the last byte of the response.
+    pub(super) duration: Duration,
 }
 
-impl HttpReply {
-    /// A header as text, empty if there is none.
+impl HttpResponse {
+    /// Value of a header as text; empty if the header is missing or not text.
     pub(super) fn header(&self, name: &str) -> &str {
-        let value = self.headers.get(name).and_then(|value| value.to_str().ok());
-        value.unwrap_or_default()
+        self.headers
+            .get(name)
+            .and_then(|value| value.to_str().ok())
+            .unwrap_or_default()
     }
 }
 
 impl Connection {
-    /// The connections to an endpoint; nothing is sent yet.
+    /// Prepares connections to an endpoint; nothing is sent yet.
     pub(super) fn new(access: &Access, scrub: Scrub, timeout: Duration) -> Result<Self> {
         Ok(Self {
             client: access.client(timeout, &scrub)?,
@@ -147,14 +152,14 @@ impl Connection {
         })
     }
 
-    /// Sends a body to a path below the base URL.
+    /// Sends a JSON body to a path below the base URL.
     pub(super) async fn post(
         &self,
         path: &str,
         headers: &HeaderMap,
-        body: &Parts,
+        body: &RequestBody,
         deadline: Deadline,
-    ) -> Result<HttpReply, AskError> {
+    ) -> Result<HttpResponse, AskError> {
         loop {
             let request = self
                 .client
@@ -162,19 +167,19 @@ impl Connection {
                 .headers(headers.clone())
                 .header(CONTENT_TYPE, "application/json")
                 .body(reqwest::Body::wrap(body.clone()));
-            let mut time = TryTime::new(deadline);
-            match self.exchange_in(request, &mut time).await {
-                // The process was stopped while it connected: nothing was sent.
-                Err(failed)
-                    if failed.failure.kind == FailureKind::Timeout
-                        && !failed.may_have_effect
-                        && !time.whole.paused().is_zero() => {}
-                sent => return sent,
+            let mut timer = AttemptTimer::new(deadline);
+            match self.exchange_within(&mut timer, request).await {
+                // The process was suspended while it connected: nothing was sent, so connect again.
+                Err(error)
+                    if error.failure.kind == FailureKind::Timeout
+                        && !error.may_have_effect
+                        && !timer.total.suspended().is_zero() => {}
+                outcome => return outcome,
             }
         }
     }
 
-    /// A request to a path below the base URL, with these fields in its query string.
+    /// Builds a request to a path below the base URL, with these fields in its query string.
     pub(in crate::ask) fn request(
         &self,
         method: Method,
@@ -193,105 +198,115 @@ impl Connection {
         &self,
         request: RequestBuilder,
         deadline: Deadline,
-    ) -> Result<HttpReply, AskError> {
-        self.exchange_in(request, &mut TryTime::new(deadline)).await
+    ) -> Result<HttpResponse, AskError> {
+        self.exchange_within(&mut AttemptTimer::new(deadline), request)
+            .await
     }
 
-    async fn exchange_in(
+    async fn exchange_within(
         &self,
+        timer: &mut AttemptTimer,
         request: RequestBuilder,
-        time: &mut TryTime,
-    ) -> Result<HttpReply, AskError> {
+    ) -> Result<HttpResponse, AskError> {
         let started = Instant::now();
-        let response = self.in_time(time, request.send()).await?;
+        let response = self.run_step(timer, request.send()).await?;
         self.has_answered.store(true, Ordering::Relaxed);
         let status = response.status();
         let headers = response.headers().clone();
-        let body = match self.receive(response, time).await {
-            Err(failed) if status.is_success() => return Err(failed),
-            // The status alone states that the request was refused.
+        let body = match self.receive(timer, response).await {
+            Err(error) if status.is_success() => return Err(error),
+            // The status of a refusal suffices without its body.
             body => body.unwrap_or_default(),
         };
-        Ok(HttpReply {
+        Ok(HttpResponse {
             status,
             headers,
             body,
-            took: started.elapsed().saturating_sub(time.whole.paused()),
+            duration: started.elapsed().saturating_sub(timer.total.suspended()),
         })
     }
 
-    /// The model's longest context and the files that it was loaded from, where the server reports them (vLLM does);
-    /// `None` if it cannot be asked.
+    /// Requests the context length and the path of a model, as text, from servers that report them (vLLM does); `None` if the request fails
+    /// or does not list the model.
     pub(super) async fn model_facts(
         &self,
         headers: &HeaderMap,
         parameters: &Parameters,
     ) -> Option<String> {
-        let request = self.client.get(self.base.join("models"));
-        let request = request.headers(headers.clone());
-        let exchange = self.exchange(request, Deadline::whole(self.timeout));
-        let answer = exchange.await.ok()?;
-        if !answer.status.is_success() {
+        let request = self
+            .client
+            .get(self.base.join("models"))
+            .headers(headers.clone());
+        let response = self
+            .exchange(request, Deadline::total(self.timeout))
+            .await
+            .ok()?;
+        if !response.status.is_success() {
             return None;
         }
-        let list = parse(std::str::from_utf8(&answer.body).ok()?).ok()?;
-        let models = list.get("data")?.as_array()?;
-        let own = models
+        let list = parse(std::str::from_utf8(&response.body).ok()?).ok()?;
+        let model = list
+            .get("data")?
+            .as_array()?
             .iter()
             .find(|model| model["id"] == *parameters.model)?;
-        let facts = ["max_model_len", "root"]
-            .map(|name| own.get(name).map(|value| format!("{name} {value}")));
-        let facts: Vec<String> = facts.into_iter().flatten().collect();
+        let facts: Vec<String> = ["max_model_len", "root"]
+            .into_iter()
+            .filter_map(|name| Some(format!("{name} {}", model.get(name)?)))
+            .collect();
         Some(self.scrub.line(&facts.join(", ")))
     }
 
-    /// Sends a request once, and writes the body of a successful response to a file, of at most `most` bytes. The body of the returned
-    /// response is empty then. No byte for the time of a request ends it.
-    pub(in crate::ask) async fn save(
+    /// Sends a request once, and writes the body of a successful response to a file of at most `max_bytes` bytes; the body of the returned
+    /// response is then empty. The download fails if no byte arrives for the timeout of a request.
+    pub(in crate::ask) async fn download(
         &self,
         request: RequestBuilder,
         to: &Path,
-        most: u64,
-    ) -> Result<HttpReply, AskError> {
+        max_bytes: u64,
+    ) -> Result<HttpResponse, AskError> {
         let started = Instant::now();
-        let mut time = TryTime::new(Deadline::download(self.timeout));
-        let mut response = self.in_time(&mut time, request.send()).await?;
+        let mut timer = AttemptTimer::new(Deadline::download(self.timeout));
+        let mut response = self.run_step(&mut timer, request.send()).await?;
         let (status, headers) = (response.status(), response.headers().clone());
         let body = if status.is_success() {
-            let failed = |what: String| AskError::new(FailureKind::Response, what);
-            let unwritten = |e| failed(format!("{}: cannot write: {e}", to.display()));
-            let mut file = files::create_new(to).map_err(unwritten)?;
+            let write_error = |error| {
+                let message = format!("{}: cannot write: {error}", to.display());
+                AskError::new(FailureKind::Response, message)
+            };
+            let mut file = files::create_new(to).map_err(write_error)?;
             let mut written = 0;
-            while let Some(chunk) = self.in_time(&mut time, response.chunk()).await? {
+            while let Some(chunk) = self.run_step(&mut timer, response.chunk()).await? {
                 written += chunk.len() as u64;
-                if written > most {
-                    let what = format!("{} sent a file of more than {most} bytes", self.base);
-                    return Err(failed(what));
+                if written > max_bytes {
+                    let message =
+                        format!("{} sent a file of more than {max_bytes} bytes", self.base);
+                    return Err(AskError::new(FailureKind::Response, message));
                 }
-                file.write_all(&chunk).map_err(unwritten)?;
+                file.write_all(&chunk).map_err(write_error)?;
             }
-            file.sync_all().map_err(unwritten)?;
+            file.sync_all().map_err(write_error)?;
             Vec::new()
         } else {
-            self.receive(response, &mut time).await.unwrap_or_default()
+            self.receive(&mut timer, response).await.unwrap_or_default()
         };
-        Ok(HttpReply {
+        Ok(HttpResponse {
             status,
             headers,
             body,
-            took: started.elapsed(),
+            duration: started.elapsed(),
         })
     }
 
-    /// The body of a response, decompressed, up to [`MAX_REPLY`].
+    /// Reads the decompressed body of a response, up to [`MAX_RESPONSE`].
     async fn receive(
         &self,
+        timer: &mut AttemptTimer,
         mut response: Response,
-        time: &mut TryTime,
     ) -> Result<Vec<u8>, AskError> {
         let mut body = Vec::new();
-        while let Some(chunk) = self.in_time(time, response.chunk()).await? {
-            if body.len() + chunk.len() > MAX_REPLY {
+        while let Some(chunk) = self.run_step(timer, response.chunk()).await? {
+            if body.len() + chunk.len() > MAX_RESPONSE {
                 let message = format!("{} answered with more than 16 MiB", self.base);
                 return Err(AskError::new(FailureKind::Response, message));
             }
@@ -300,29 +315,29 @@ impl Connection {
         Ok(body)
     }
 
-    /// The result of one step of a request, or its failure.
-    async fn in_time<T>(
+    /// Runs one step of an attempt, and describes its failure.
+    async fn run_step<T>(
         &self,
-        time: &mut TryTime,
+        timer: &mut AttemptTimer,
         step: impl Future<Output = reqwest::Result<T>>,
     ) -> Result<T, AskError> {
-        let message = match time.step(step).await {
-            Ok(done) => return done.map_err(|error| self.failed_try(error)),
-            Err(TimeOut::Whole(limit)) => self.no_answer_within(limit),
-            Err(TimeOut::Silence(limit)) => format!(
+        let message = match timer.run(step).await {
+            Ok(result) => return result.map_err(|error| self.request_error(error)),
+            Err(ReachedLimit::Total(limit)) => self.timeout_message(limit),
+            Err(ReachedLimit::Idle(limit)) => format!(
                 "{} sent nothing for {} s; allow more with --timeout",
                 self.base,
                 limit.as_secs_f64()
             ),
         };
         Err(AskError {
-            again: Again::Later,
+            retry: Retry::AfterDelay,
             ..AskError::new(FailureKind::Timeout, message)
         })
     }
 
-    /// The message about a request without an answer in time.
-    fn no_answer_within(&self, limit: Duration) -> String {
+    /// Message about a request without a response within a time limit.
+    fn timeout_message(&self, limit: Duration) -> String {
         let limit = limit.as_secs_f64();
         format!(
             "{} did not answer within {limit} s; allow more with --timeout",
@@ -330,14 +345,14 @@ impl Connection {
         )
     }
 
-    /// The failure of a request without a complete response.
-    fn failed_try(&self, error: reqwest::Error) -> AskError {
-        // A request whose connection was not made was not sent.
+    /// Error of a request without a complete response.
+    fn request_error(&self, error: reqwest::Error) -> AskError {
+        // Without a connection the request was not sent.
         let may_have_effect = !error.is_connect();
         if error.is_timeout() {
-            let message = self.no_answer_within(connect_limit(self.timeout));
+            let message = self.timeout_message(connect_timeout(self.timeout));
             return AskError {
-                again: Again::Later,
+                retry: Retry::AfterDelay,
                 may_have_effect,
                 ..AskError::new(FailureKind::Timeout, message)
             };
@@ -350,16 +365,18 @@ impl Connection {
                 self.base
             );
             return AskError {
-                again: Again::WhenTaken,
+                retry: Retry::WhenAccepted,
                 may_have_effect,
                 ..AskError::new(FailureKind::Connection, message)
             };
         }
         let is_mistyped = !self.has_answered.load(Ordering::Relaxed) && is_unknown_host(&text);
-        let unknown = is_mistyped.then_some(UNKNOWN_HOST);
-        let Some(remedy) = unknown.or_else(|| permanent_cause(&text, self.base.is_plain())) else {
+        let remedy = is_mistyped
+            .then_some(UNKNOWN_HOST)
+            .or_else(|| permanent_cause(&text, self.base.is_plain()));
+        let Some(remedy) = remedy else {
             return AskError {
-                again: Again::Later,
+                retry: Retry::AfterDelay,
                 may_have_effect,
                 ..AskError::new(FailureKind::Connection, format!("{}: {text}", self.base))
             };

@@ -1,11 +1,11 @@
-//! The cause of a connection that cannot be made: [`permanent_cause`] and [`is_unknown_host`] from the words of the HTTP client,
-//! [`lacks_open_files`] from its error.
+//! Causes of failed connections: [`permanent_cause`] and [`is_unknown_host`] search the error text of the HTTP client,
+//! [`lacks_open_files`] inspects the error itself.
 
 use std::error::Error;
 use std::io;
 
-/// Words of causes that another try does not remove, with what to do.
-const CAUSES: [(&[&str], &str); 7] = [
+/// Phrases in errors that a retry does not solve, with the remedy.
+const PERMANENT_CAUSES: [(&[&str], &str); 7] = [
     (
         &["UnknownIssuer", "self-signed", "self signed"],
         "its certificate is signed by an authority that is not trusted; name that authority, or the certificate itself, with --ca-file",
@@ -45,28 +45,28 @@ const CAUSES: [(&[&str], &str); 7] = [
     ),
 ];
 
-/// Words for a server that speaks TLS where plain HTTP was sent.
-const TLS_EXPECTED: [&str; 2] = ["invalid HTTP version parsed", "received invalid HTTP"];
+/// Phrases in errors of plain HTTP requests to a TLS port.
+const TLS_PORT: [&str; 2] = ["invalid HTTP version parsed", "received invalid HTTP"];
 
-/// The remedy for a failure to connect that another try does not remove; `None` for others. `is_plain` if http:// was used.
+/// Remedy for a connection error that a retry does not solve; `None` for other errors. `is_plain` is true for http:// addresses.
 pub(super) fn permanent_cause(text: &str, is_plain: bool) -> Option<&'static str> {
     if is_plain {
-        let is_tls = TLS_EXPECTED.iter().any(|words| text.contains(words));
+        let is_tls = TLS_PORT.iter().any(|phrase| text.contains(phrase));
         return is_tls.then_some(
             "the server does not answer in plain http at this port; if it speaks TLS, use https:// in --base-url",
         );
     }
-    let found = CAUSES
+    PERMANENT_CAUSES
         .iter()
-        .find(|(words, _)| words.iter().any(|words| text.contains(words)));
-    found.map(|(_, remedy)| *remedy)
+        .find(|(phrases, _)| phrases.iter().any(|phrase| text.contains(phrase)))
+        .map(|(_, remedy)| *remedy)
 }
 
-/// Remedy for a host name that no name server knows.
+/// Remedy for a host name that DNS does not know.
 pub(super) const UNKNOWN_HOST: &str = "no name server knows this host; check --base-url and the proxy settings, and that the server is started and this machine is online";
 
-/// Words of glibc, musl, macOS and Windows for a host name that does not exist. A name server that does not answer has others.
-const UNKNOWN_HOST_WORDS: [&str; 5] = [
+/// Phrases of glibc, musl, macOS and Windows for a host name that does not exist. A DNS outage has other phrases.
+const UNKNOWN_HOST_PHRASES: [&str; 5] = [
     "Name or service not known",
     "No address associated with hostname",
     "Name does not resolve",
@@ -74,19 +74,22 @@ const UNKNOWN_HOST_WORDS: [&str; 5] = [
     "No such host is known",
 ];
 
-/// True if the host name does not exist.
+/// True if the error text reports that the host name does not exist.
 pub(super) fn is_unknown_host(text: &str) -> bool {
-    UNKNOWN_HOST_WORDS.iter().any(|words| text.contains(words))
+    UNKNOWN_HOST_PHRASES
+        .iter()
+        .any(|phrase| text.contains(phrase))
 }
 
-/// Errors of systems that allow no further open file, to this process or to all: EMFILE and ENFILE; on Windows WSAEMFILE.
-const NO_MORE_FILES: &[i32] = if cfg!(windows) { &[10_024] } else { &[24, 23] };
+/// Error codes for too many open files, in this process or in the system: EMFILE and ENFILE; on Windows WSAEMFILE.
+const TOO_MANY_FILES: &[i32] = if cfg!(windows) { &[10_024] } else { &[24, 23] };
 
-/// True if a request failed because no further file could be opened, such as a connection.
+/// True if a request failed because the system allows no further open file or connection.
 pub(super) fn lacks_open_files(error: &(dyn Error + 'static)) -> bool {
-    let system = error.downcast_ref::<io::Error>();
-    let code = system.and_then(io::Error::raw_os_error);
-    code.is_some_and(|code| NO_MORE_FILES.contains(&code))
+    error
+        .downcast_ref::<io::Error>()
+        .and_then(io::Error::raw_os_error)
+        .is_some_and(|code| TOO_MANY_FILES.contains(&code))
         || error.source().is_some_and(lacks_open_files)
 }
 
@@ -95,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn causes_that_stay_have_a_remedy() {
+    fn permanent_causes_have_a_remedy() {
         for (text, is_plain, remedy) in [
             (
                 "invalid peer certificate: UnknownIssuer",
@@ -141,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_silent_name_server_is_no_unknown_host() {
+    fn a_dns_outage_is_not_an_unknown_host() {
         let lookup = "dns error: failed to lookup address information: ";
         assert!(is_unknown_host(&format!(
             "{lookup}Name or service not known"
@@ -153,13 +156,13 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn open_files_are_found_among_causes() {
+    fn too_many_open_files_are_found_among_causes() {
         #[derive(Debug, thiserror::Error)]
         #[error("outer")]
         struct Outer(#[source] io::Error);
-        let of_code = |code| Outer(io::Error::from_raw_os_error(code));
-        assert!(lacks_open_files(&of_code(24)));
-        assert!(!lacks_open_files(&of_code(111)));
+        let error_with_code = |code| Outer(io::Error::from_raw_os_error(code));
+        assert!(lacks_open_files(&error_with_code(24)));
+        assert!(!lacks_open_files(&error_with_code(111)));
         assert!(!lacks_open_files(&Outer(io::Error::other(
             "Too many open files"
         ))));

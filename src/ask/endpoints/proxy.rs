@@ -1,4 +1,4 @@
-//! The proxy of an endpoint, as the environment names it: [`check_proxy`].
+//! Check of the proxy settings in the environment: [`check_proxy`].
 
 use std::ffi::OsString;
 
@@ -9,21 +9,21 @@ use hyper_util::client::proxy::matcher::Matcher;
 use super::url::BaseUrl;
 use crate::error::{Error, Result};
 
-/// A proxy that can be used, to find out whether `NO_PROXY` exempts an address.
-const PROBE: &str = "http://127.0.0.1:1";
+/// Valid proxy address, to find out whether `NO_PROXY` exempts an address.
+const SAMPLE_PROXY: &str = "http://127.0.0.1:1";
 
-/// Refuses a proxy that cannot be used. reqwest ignores such a setting, and would connect to the endpoint directly.
+/// Checks that the proxy for an address is usable: reqwest ignores an invalid proxy and would connect directly.
 ///
-/// The variables and their order are those of reqwest: `HTTP_PROXY` or `HTTPS_PROXY` by the scheme of the address, then `ALL_PROXY`,
-/// each before its name in small letters. An empty variable is not set.
+/// Reads the same variables in the same order as reqwest: `HTTP_PROXY` or `HTTPS_PROXY` by the scheme of the address, then
+/// `ALL_PROXY`, each before its lower-case name. An empty variable counts as unset.
 ///
 /// # Errors
-/// Names the variable, and not its value, which may have a password.
+/// If the proxy is not usable. The error names the variable but not its value, which may contain a password.
 pub(super) fn check_proxy(
     base: &BaseUrl,
     variable: impl Fn(&str) -> Option<OsString>,
 ) -> Result<()> {
-    // For this machine no proxy is used.
+    // Requests to this machine use no proxy.
     if base.is_loopback() {
         return Ok(());
     }
@@ -36,18 +36,20 @@ pub(super) fn check_proxy(
             .find_map(|name| Some((name, variable(name)?)))
             .filter(|(_, value)| !value.is_empty())
     };
-    let own = if base.is_plain() {
+    let by_scheme = if base.is_plain() {
         ["HTTP_PROXY", "http_proxy"]
     } else {
         ["HTTPS_PROXY", "https_proxy"]
     };
-    let Some((name, value)) = first(own).or_else(|| first(["ALL_PROXY", "all_proxy"])) else {
+    let Some((name, value)) = first(by_scheme).or_else(|| first(["ALL_PROXY", "all_proxy"])) else {
         return Ok(());
     };
-    let except = first(["NO_PROXY", "no_proxy"]).and_then(|(_, value)| value.into_string().ok());
-    let except = except.unwrap_or_default();
-    let exempt = Matcher::builder().all(PROBE).no(except).build();
-    if exempt.intercept(&address).is_none() || value.to_str().is_some_and(is_usable) {
+    let no_proxy = first(["NO_PROXY", "no_proxy"])
+        .and_then(|(_, value)| value.into_string().ok())
+        .unwrap_or_default();
+    let matcher = Matcher::builder().all(SAMPLE_PROXY).no(no_proxy).build();
+    let is_exempt = matcher.intercept(&address).is_none();
+    if is_exempt || value.to_str().is_some_and(is_usable) {
         return Ok(());
     }
     let problem = "not a proxy that can be used, and nothing was sent without it; expected for example http://proxy.example:3128 (no \
@@ -55,36 +57,41 @@ pub(super) fn check_proxy(
     Err(Error::usage(name, problem))
 }
 
-/// Whether requests can be sent through a proxy of this address.
+/// True if requests can be sent through a proxy at this address.
 fn is_usable(proxy: &str) -> bool {
     let matcher = Matcher::builder().all(proxy.to_owned()).build();
-    let found = matcher.intercept(&Uri::from_static("http://host.example/"));
-    found.is_some_and(|proxy| {
-        let is_http = matches!(proxy.uri().scheme_str(), Some("http" | "https"));
-        is_http && proxy.uri().authority().is_some_and(is_address)
-    })
+    matcher
+        .intercept(&Uri::from_static("http://host.example/"))
+        .is_some_and(|proxy| {
+            let is_http = matches!(proxy.uri().scheme_str(), Some("http" | "https"));
+            is_http && proxy.uri().authority().is_some_and(is_valid_authority)
+        })
 }
 
-/// Whether an authority has a host, and a port that exists if it has one.
-fn is_address(authority: &Authority) -> bool {
-    let after_host = authority.as_str().strip_prefix(authority.host());
-    let port = after_host.and_then(|rest| rest.strip_prefix(':'));
-    let is_port = |port: &str| port.parse::<u16>().is_ok_and(|port| port > 0);
-    !authority.host().is_empty() && port.is_none_or(is_port)
+/// True if an authority has a host and either no port or a valid one.
+fn is_valid_authority(authority: &Authority) -> bool {
+    let port = authority
+        .as_str()
+        .strip_prefix(authority.host())
+        .and_then(|rest| rest.strip_prefix(':'));
+    !authority.host().is_empty()
+        && port.is_none_or(|port| port.parse::<u16>().is_ok_and(|port| port > 0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// The variable that is refused for this address and environment.
+    /// Variable with an unusable proxy for this address and environment.
     fn refused(base: &str, set: &[(&str, &str)]) -> Option<String> {
         let variable = |name: &str| {
-            let found = set.iter().find(|(known, _)| *known == name);
-            found.map(|(_, value)| value.into())
+            set.iter()
+                .find(|(known, _)| *known == name)
+                .map(|(_, value)| value.into())
         };
-        let error = check_proxy(&base.parse().unwrap(), variable).err()?;
-        let error = error.to_string();
+        let error = check_proxy(&base.parse().unwrap(), variable)
+            .err()?
+            .to_string();
         assert!(!error.contains("pass"), "{error}");
         Some(error.split(':').next().unwrap_or_default().to_owned())
     }
@@ -118,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn proxies_that_can_be_used_are_taken() {
+    fn usable_proxies_are_accepted() {
         for proxy in [
             "",
             "http://proxy:3128",
@@ -131,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn a_proxy_that_is_not_asked_may_be_anything() {
+    fn unused_proxies_are_not_checked() {
         let wrong = ("ALL_PROXY", "socks5://proxy");
         assert_eq!(refused("http://127.0.0.1:8000/v1", &[wrong]), None);
         assert_eq!(
@@ -139,8 +146,8 @@ mod tests {
             None
         );
         assert_eq!(refused(PLAIN, &[("HTTPS_PROXY", "socks5://proxy")]), None);
-        for except in ["*", "llm.example", ".example, other"] {
-            assert_eq!(refused(PLAIN, &[wrong, ("NO_PROXY", except)]), None);
+        for no_proxy in ["*", "llm.example", ".example, other"] {
+            assert_eq!(refused(PLAIN, &[wrong, ("NO_PROXY", no_proxy)]), None);
         }
         let other = refused(PLAIN, &[wrong, ("NO_PROXY", "other")]);
         assert_eq!(other.as_deref(), Some("ALL_PROXY"));

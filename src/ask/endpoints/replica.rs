@@ -1,4 +1,4 @@
-//! One address of an endpoint, and the way one request is sent to it: [`Replica`].
+//! One address of an endpoint: [`Replica`].
 
 use std::time::SystemTime;
 
@@ -7,11 +7,11 @@ use tokio::time::Instant;
 use tracing::debug;
 
 use super::access::Access;
-use super::connection::{Connection, Deadline, HttpReply};
+use super::connection::{Connection, Deadline, HttpResponse};
 use super::sending::Sending;
 use super::url::BaseUrl;
-use crate::ask::failures::{Again, AskError, Complaint, Reach, Unreadable, UnreadableReply};
-use crate::ask::pace::{Gate, RateLimits, Window, asked_wait};
+use crate::ask::failures::{ApiError, AskError, Reach, ReplyError, Retry, Unreadable};
+use crate::ask::pace::{Gate, RateLimits, Window, retry_after};
 use crate::ask::requests::Request;
 use crate::ask::secrets::without_secrets;
 use crate::ask::vendors::Vendor;
@@ -20,7 +20,7 @@ use crate::ask::wire_kind::Wire;
 use crate::error::Result;
 use crate::types::{FailureKind, Finish, Reply};
 
-/// One address of an endpoint: its key, pooled connections, and the pauses that it asked for.
+/// One address of an endpoint, with its key, pooled connections, rate limiter and concurrency window.
 #[derive(Debug)]
 pub(super) struct Replica {
     access: Access,
@@ -31,7 +31,7 @@ pub(super) struct Replica {
 }
 
 impl Replica {
-    /// A replica that is ready for requests; nothing is sent yet.
+    /// Prepares a replica for requests; nothing is sent yet.
     ///
     /// # Errors
     /// If a key would be sent unencrypted to another machine, or if two keys are set.
@@ -47,17 +47,17 @@ impl Replica {
         })
     }
 
-    /// The number of requests that may be in flight now, within [`Sending::concurrency`].
+    /// Maximum number of requests in flight at the moment, within [`Sending::concurrency`].
     pub(super) fn width(&self) -> usize {
         self.window.width()
     }
 
-    /// The base URL; its text has no user, password and query string.
+    /// The base URL; its `Display` form has no user name, password and query string.
     pub(super) fn base(&self) -> &BaseUrl {
         &self.access.base
     }
 
-    /// Facts about the vendor.
+    /// Vendor of the host; `None` if no table lists it.
     pub(super) fn vendor(&self) -> Option<&'static Vendor> {
         self.access.vendor
     }
@@ -66,12 +66,12 @@ impl Replica {
         self.access.key.is_some() || self.base().has_credentials()
     }
 
-    /// The headers of every request to an API.
+    /// Headers of every request through this API.
     pub(super) fn headers(&self, wire: Wire) -> Result<HeaderMap> {
         self.access.headers(wire)
     }
 
-    /// Sends the request once; `sent` is the time of its turn.
+    /// Sends the request once; `sent` is the time at which it passed the gate.
     pub(super) async fn send(
         &self,
         request: &Request<'_>,
@@ -82,62 +82,66 @@ impl Replica {
         let timeout = self.sending.timeout;
         let deadline = match wire {
             Wire::ChatStream => Deadline::stream(timeout),
-            Wire::Chat | Wire::Responses => Deadline::whole(timeout),
+            Wire::Chat | Wire::Responses => Deadline::total(timeout),
         };
-        let posted = self
+        let response = self
             .connection
-            .post(wire.path(), headers, &request.body, deadline);
-        let posted = posted.await;
-        let answer = posted.inspect_err(|failed| {
-            if failed.failure.kind == FailureKind::Timeout {
-                self.window.overloaded(sent);
-            }
-            // This process may open no more files: fewer connections need fewer.
-            if failed.again == Again::WhenTaken {
-                self.window.overloaded(sent);
-                self.gate.pause(self.sending.first_delay);
-            }
-        })?;
-        let status = answer.status.as_u16();
-        let (request_id, took) = (self.request_id(&answer), answer.took);
+            .post(wire.path(), headers, &request.body, deadline)
+            .await
+            .inspect_err(|error| {
+                if error.failure.kind == FailureKind::Timeout {
+                    self.window.record_overload(sent);
+                }
+                // This process cannot open more files: use fewer connections.
+                if error.retry == Retry::WhenAccepted {
+                    self.window.record_overload(sent);
+                    self.gate.pause(self.sending.first_delay);
+                }
+            })?;
+        let status = response.status.as_u16();
+        let (request_id, took) = (self.request_id(&response), response.duration);
         debug!(endpoint = %self.base(), status, ?took, request_id, "answered");
-        if !answer.status.is_success() {
+        if !response.status.is_success() {
             if asks_for_pause(status) {
-                self.window.overloaded(sent);
+                self.window.record_overload(sent);
             }
-            let mut complaint = wire.complaint(&answer.body);
-            if answer.status.is_redirection() {
-                complaint.message = format!("moved to {}", answer.header(LOCATION.as_str()));
+            let mut api_error = wire.parse_error(&response.body);
+            if response.status.is_redirection() {
+                api_error.message = format!("moved to {}", response.header(LOCATION.as_str()));
             }
-            return Err(self.refused_try(status, &complaint, &answer, request, sent));
+            return Err(self.refusal(status, &api_error, &response, request, sent));
         }
-        let unreadable = match wire.reply(&answer.body, answer.header(CONTENT_TYPE.as_str())) {
-            Ok(reply) => return Ok(self.succeeded(reply, &answer, sent)),
-            Err(unreadable) => unreadable,
+        let reply_error = match wire.reply(&response.body, response.header(CONTENT_TYPE.as_str())) {
+            Ok(reply) => return Ok(self.finish_reply(reply, &response, sent)),
+            Err(error) => error,
         };
-        let mut failed = match unreadable {
-            // An error without a code is a failure of the server, which may pass.
-            UnreadableReply::Complaint(complaint) => {
-                let code = complaint.status().unwrap_or(500);
-                self.refused_try(code, &complaint, &answer, request, sent)
+        let mut failed = match reply_error {
+            // An error without a code is a temporary failure of the server.
+            ReplyError::Api(api_error) => {
+                let code = api_error.status().unwrap_or(500);
+                self.refusal(code, &api_error, &response, request, sent)
             }
-            UnreadableReply::Other(unreadable) => {
+            ReplyError::Unreadable(unreadable) => {
                 let limit = request.sent.parameters.limit();
-                if let Some(reply) = cut_reply(&unreadable, limit) {
-                    return Ok(self.succeeded(reply, &answer, sent));
+                if let Some(reply) = truncated_reply(&unreadable, limit) {
+                    return Ok(self.finish_reply(reply, &response, sent));
                 }
                 let Unreadable {
-                    what,
+                    description,
                     usage,
                     finish,
                     is_final,
                 } = *unreadable;
                 let scrub = &self.connection.scrub;
-                let message = format!("{} answered with {}", self.base(), scrub.line(&what));
+                let message = format!("{} answered with {}", self.base(), scrub.line(&description));
                 AskError {
-                    again: if is_final { Again::Never } else { Again::Later },
+                    retry: if is_final {
+                        Retry::Never
+                    } else {
+                        Retry::AfterDelay
+                    },
                     finish: finish.map(|word| scrub.line(&word)),
-                    ..AskError::new(FailureKind::Response, message).charged(usage)
+                    ..AskError::new(FailureKind::Response, message).with_charge(usage)
                 }
             }
         };
@@ -145,89 +149,94 @@ impl Replica {
         Err(failed)
     }
 
-    /// The reply without keys; its tokens and the remaining limits are noted in the gate.
-    fn succeeded(&self, reply: Reply, answer: &HttpReply, sent: Instant) -> Reply {
-        self.window.succeeded(answer.took);
-        let allowance = RateLimits::read(&answer.headers, SystemTime::now());
+    /// Records the success in the window and the gate, and returns the reply without keys and with its latency.
+    fn finish_reply(&self, reply: Reply, response: &HttpResponse, sent: Instant) -> Reply {
+        self.window.record_success(response.duration);
+        let limits = RateLimits::read(&response.headers, SystemTime::now());
         let tokens = reply.usage.and_then(|usage| usage.total());
         self.gate
-            .succeeded(sent, tokens, allowance, self.sending.max_wait);
+            .record_success(sent, tokens, limits, self.sending.max_wait);
         Reply {
-            latency_ms: answer.took.as_millis() as u64,
+            latency_ms: response.duration.as_millis() as u64,
             ..without_secrets(reply, &self.connection.scrub)
         }
     }
 
-    /// The failure of a request that the server refused with this status.
-    fn refused_try(
+    /// Error of a request that the server refused with this status; pauses the gate if the server asks for it.
+    fn refusal(
         &self,
         status: u16,
-        complaint: &Complaint,
-        answer: &HttpReply,
+        api_error: &ApiError,
+        response: &HttpResponse,
         request: &Request<'_>,
         sent: Instant,
     ) -> AskError {
-        let mut failed = AskError::refused(status, complaint, request.wire, request.sent);
-        let is_retryable = match answer.header("x-should-retry") {
+        let mut failed = AskError::refused(status, api_error, request.wire, request.sent);
+        let is_retryable = match response.header("x-should-retry") {
             "true" => true,
             "false" => false,
-            _ => failed.again != Again::Never,
+            _ => failed.retry != Retry::Never,
         };
-        let remedy = &failed.failure.message;
-        let message = self.message(answer, complaint, remedy);
-        failed.failure.message = message;
+        failed.failure.message = self.refusal_message(response, api_error, &failed.failure.message);
         failed.failure.status = Some(status);
         let now = SystemTime::now();
-        let stated = asked_wait(&answer.headers, now).max(complaint.wait);
-        let reset = || RateLimits::read(&answer.headers, now).pause();
-        failed.wait = stated
-            .or_else(|| reset().filter(|_| status == 429))
-            .filter(|_| is_retryable);
+        let mut wait = retry_after(&response.headers, now).max(api_error.wait);
+        if wait.is_none() && status == 429 {
+            wait = RateLimits::read(&response.headers, now).pause();
+        }
+        failed.wait = wait.filter(|_| is_retryable);
         let is_full = status == 429 || (asks_for_pause(status) && failed.wait.is_some());
-        failed.again = match is_retryable {
-            false => Again::Never,
-            true if is_full => Again::WhenTaken,
-            true => Again::Later,
+        failed.retry = if !is_retryable {
+            Retry::Never
+        } else if is_full {
+            Retry::WhenAccepted
+        } else {
+            Retry::AfterDelay
         };
         failed
             .lost
-            .add(body_usage(&String::from_utf8_lossy(&answer.body)));
-        failed.may_have_effect = status >= 500 && !refuses_work(status);
+            .add(body_usage(&String::from_utf8_lossy(&response.body)));
+        failed.may_have_effect = status >= 500 && !is_rejected_unprocessed(status);
         self.pause(status, sent, &mut failed);
         failed
     }
 
-    /// The error text for a refused request.
-    fn message(&self, answer: &HttpReply, complaint: &Complaint, remedy: &str) -> String {
-        let status = answer.status.as_u16();
-        // Gateways send errors with the status of success.
-        let error = match complaint.status().filter(|_| answer.status.is_success()) {
-            Some(code) => format!(" with the error {code}"),
-            None if answer.status.is_success() => " with an error".to_owned(),
-            None => String::new(),
+    /// Error message for a refused request.
+    fn refusal_message(
+        &self,
+        response: &HttpResponse,
+        api_error: &ApiError,
+        remedy: &str,
+    ) -> String {
+        let status = response.status.as_u16();
+        // Gateways send errors with a success status.
+        let error = match api_error.status() {
+            Some(code) if response.status.is_success() => format!(" with the error {code}"),
+            None if response.status.is_success() => " with an error".to_owned(),
+            _ => String::new(),
         };
         let mut message = format!("{} answered {status}{error}", self.base());
-        let text = self.connection.scrub.line(&complaint.message);
+        let text = self.connection.scrub.line(&api_error.message);
         if !text.is_empty() {
             message = format!("{message}: {text}");
         }
         if !remedy.is_empty() {
             message = format!("{message} ({remedy})");
         }
-        let request_id = self.request_id(answer);
+        let request_id = self.request_id(response);
         if !request_id.is_empty() {
             message = format!("{message} [request {request_id}]");
         }
         message
     }
 
-    /// Makes all requests wait as long as the server asked; a request that would wait more than `--retries max-wait` is given up, and
-    /// the time at which it could go on is said.
+    /// Pauses all requests as long as the server asks. A request that would wait longer than `--retries max-wait` is given up; its message
+    /// then includes the wait.
     fn pause(&self, status: u16, sent: Instant, failed: &mut AskError) {
         let max_wait = self.sending.max_wait;
         match failed.wait {
             Some(wait) if wait > max_wait => {
-                failed.again = Again::Never;
+                failed.retry = Retry::Never;
                 if asks_for_pause(status) {
                     failed.reach = Reach::Endpoint;
                 }
@@ -238,42 +247,41 @@ impl Replica {
                     max_wait.as_secs_f64()
                 );
             }
-            wait if status == 429 && failed.again != Again::Never => {
-                self.gate.rate_limited(sent, wait);
+            wait if status == 429 && failed.retry != Retry::Never => {
+                self.gate.record_rate_limited(sent, wait);
             }
             Some(wait) if asks_for_pause(status) => self.gate.pause(wait),
-            // The server states no time: all wait as long as the refused request does before its first retry.
-            None if asks_for_pause(status) && failed.again != Again::Never => {
+            // The server states no wait: all requests wait as long as the refused one does before its first retry.
+            None if asks_for_pause(status) && failed.retry != Retry::Never => {
                 self.gate.pause(self.sending.first_delay);
             }
             _ => {}
         }
     }
 
-    /// The server's id of a request, without secrets; empty if it sent none.
-    fn request_id(&self, answer: &HttpReply) -> String {
-        self.connection.scrub.line(answer.header("x-request-id"))
+    /// The server's id of the request, without secrets; empty if the response has none.
+    fn request_id(&self, response: &HttpResponse) -> String {
+        self.connection.scrub.line(response.header("x-request-id"))
     }
 }
 
-/// The reply that the token limit cut, if a body without a reply was charged as many tokens as that: another attempt would be cut,
-/// too.
-fn cut_reply(unreadable: &Unreadable, limit: Option<u32>) -> Option<Reply> {
+/// An empty truncated reply, if a body without a reply was charged at least the token limit: a retry would be truncated too.
+fn truncated_reply(unreadable: &Unreadable, limit: Option<u32>) -> Option<Reply> {
     let tokens = unreadable.usage?.completion_tokens?;
-    let is_cut = unreadable.finish.is_none() && tokens >= u64::from(limit?);
-    is_cut.then(|| Reply {
+    let is_truncated = unreadable.finish.is_none() && tokens >= u64::from(limit?);
+    is_truncated.then(|| Reply {
         finish: Finish::Length,
         usage: unreadable.usage,
         ..Reply::local(String::new())
     })
 }
 
-/// Whether a server error means that the request was not worked on.
-fn refuses_work(status: u16) -> bool {
+/// True for a server error by which the request was rejected before any work on it.
+fn is_rejected_unprocessed(status: u16) -> bool {
     asks_for_pause(status) || matches!(status, 501 | 505)
 }
 
-/// Whether a status means that the server accepts no request at the moment.
+/// True if the status means that the server accepts no requests at the moment.
 fn asks_for_pause(status: u16) -> bool {
     matches!(status, 429 | 503 | 529)
 }

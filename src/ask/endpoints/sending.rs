@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::ask::pace::{Bounds, Quota};
+use crate::ask::pace::{ConcurrencyBounds, Quota};
 use crate::types::Decides;
 use crate::types::flags::{positive, seconds};
 
@@ -15,7 +15,7 @@ pub struct Sending {
     /// Requests in flight at once: N, fewer if the server is overloaded; MIN-MAX, from MIN up as far as replies come no
     /// slower; or auto, from 8 up to 32, down to 1
     #[arg(long, value_name = "N|MIN-MAX|auto", default_value = "auto", add = Decides::Nothing)]
-    pub concurrency: Bounds,
+    pub concurrency: ConcurrencyBounds,
     /// The user's limits per minute.
     #[command(flatten)]
     pub quota: Quota,
@@ -28,8 +28,8 @@ pub struct Sending {
     /// Retries of a trial after an attempt that was charged and gave no reply, in all calls together
     #[arg(long, value_name = "N", default_value_t = 1, add = Decides::Nothing)]
     pub paid_retries: u32,
-    /// The wait before the first retry if the server asks for none. Each further wait doubles, and each is extended at random
-    /// by up to its length.
+    /// Wait before the first retry if the server does not ask for one. It doubles with each further retry; each wait is extended at
+    /// random by up to its own length.
     #[arg(skip = FIRST_DELAY)]
     pub first_delay: Duration,
     /// Seconds for which an endpoint may turn all requests away (status 429) before the run stops; these refusals do not count as retries
@@ -43,13 +43,13 @@ pub struct Sending {
     pub max_image: Option<f64>,
 }
 
-/// The wait before the first retry; chosen.
+/// Default of [`Sending::first_delay`]; chosen.
 const FIRST_DELAY: Duration = Duration::from_millis(500);
 
 impl Default for Sending {
     fn default() -> Self {
         Self {
-            concurrency: Bounds::DEFAULT,
+            concurrency: ConcurrencyBounds::DEFAULT,
             quota: Quota::default(),
             timeout: Duration::from_mins(2),
             retries: 5,

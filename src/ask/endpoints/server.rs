@@ -1,11 +1,11 @@
-//! The server at which models are asked: its flags ([`AccessArgs`]), and its settings with the key ([`Server`]).
+//! The server of a run: its flags ([`AccessArgs`]), and the resolved settings with the key ([`Server`]).
 
 use std::path::PathBuf;
 
 use clap::Args;
 
 use super::access::{Access, Authorities};
-use super::own_headers::CustomHeaders;
+use super::custom_headers::CustomHeaders;
 use super::sending::Sending;
 use super::url::BaseUrl;
 use super::variable::variable;
@@ -14,16 +14,16 @@ use crate::ask::vendors::{Vendor, VendorTable};
 use crate::error::{Error, Result};
 use crate::types::Decides;
 
-/// The endpoint if neither `--base-url` nor `OPENAI_BASE_URL` names one.
-const BASE_URL: &str = "https://api.openai.com/v1";
+/// Base URL if neither `--base-url` nor `OPENAI_BASE_URL` is set.
+const DEFAULT_BASE_URL: &str = "https://api.openai.com/v1";
 
-/// The variable that names the endpoint if `--base-url` does not.
+/// Variable with the base URL if `--base-url` is not set.
 const BASE_URL_VARIABLE: &str = "OPENAI_BASE_URL";
 
-/// The variable that holds the key of endpoints that the table of vendors does not have.
+/// Variable with the key of endpoints that are not in the table of vendors.
 pub(crate) const OPENAI_KEY: &str = "OPENAI_API_KEY";
 
-/// The value of `--api-key-env` for an endpoint without keys.
+/// Value of `--api-key-env` for an endpoint without keys.
 const NO_KEY: &str = "none";
 
 /// The address of an endpoint, its key and its headers.
@@ -67,23 +67,23 @@ pub(crate) struct AccessArgs {
     pub allow_http: bool,
 }
 
-/// The address of a server, and how requests are sent to it.
+/// Replicas of a server, and the settings for sending requests to it.
 #[derive(Debug, Clone)]
 pub(crate) struct Server {
-    /// The address, the key and the certificates of each replica; at least one.
+    /// Address, key and certificates of each replica; at least one.
     pub replicas: Vec<Access>,
-    /// The timeouts, retries and rate limits of requests.
+    /// Timeouts, retries and rate limits of requests.
     pub sending: Sending,
 }
 
 impl Server {
-    /// The maximum number of requests in flight, at all replicas together.
-    pub(crate) fn most_in_flight(&self) -> usize {
+    /// Maximum number of requests in flight, at all replicas together.
+    pub(crate) fn max_in_flight(&self) -> usize {
         let replicas = self.replicas.len();
-        self.sending.concurrency.share(replicas).most() * replicas
+        self.sending.concurrency.per_replica(replicas).max() * replicas
     }
 
-    /// The addresses of all replicas, as text without secrets.
+    /// Addresses of all replicas, without secrets.
     pub(crate) fn addresses(&self) -> Vec<String> {
         self.replicas
             .iter()
@@ -93,7 +93,7 @@ impl Server {
 }
 
 impl AccessArgs {
-    /// The same endpoint without a key.
+    /// The same endpoint, without any key.
     #[must_use]
     pub(crate) fn without_key(&self) -> Self {
         Self {
@@ -104,9 +104,9 @@ impl AccessArgs {
         }
     }
 
-    /// Another endpoint: nothing that authenticates at this one is sent there.
+    /// Flags for another endpoint: without the key and the headers of this one.
     #[must_use]
-    pub(crate) fn elsewhere(&self, base_url: String) -> Self {
+    pub(crate) fn for_base_url(&self, base_url: String) -> Self {
         Self {
             base_url: vec![base_url],
             ca_file: self.ca_file.clone(),
@@ -117,10 +117,10 @@ impl AccessArgs {
         }
     }
 
-    /// Reads the key, the headers and the certificates.
+    /// Reads the keys, the headers and the certificates.
     ///
     /// # Errors
-    /// If the address is not valid, or a key, header or certificate cannot be read.
+    /// If an address is not valid or occurs twice, or a key, header or certificate cannot be read or must not be sent.
     pub(crate) fn server(&self, sending: Sending) -> Result<Server> {
         let authorities = self.ca_file.as_deref().map(Authorities::load).transpose()?;
         let authorities = authorities.unwrap_or_default();
@@ -132,11 +132,14 @@ impl AccessArgs {
                 return Err(Error::usage("--base-url", problem));
             }
             let vendor = vendors.at_host(base.host());
-            vendor.map_or(Ok(()), |vendor| vendor.check_address(&base))?;
+            if let Some(vendor) = vendor {
+                vendor.check_address(&base)?;
+            }
             let key = self.key(&base, vendor)?;
-            match &key {
-                Some(key) if !self.key_anyway => check_owner(key, &base, vendors)?,
-                _ => {}
+            if let Some(key) = &key
+                && !self.key_anyway
+            {
+                check_owner(key, &base, vendors)?;
             }
             replicas.push(Access {
                 vendor,
@@ -152,25 +155,27 @@ impl AccessArgs {
         Ok(Server { replicas, sending })
     }
 
-    /// The user's own vendors.
+    /// Reads the vendors of `--vendor`.
     fn vendors(&self) -> Result<VendorTable> {
-        let own = self.vendor.as_deref().map(VendorTable::read);
-        Ok(own.transpose()?.unwrap_or_default())
+        match &self.vendor {
+            Some(path) => VendorTable::read(path),
+            None => Ok(VendorTable::default()),
+        }
     }
 
-    /// The addresses that flags or the environment name, else OpenAI's.
+    /// Addresses from the flags or the environment, by default OpenAI's.
     ///
     /// # Errors
-    /// If one is not valid.
+    /// If an address is not valid.
     pub(crate) fn addresses(&self) -> Result<Vec<BaseUrl>> {
         if self.base_url.is_empty() {
             let named = variable(BASE_URL_VARIABLE);
-            return Ok(vec![named.as_deref().unwrap_or(BASE_URL).parse()?]);
+            return Ok(vec![named.as_deref().unwrap_or(DEFAULT_BASE_URL).parse()?]);
         }
         self.base_url.iter().map(|text| text.parse()).collect()
     }
 
-    /// Where the key comes from, for people: never the key itself.
+    /// Description of the source of the key, without the key.
     pub(crate) fn key_source(&self, replica: &Access) -> String {
         if let Some(path) = &self.api_key_file {
             return format!("the file {}", path.display());
@@ -186,12 +191,12 @@ impl AccessArgs {
         }
     }
 
-    /// Checks that no key and no header goes to an address that only a run folder names, unless it is that of a vendor of the built-in
-    /// table: the folder may be a stranger's.
+    /// Checks that neither a key nor a custom header is sent to an address from a run folder, which may come from someone else. Addresses
+    /// of vendors in the built-in table are safe.
     ///
     /// # Errors
-    /// If one would.
-    pub(crate) fn check_address_of_run(&self, base: &BaseUrl) -> Result<()> {
+    /// If a key or a custom header would be sent.
+    pub(crate) fn check_run_address(&self, base: &BaseUrl) -> Result<()> {
         if Vendor::has_host(base.host()) && !base.is_plain() {
             return Ok(());
         }
@@ -206,58 +211,58 @@ impl AccessArgs {
         Err(Error::usage("--base-url", problem))
     }
 
-    /// The key from a file or a variable. For an endpoint on another machine a key is required, except with `none`.
+    /// Reads the key from a file or a variable. An endpoint on another machine requires a key, except with `none`.
     fn key(&self, base: &BaseUrl, vendor: Option<&'static Vendor>) -> Result<Option<Secret>> {
         if let Some(path) = &self.api_key_file {
             return Secret::read(path).map(Some);
         }
         if let Some(name) = self.api_key_env.as_deref() {
-            let wrong = |problem: String| Error::usage("--api-key-env", problem);
             if name == NO_KEY {
                 return Ok(None);
             }
             if looks_like_key(name) {
-                return Err(wrong(
+                return Err(Error::usage(
+                    "--api-key-env",
                     "the name of a variable expected; this value looks like a key and is not shown here: put it into a variable, and name \
-                     that variable"
-                        .to_owned(),
+                     that variable",
                 ));
             }
-            let text = variable(name);
-            let text = text.ok_or_else(|| wrong(format!("the variable {name} is not set")))?;
+            let text = variable(name).ok_or_else(|| {
+                let problem = format_args!("the variable {name} is not set");
+                Error::usage("--api-key-env", problem)
+            })?;
             return Secret::new(&text, name).map(Some);
         }
         let names = key_variables(base, vendor);
-        let mut set = names
-            .iter()
-            .filter_map(|name| Some((*name, variable(name)?)));
-        match set.next() {
+        let first_set = names.iter().find_map(|name| Some((*name, variable(name)?)));
+        match first_set {
             Some((name, text)) => Secret::new(&text, name).map(Some),
             None if base.is_loopback() || base.has_credentials() => Ok(None),
-            // A header from a variable authenticates, too.
+            // A header from a variable authenticates the user instead.
             None if !self.header_env.is_empty() => Ok(None),
-            None => Err(no_key(base, &names)),
+            None => Err(missing_key_error(base, &names)),
         }
     }
 }
 
-/// The variables that may hold the key of an endpoint, in order. OpenAI's key goes to another vendor only if `OPENAI_BASE_URL`
-/// names the host.
+/// Variables that may hold the key of an endpoint, in order. OpenAI's key is sent to another vendor only if `OPENAI_BASE_URL` has the
+/// same host.
 fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'static str> {
     let Some(vendor) = vendor else {
         return vec![OPENAI_KEY];
     };
     let mut names: Vec<&str> = vendor.key.iter().map(String::as_str).collect();
-    let named = variable(BASE_URL_VARIABLE).and_then(|text| text.parse::<BaseUrl>().ok());
-    let is_named = named.is_some_and(|named| named.host() == base.host());
-    if is_named && !names.contains(&OPENAI_KEY) {
+    let has_same_host = variable(BASE_URL_VARIABLE)
+        .and_then(|text| text.parse::<BaseUrl>().ok())
+        .is_some_and(|url| url.host() == base.host());
+    if has_same_host && !names.contains(&OPENAI_KEY) {
         names.push(OPENAI_KEY);
     }
     names
 }
 
-/// The variables of the tools of a host's vendor; none if the built-in table does not have the host.
-pub(crate) fn own_variables(host: &str) -> Vec<&'static str> {
+/// Environment variables of the tools of a host's vendor; empty if the built-in table does not have the host.
+pub(crate) fn vendor_variables(host: &str) -> Vec<&'static str> {
     Vendor::at_host(host)
         .into_iter()
         .flat_map(|vendor| vendor.key.iter().chain(vendor.account.values()))
@@ -265,15 +270,15 @@ pub(crate) fn own_variables(host: &str) -> Vec<&'static str> {
         .collect()
 }
 
-/// The error about an endpoint without a key.
-fn no_key(base: &BaseUrl, names: &[&str]) -> Error {
-    let foreign = !names.contains(&OPENAI_KEY) && variable(OPENAI_KEY).is_some();
-    let foreign = if foreign {
+/// Error about a missing key.
+fn missing_key_error(base: &BaseUrl, names: &[&str]) -> Error {
+    let has_unused_key = !names.contains(&OPENAI_KEY) && variable(OPENAI_KEY).is_some();
+    let unused_key = if has_unused_key {
         " (OPENAI_API_KEY is set, and is not sent to another vendor unless --api-key-env names it)"
     } else {
         ""
     };
-    let these = if names.len() == 1 {
+    let variables = if names.len() == 1 {
         "this variable"
     } else {
         "one of these variables"
@@ -281,13 +286,13 @@ fn no_key(base: &BaseUrl, names: &[&str]) -> Error {
     Error::usage(
         names.join(", "),
         format_args!(
-            "no key for {base}: set {these}{foreign}, or name another with --api-key-env NAME or a file with --api-key-file FILE; \
+            "no key for {base}: set {variables}{unused_key}, or name another with --api-key-env NAME or a file with --api-key-file FILE; \
              name your own server with --base-url URL; --api-key-env none sends no key"
         ),
     )
 }
 
-/// The headers for accounts with several organizations or projects, from the variables that the vendor's clients use.
+/// Headers for accounts with several organizations or projects, from the variables that the vendor's clients use.
 fn account_headers(vendor: Option<&Vendor>) -> Vec<(String, String)> {
     vendor
         .into_iter()

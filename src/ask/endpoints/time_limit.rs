@@ -1,53 +1,54 @@
-//! A time limit that counts only the time in which the process ran: [`TimeLimit`].
+//! Time limit that counts only the time in which the process runs: [`TimeLimit`].
 //!
-//! A stopped process (Ctrl-Z, `scontrol suspend`, a closed laptop) reads nothing, while the clock goes on. The replies that arrive in
-//! the pause are paid for: they must be read before a timeout is judged.
+//! A suspended process (Ctrl-Z, `scontrol suspend`, a closed laptop) reads nothing, but the clock goes on. Replies that arrive during
+//! the suspension are paid for, so they must be read before a timeout is declared.
 
 use std::pin::pin;
 use std::time::Duration;
 
 use tokio::time::{Instant, timeout};
 
-/// The number of steps in which a limit is counted, and the shortest and longest step; chosen. A pause counts as one step.
+/// Number of steps into which a limit is divided, and the shortest and longest step; chosen. A suspension counts as one step.
 const STEPS: u32 = 20;
-const SHORTEST: Duration = Duration::from_millis(10);
-const LONGEST: Duration = Duration::from_secs(1);
+const MIN_STEP: Duration = Duration::from_millis(10);
+const MAX_STEP: Duration = Duration::from_secs(1);
 
-/// A step that ends this much too late contains a pause; chosen: a busy machine delays a timer less.
-const PAUSE: Duration = Duration::from_millis(100);
+/// Minimum delay of a step that counts as a suspension; chosen: a busy machine delays a timer less.
+const MIN_SUSPENSION: Duration = Duration::from_millis(100);
 
-/// A limit of the time in which the process runs, for one future or for several in turn.
+/// Limit on the time in which the process runs, for one future or several consecutive ones.
 #[derive(Debug)]
 pub(super) struct TimeLimit {
     step: Duration,
+    /// Time left.
     left: Duration,
-    paused: Duration,
+    /// Total time of the detected suspensions.
+    suspended: Duration,
 }
 
 impl TimeLimit {
-    /// A limit of which nothing is used.
     pub(super) fn new(limit: Duration) -> Self {
         Self {
-            step: (limit / STEPS).clamp(SHORTEST, LONGEST),
+            step: (limit / STEPS).clamp(MIN_STEP, MAX_STEP),
             left: limit,
-            paused: Duration::ZERO,
+            suspended: Duration::ZERO,
         }
     }
 
-    /// The output of a future, or `None` if the limit is reached first.
+    /// Runs a future; `None` if the limit is reached before it ends.
     pub(super) async fn run<T>(&mut self, future: impl Future<Output = T>) -> Option<T> {
         let mut future = pin!(future);
         loop {
-            // With no time left, what has arrived is read.
+            // With no time left, a step of zero still reads data that has arrived.
             let step = self.step.min(self.left);
             let started = Instant::now();
             let output = timeout(step, future.as_mut()).await;
-            let took = started.elapsed();
-            self.left = self.left.saturating_sub(took.min(step));
-            let late = took.saturating_sub(step);
-            if late > self.step.max(PAUSE) {
-                self.paused += late;
-                // One more step reads what arrived during the pause.
+            let elapsed = started.elapsed();
+            self.left = self.left.saturating_sub(elapsed.min(step));
+            let delay = elapsed.saturating_sub(step);
+            if delay > self.step.max(MIN_SUSPENSION) {
+                self.suspended += delay;
+                // One more step reads data that arrived during the suspension.
                 self.left = self.left.max(self.step);
             }
             match output {
@@ -58,13 +59,13 @@ impl TimeLimit {
         }
     }
 
-    /// The time in which the process did not run, as far as it was noticed.
-    pub(super) fn paused(&self) -> Duration {
-        self.paused
+    /// Total time of the detected suspensions of the process.
+    pub(super) fn suspended(&self) -> Duration {
+        self.suspended
     }
 }
 
-/// Sleeps for a time in which the process runs.
+/// Sleeps until the process has run for a time; suspensions do not count.
 pub(crate) async fn sleep_running(time: Duration) {
     let _ = TimeLimit::new(time).run(std::future::pending::<()>()).await;
 }
@@ -80,16 +81,16 @@ mod tests {
 
     const LIMIT: Duration = Duration::from_millis(400);
 
-    /// A pause of the process, as far as its only thread is concerned.
-    const STOPPED: Duration = Duration::from_millis(900);
+    /// Simulated suspension of the process: its only thread sleeps.
+    const SUSPENSION: Duration = Duration::from_millis(900);
 
     #[tokio::test(start_paused = true)]
-    async fn limit_is_exact_without_pause() {
+    async fn limit_is_exact_without_suspension() {
         for limit in [1, 7, 400, 120_000].map(Duration::from_millis) {
             let started = Instant::now();
             assert!(TimeLimit::new(limit).run(pending::<()>()).await.is_none());
             let took = started.elapsed();
-            assert!(took >= limit && took < limit + SHORTEST, "{took:?}");
+            assert!(took >= limit && took < limit + MIN_STEP, "{took:?}");
         }
     }
 
@@ -98,40 +99,47 @@ mod tests {
         let mut limit = TimeLimit::new(LIMIT);
         assert!(limit.run(sleep(LIMIT * 3 / 4)).await.is_some());
         assert!(limit.run(sleep(LIMIT / 2)).await.is_none());
-        assert_eq!(limit.paused(), Duration::ZERO);
+        assert_eq!(limit.suspended(), Duration::ZERO);
     }
 
-    /// The pieces of a reply that arrive one by one.
+    /// Chunks of a reply that arrive one by one.
     #[tokio::test(start_paused = true)]
     async fn short_futures_do_not_outlast_the_limit() {
         let mut limit = TimeLimit::new(LIMIT);
-        let piece = Duration::from_millis(5);
+        let interval = Duration::from_millis(5);
         let mut read = 0;
-        while limit.run(sleep(piece)).await.is_some() {
+        while limit.run(sleep(interval)).await.is_some() {
             read += 1;
-            assert!(read <= LIMIT.as_millis() / piece.as_millis(), "{read}");
+            assert!(read <= LIMIT.as_millis() / interval.as_millis(), "{read}");
         }
-        assert!(limit.run(async {}).await.is_some(), "what is there is read");
+        assert!(
+            limit.run(async {}).await.is_some(),
+            "data that has arrived is read"
+        );
     }
 
     #[tokio::test]
-    async fn pause_does_not_count() {
+    async fn suspension_does_not_count() {
         let mut limit = TimeLimit::new(LIMIT);
         let done = limit.run(async {
             sleep(LIMIT / 4).await;
-            thread::sleep(STOPPED);
+            thread::sleep(SUSPENSION);
             sleep(LIMIT / 4).await;
         });
         assert!(done.await.is_some());
-        assert!(limit.paused() > STOPPED / 2, "{:?}", limit.paused());
+        assert!(
+            limit.suspended() > SUSPENSION / 2,
+            "{:?}",
+            limit.suspended()
+        );
     }
 
     #[tokio::test]
-    async fn output_after_pause_comes_before_the_limit() {
-        // A pause in the last step: the future is ready only some polls later, as a socket that another task reads.
+    async fn output_after_suspension_precedes_the_limit() {
+        // Suspension in the last step: the future is ready only some polls later, like a socket that another task reads.
         let mut limit = TimeLimit::new(LIMIT);
-        limit.left = SHORTEST;
-        let stop = tokio::spawn(async { thread::sleep(STOPPED) });
+        limit.left = MIN_STEP;
+        let stop = tokio::spawn(async { thread::sleep(SUSPENSION) });
         let ready = async {
             stop.await.unwrap();
             for _ in 0..5 {

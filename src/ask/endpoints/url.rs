@@ -30,13 +30,13 @@ impl BaseUrl {
         self.0.host_str().unwrap_or_default()
     }
 
-    /// The port; `None` if it is not known for the scheme.
+    /// The port, or the default port of the scheme.
     #[must_use]
     pub(in crate::ask) fn port(&self) -> Option<u16> {
         self.0.port_or_known_default()
     }
 
-    /// Whether the host is this machine.
+    /// True if the host is this machine.
     #[must_use]
     pub fn is_loopback(&self) -> bool {
         let host = self.host();
@@ -46,24 +46,24 @@ impl BaseUrl {
             || bare.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
     }
 
-    /// Whether requests are sent unencrypted.
+    /// True for http://: requests are sent unencrypted.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.0.scheme() == "http"
     }
 
-    /// Whether anything stands behind the host's name.
+    /// True if the URL has a path other than `/`.
     pub(in crate::ask) fn has_path(&self) -> bool {
         !self.0.path().trim_matches('/').is_empty()
     }
 
-    /// Whether the URL has a user name or password.
+    /// True if the URL has a user name or password.
     #[must_use]
     pub fn has_credentials(&self) -> bool {
         !self.0.username().is_empty() || self.0.password().is_some()
     }
 
-    /// The secrets in the URL: user and password in every form that a server could repeat, and the values of the query string.
+    /// Secrets in the URL: user name and password in every form that a server could repeat, and the values of the query string.
     pub(super) fn secrets(&self) -> Vec<String> {
         let mut secrets = Vec::new();
         if self.has_credentials() {
@@ -85,7 +85,7 @@ impl BaseUrl {
     }
 }
 
-/// A text without percent encoding.
+/// Decodes percent encoding.
 fn decoded(text: &str) -> String {
     percent_decode_str(text).decode_utf8_lossy().into_owned()
 }
@@ -93,7 +93,7 @@ fn decoded(text: &str) -> String {
 impl FromStr for BaseUrl {
     type Err = Error;
 
-    /// Reads an address. The error does not show it, because it may have a password.
+    /// Parses a URL. Errors do not show it, because it may contain a password.
     fn from_str(text: &str) -> Result<Self> {
         let wrong = |problem: &str| Error::usage("--base-url", problem);
         let url = Url::parse(text.trim()).map_err(|error| {
@@ -124,7 +124,7 @@ impl FromStr for BaseUrl {
 }
 
 impl fmt::Display for BaseUrl {
-    /// The address without user, password and query string.
+    /// Writes the URL without user name, password and query string.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}://{}", self.0.scheme(), self.host())?;
         if let Some(port) = self.0.port() {
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn secrets_of_the_address_are_not_shown() {
+    fn secrets_in_the_url_are_not_shown() {
         let base = url("https://me:p%40ss@h.example:444/v1?key=s3cr%20t&api-version=2024-10-21");
         assert_eq!(base.to_string(), "https://h.example:444/v1");
         assert_eq!(format!("{base:?}"), "BaseUrl(https://h.example:444/v1)");

@@ -1,13 +1,13 @@
-//! Failures: the errors of servers, their wordings, and whether a request is retried.
+//! Failures: parsing of server errors, their causes, and the decision whether to retry a request.
 
-mod complaint;
-mod failure;
-mod failure_class;
+mod api_error;
+mod ask_error;
 mod quota_refusal;
+mod refused;
 mod wording;
 
-pub(super) use complaint::{Complaint, Unreadable, UnreadableReply, page_title};
-pub(super) use failure::Again;
-pub use failure::{AskError, Reach};
+pub(super) use api_error::{ApiError, ReplyError, Unreadable, page_title};
+pub(super) use ask_error::Retry;
+pub use ask_error::{AskError, Reach};
 pub(crate) use quota_refusal::QuotaRefusal;
 pub(super) use wording::Wording;

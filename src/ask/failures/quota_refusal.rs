@@ -1,34 +1,34 @@
-//! The refusal of a batch because of the tokens that wait: [`QuotaRefusal`].
+//! Refusal of a batch because of the limit on enqueued tokens: [`QuotaRefusal`].
 
-use super::complaint::Complaint;
+use super::api_error::ApiError;
 use crate::ask::secrets::Scrub;
 
-/// The refusal of a batch because too many tokens already wait for batches.
+/// Refusal of a batch because too many tokens are already enqueued in batches.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct QuotaRefusal {
-    /// The number of tokens that may wait; `None` if the server does not state it.
+    /// Maximum number of enqueued tokens; `None` if the server does not report it.
     pub limit: Option<u64>,
-    /// The server's words, without secrets.
+    /// The server's message, without secrets.
     pub message: String,
 }
 
 impl QuotaRefusal {
-    /// The refusal in an error; `None` if the error is about something else.
-    pub(in crate::ask) fn from_complaint(complaint: &Complaint, scrub: &Scrub) -> Option<Self> {
-        let is_quota = complaint.has_code(&["token_limit_exceeded"])
-            || complaint.mentions_any(&["enqueued token"]);
+    /// Recognizes such a refusal; `None` for other errors.
+    pub(in crate::ask) fn from_api_error(api_error: &ApiError, scrub: &Scrub) -> Option<Self> {
+        let is_quota = api_error.has_code(&["token_limit_exceeded"])
+            || api_error.mentions_any(&["enqueued token"]);
         is_quota.then(|| Self {
-            limit: stated_limit(&complaint.message),
-            message: scrub.line(&complaint.message),
+            limit: stated_limit(&api_error.message),
+            message: scrub.line(&api_error.message),
         })
     }
 }
 
-/// The number behind "Limit:", with or without commas.
+/// Parses the number after "Limit:", with or without thousands separators.
 fn stated_limit(message: &str) -> Option<u64> {
     let lower = message.to_lowercase();
-    let (_, behind) = lower.split_once("limit:")?;
-    let digits: String = behind
+    let (_, after) = lower.split_once("limit:")?;
+    let digits: String = after
         .trim_start()
         .chars()
         .take_while(|c| c.is_ascii_digit() || matches!(c, ',' | '_'))
@@ -42,16 +42,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_limit_of_waiting_tokens_is_read_from_words() {
-        let of = |code: Option<&str>, message: &str| {
+    fn the_limit_is_parsed_from_the_message() {
+        let parse = |code: Option<&str>, message: &str| {
             let error = serde_json::json!({"code": code, "message": message});
-            QuotaRefusal::from_complaint(&Complaint::from_error(&error), &Scrub::default())
+            QuotaRefusal::from_api_error(&ApiError::from_error(&error), &Scrub::default())
         };
-        let words = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
+        let message = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
                      once some in_progress batches have been completed.";
-        assert_eq!(of(None, words).unwrap().limit, Some(90_000));
-        let azure = of(Some("token_limit_exceeded"), "The limit was exceeded");
+        assert_eq!(parse(None, message).unwrap().limit, Some(90_000));
+        let azure = parse(Some("token_limit_exceeded"), "The limit was exceeded");
         assert_eq!(azure.unwrap().limit, None);
-        assert_eq!(of(None, "Rate limit reached. Limit: 30000"), None);
+        assert_eq!(parse(None, "Rate limit reached. Limit: 30000"), None);
     }
 }

@@ -1,26 +1,26 @@
-//! Wordings of servers' errors, with the cause and the remedy: [`Wording::find`], by `wordings.toml`.
+//! Causes and remedies of server errors, recognized by their wording: [`Wording::find`], with the table `wordings.toml`.
 
 use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::complaint::Complaint;
-use super::failure::Reach;
+use super::api_error::ApiError;
+use super::ask_error::Reach;
 
-/// A cause of refused requests.
+/// A cause of refused requests, with the text patterns that indicate it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::ask) struct Wording {
     cause: String,
     remedy: String,
     reach: WordingReach,
-    /// Whether only requests with images are refused for it.
+    /// True if only requests with images can have this cause.
     #[serde(default)]
     images: bool,
     patterns: Vec<String>,
 }
 
-/// The requests that fail for a cause.
+/// Requests that fail for a cause.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum WordingReach {
@@ -34,23 +34,24 @@ struct Wordings {
     wording: Vec<Wording>,
 }
 
-static WORDINGS: LazyLock<Vec<Wording>> = LazyLock::new(|| {
-    let all: Wordings = toml::from_str(include_str!("../wordings.toml")).unwrap_or_default();
-    all.wording
-});
+/// The built-in table; a test parses it.
+static WORDINGS: LazyLock<Wordings> =
+    LazyLock::new(|| toml::from_str(include_str!("../wordings.toml")).unwrap_or_default());
 
 impl Wording {
-    /// The cause that an error is about; `None` if the table does not have it.
-    pub(in crate::ask) fn find(complaint: &Complaint, has_image: bool) -> Option<&'static Self> {
-        let texts = complaint.texts();
-        WORDINGS.iter().find(|wording| {
-            let mut patterns = wording.patterns.iter();
+    /// Finds the cause of an error; `None` if the table does not have it.
+    pub(in crate::ask) fn find(api_error: &ApiError, has_image: bool) -> Option<&'static Self> {
+        let texts = api_error.lower_case_texts();
+        WORDINGS.wording.iter().find(|wording| {
             (has_image || !wording.images)
-                && patterns.any(|pattern| texts.iter().any(|text| text.contains(pattern)))
+                && wording
+                    .patterns
+                    .iter()
+                    .any(|pattern| texts.iter().any(|text| text.contains(pattern)))
         })
     }
 
-    /// The requests that fail for the cause.
+    /// Requests that fail for this cause.
     pub(super) fn reach(&self) -> Reach {
         match self.reach {
             WordingReach::All => Reach::Endpoint,
@@ -58,7 +59,7 @@ impl Wording {
         }
     }
 
-    /// The cause and the remedy.
+    /// Cause and remedy, as one text.
     pub(super) fn hint(&self) -> String {
         format!("{}: {}", self.cause, self.remedy)
     }
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn words_of_servers_have_their_cause() {
+    fn server_errors_have_a_cause() {
         let error = |message: &str| json!({"error": {"message": message}}).to_string();
         let flat = |message: &str| {
             json!({"object": "error", "message": message, "type": "BadRequestError", "code": 400})
@@ -120,13 +121,13 @@ mod tests {
             (json!({"error": {"message": "Please reduce the length of the messages or completion.", "code": "context_length_exceeded"}}).to_string(), "--image max-side"),
             (json!([{"error": {"code": 400, "message": "Bad key", "details": [{"reason": "API_KEY_INVALID"}]}}]).to_string(), "--api-key-env"),
         ] {
-            let wording = Wording::find(&Complaint::from_body(&body), true);
+            let wording = Wording::find(&ApiError::from_body(&body), true);
             let hint = wording.unwrap_or_else(|| panic!("{body}")).hint();
             assert!(hint.contains(flag), "{body}: {hint}");
         }
-        let text = Complaint::from_body(r#"{"error":{"message":"m is not a multimodal model"}}"#);
+        let text = ApiError::from_body(r#"{"error":{"message":"m is not a multimodal model"}}"#);
         assert!(Wording::find(&text, false).is_none(), "no image was sent");
-        let other = Complaint::from_body(r#"{"error":{"message":"the image is too small"}}"#);
+        let other = ApiError::from_body(r#"{"error":{"message":"the image is too small"}}"#);
         assert!(Wording::find(&other, true).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! A model whose answers a function of this process gives: [`Local`].
+//! Model that a function in this process answers for: [`Local`].
 
 use std::fmt;
 
@@ -10,30 +10,31 @@ use crate::ask::requests::Call;
 use crate::types::questions::letter;
 use crate::types::{Digest, FailureKind, Finish, Observed, Question, Reply};
 
-/// Reason for the end of a reply that is a guess.
+/// Finish reason of a reply that is a guess.
 const GUESS: &str = "guess";
 
-/// The answer of a function.
+/// Answer of the function of a [`Local`] model.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct LocalAnswer {
     /// Index of the choice; `None` if the function does not know.
     pub(crate) choice: Option<usize>,
-    /// The observation, for the record; `None` without an image.
+    /// Observation to record; `None` without an image.
     pub(crate) observed: Option<Observed>,
-    /// Whether the record calls the answer a guess.
+    /// True to record the answer as a guess.
     pub(crate) guessed: bool,
 }
 
 /// A function that answers a question.
-pub(crate) type Opinion = dyn Fn(&Question, &Call<'_>) -> Result<LocalAnswer, String> + Send + Sync;
+pub(crate) type AnswerFn =
+    dyn Fn(&Question, &Call<'_>) -> Result<LocalAnswer, String> + Send + Sync;
 
-/// A model whose answers a function gives. If the function does not know, a choice is guessed as [`Random`] does: the same
-/// seed, question, condition and turn give the same guess.
+/// Model whose answers come from a function. If the function does not know the answer, [`Random`] guesses: the same seed, question,
+/// condition and turn give the same guess.
 pub struct Local {
     name: String,
     digest: Digest,
-    prior: Random,
-    opinion: Box<Opinion>,
+    fallback: Random,
+    answer_fn: Box<AnswerFn>,
 }
 
 impl fmt::Debug for Local {
@@ -43,14 +44,19 @@ impl fmt::Debug for Local {
 }
 
 impl Local {
-    /// A model with a name; `digest` is the digest of everything that decides the function's answers.
+    /// Creates a model; `digest` is the digest of everything that decides the function's answers.
     #[must_use]
-    pub(crate) fn new(name: String, digest: Digest, prior: Random, opinion: Box<Opinion>) -> Self {
+    pub(crate) fn new(
+        name: String,
+        digest: Digest,
+        fallback: Random,
+        answer_fn: Box<AnswerFn>,
+    ) -> Self {
         Self {
             name,
             digest,
-            prior,
-            opinion,
+            fallback,
+            answer_fn,
         }
     }
 
@@ -59,15 +65,15 @@ impl Local {
     }
 
     pub(super) fn content(&self) -> Value {
-        json!({"local": self.name, "digest": self.digest, "prior": self.prior.content()})
+        json!({"local": self.name, "digest": self.digest, "prior": self.fallback.content()})
     }
 
     pub(super) fn answer(&self, question: &Question, call: Call<'_>) -> Result<Reply, AskError> {
-        let answer = (self.opinion)(question, &call);
-        let answer = answer.map_err(|message| AskError::new(FailureKind::Request, message))?;
+        let answer = (self.answer_fn)(question, &call)
+            .map_err(|message| AskError::new(FailureKind::Request, message))?;
         let text = match answer.choice {
             Some(choice) => letter(choice).to_string(),
-            None => self.prior.answer(question, call),
+            None => self.fallback.answer(question, call),
         };
         let reply = Reply::local(text);
         Ok(Reply {

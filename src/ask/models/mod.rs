@@ -1,4 +1,4 @@
-//! Models: those at an endpoint, and those that answer in this process.
+//! Models: remote ones at an endpoint, and built-in ones in this process.
 
 mod local;
 mod model;

@@ -1,4 +1,4 @@
-//! The models that can be asked: [`Model`].
+//! Remote and built-in models: [`Model`].
 
 use serde_json::Value;
 
@@ -14,7 +14,7 @@ use crate::ask::requests::{Call, Message, Parameters};
 use crate::error::Result;
 use crate::types::{Digest, Reply};
 
-/// A model, remote or in this process.
+/// A model, at an endpoint or in this process.
 #[derive(Debug)]
 pub enum Model {
     /// A model at an endpoint.
@@ -28,7 +28,7 @@ pub enum Model {
 }
 
 impl Model {
-    /// The name in records and tables.
+    /// Name in records and tables.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
@@ -39,7 +39,7 @@ impl Model {
         }
     }
 
-    /// The content that decides a reply besides prompt and image: the model and its parameters, but not the address.
+    /// Everything besides prompt and image that decides a reply: the model and its parameters, but not the address.
     #[must_use]
     pub fn content(&self) -> Value {
         match self {
@@ -50,7 +50,7 @@ impl Model {
         }
     }
 
-    /// The digest of [`Model::content`].
+    /// Digest of [`Model::content`].
     ///
     /// # Errors
     /// If a number in it is not finite.
@@ -58,18 +58,18 @@ impl Model {
         Digest::canonical("darkqa.model/2", &self.content())
     }
 
-    /// The number of questions that may be in flight at once; `None` for any number.
+    /// Maximum number of questions in flight at the moment; `None` for any number.
     #[must_use]
     pub fn width(&self) -> Option<usize> {
         match self {
             Self::Remote(model) => Some(model.width()),
-            // It computes on the cores of this machine.
+            // The function uses the CPU of this machine.
             Self::Local(_) => std::thread::available_parallelism().ok().map(usize::from),
             Self::Random(_) | Self::Script(_) => None,
         }
     }
 
-    /// Whether both models are asked at one endpoint, whose window they share; or both are in this process.
+    /// True if both models are at the same endpoint, so that they share its window, or both are in this process.
     #[must_use]
     pub fn shares_endpoint(&self, other: &Self) -> bool {
         match (self.remote(), other.remote()) {
@@ -79,56 +79,57 @@ impl Model {
         }
     }
 
-    /// Stops further requests to the model's endpoint; those in flight are finished.
+    /// Stops further requests to the model's endpoint; requests in flight finish.
     pub fn close(&self) {
         if let Self::Remote(model) = self {
             model.endpoint().close();
         }
     }
 
-    /// Whether the model is asked over a network, which can fail.
+    /// True if the model is at an endpoint.
     #[must_use]
     pub fn is_remote(&self) -> bool {
         self.remote().is_some()
     }
 
-    /// The changes to requests after the server refused a field; see [`Remote::adapted`].
+    /// Changes to requests after the server refused a field; see [`Remote::adapted`].
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
         self.remote().map_or_else(Vec::new, Remote::adapted)
     }
 
-    /// The number of tokens of an image of this width and height, in pixels; `None` if unknown.
+    /// Number of tokens of an image of this width and height, in pixels; `None` if unknown.
     #[must_use]
     pub fn image_tokens(&self, width: u64, height: u64) -> Option<u64> {
         let Parameters { model, detail, .. } = self.remote()?.parameters();
         image_tokens(model, *detail, width, height)
     }
 
-    /// The maximum number of tokens in a reply; `None` for models without this limit.
+    /// Maximum number of tokens in a reply; `None` for models without this limit.
     #[must_use]
     pub fn max_tokens(&self) -> Option<u32> {
         Some(self.remote()?.parameters().max_tokens.get())
     }
 
-    /// The most tokens that a reply is charged, hidden reasoning included, if the server keeps to its limits; `None` if no limit holds
-    /// for all of them.
+    /// Maximum number of charged tokens of a reply, including hidden reasoning; `None` if not all of them are limited. The server may
+    /// exceed it.
     pub(crate) fn reply_limit(&self) -> Option<u64> {
         self.remote()?.reply_limit()
     }
 
-    /// The text of a request besides the question, in bytes: the system message.
+    /// Length of the system message in bytes; 0 without one.
     pub(crate) fn system_bytes(&self) -> usize {
-        let system = self.remote().map(|model| &model.parameters().extra.system);
-        system.and_then(Option::as_ref).map_or(0, String::len)
+        self.remote()
+            .and_then(|model| model.parameters().extra.system.as_ref())
+            .map_or(0, String::len)
     }
 
-    /// The token limit of its replies, if it is larger than the one that the run began with.
-    pub(crate) fn grown_limit(&self) -> Option<u32> {
-        self.remote()?.parameters().grown_limit()
+    /// Token limit of replies, if it was raised after the run began.
+    pub(crate) fn raised_limit(&self) -> Option<u32> {
+        self.remote()?.parameters().raised_limit()
     }
 
-    /// The body of a request as it would be sent now; `None` for models without requests.
+    /// Body of a request as it would be sent now; `None` for built-in models.
     #[must_use]
     pub fn body(
         &self,
@@ -138,8 +139,7 @@ impl Model {
         Some(self.remote()?.body(message, choices))
     }
 
-    /// One line of a Batch API's input file, with a line end; `None` if the model cannot be asked in a batch. `url` replaces
-    /// the API's path in the line.
+    /// A line of an input file for the Batch API, with a line end; `None` for built-in models. `url` is the path of the API in the line.
     ///
     /// # Errors
     /// If the line cannot be written as JSON.
@@ -154,47 +154,45 @@ impl Model {
             return Ok(None);
         };
         let body = model.batch_body(message, choices)?;
-        batch::line(id, url, &body).map(Some)
+        batch::input_line(id, url, &body).map(Some)
     }
 
-    /// The path in a line of a Batch API's file; `None` if the model cannot be asked in a batch.
+    /// Path of the API in the lines of a batch file; `None` for built-in models.
     pub(crate) fn batch_url(&self) -> Option<&'static str> {
         Some(self.remote()?.batch_url())
     }
 
-    /// The address of the files and batches of the model's endpoint, without secrets; `None` if the model is built in.
+    /// Base URL for files and batches, without secrets; `None` for built-in models.
     pub(crate) fn batch_base(&self) -> Option<String> {
         Some(self.remote()?.endpoint().base().to_string())
     }
 
-    /// The files and batches of the model's endpoint; `None` if the model is built in.
+    /// Client for the Files and Batch APIs of the model's endpoint; `None` for built-in models.
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
     pub(crate) fn batch_server(&self) -> Result<Option<BatchServer>> {
-        let remote = self.remote();
-        remote
+        self.remote()
             .map(|model| model.endpoint().batch_server())
             .transpose()
     }
 
-    /// Whether the files and batches of both models are those of one account; false if one is built in.
+    /// True if both models use the same account for files and batches; false for built-in models.
     ///
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
-    pub(crate) fn has_account_of(&self, other: &Self) -> Result<bool> {
+    pub(crate) fn shares_account_with(&self, other: &Self) -> Result<bool> {
         match (self.remote(), other.remote()) {
-            (Some(own), Some(other)) => own.endpoint().has_account_of(other.endpoint()),
+            (Some(own), Some(other)) => own.endpoint().shares_account_with(other.endpoint()),
             _ => Ok(false),
         }
     }
 
-    /// Adapts further requests to a refusal in the output of a batch, as after a refused request. Returns whether the request may
-    /// succeed now.
+    /// Adapts further requests after a refusal in the output of a batch. Returns true if the request may succeed now.
     #[must_use]
     pub(crate) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
-        let remote = self.remote();
-        remote.is_some_and(|model| model.adapt_to_refusal(status, body))
+        self.remote()
+            .is_some_and(|model| model.adapt_to_refusal(status, body))
     }
 
     fn remote(&self) -> Option<&Remote> {
@@ -204,12 +202,12 @@ impl Model {
         }
     }
 
-    /// Asks one question. The future may be dropped at any time, which gives up the request.
+    /// Asks one question. Dropping the future abandons the request.
     pub async fn ask(&self, call: Call<'_>) -> Result<Reply, AskError> {
         self.ask_within(call, None).await
     }
 
-    /// Asks one question; each of its requests holds this reservation while it is in flight.
+    /// Asks one question; the reservation covers the cost of each of its requests.
     pub(crate) async fn ask_within(
         &self,
         call: Call<'_>,
@@ -217,16 +215,16 @@ impl Model {
     ) -> Result<Reply, AskError> {
         match self {
             Self::Remote(model) => {
-                let choices = call.query.choices();
+                let choices = call.query.choice_count();
                 model.ask_within(call.message, choices, reservation).await
             }
             Self::Random(random) => {
-                let question = call.query.choice()?;
+                let question = call.query.require_choices()?;
                 Ok(Reply::local(random.answer(question, call)))
             }
             Self::Script(script) => script.answer(call.query.id(), call.condition),
             Self::Local(local) => {
-                let question = call.query.choice()?;
+                let question = call.query.require_choices()?;
                 tokio::task::block_in_place(|| local.answer(question, call))
             }
         }

@@ -1,4 +1,4 @@
-//! [`Random`]: a model that guesses.
+//! Model that guesses: [`Random`].
 
 use serde_json::{Value, json};
 
@@ -73,7 +73,7 @@ mod tests {
         let call = Call {
             query: Query::Choice(question),
             condition,
-            message: Message::words(""),
+            message: Message::text_only(""),
             turn,
         };
         Random { seed }.answer(question, call)
@@ -86,7 +86,7 @@ mod tests {
             let reply = guess(7, &question(id, 3), None, 0);
             counts[usize::from(reply.as_bytes()[0] - b'A')] += 1;
         }
-        // 129 is five standard deviations of a count of uniform guesses.
+        // 129 is five standard deviations of the count for uniform guesses.
         assert!(
             counts.iter().all(|count| count.abs_diff(1000) < 130),
             "{counts:?}"

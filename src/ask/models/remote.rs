@@ -1,4 +1,4 @@
-//! A model at an endpoint: [`Remote`].
+//! Model at an endpoint: [`Remote`].
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,9 +8,9 @@ use serde_json::{Map, Value};
 use tracing::warn;
 
 use crate::ask::costs::Reservation;
-use crate::ask::endpoints::{Endpoint, ModelNumber};
+use crate::ask::endpoints::{Endpoint, ModelIndex};
 use crate::ask::failures::{AskError, Reach};
-use crate::ask::requests::constraint::letter_of;
+use crate::ask::requests::constraint::constrained_letter;
 use crate::ask::requests::{
     AdaptableField, Constrain, Message, Parameters, Request, RequestFields, SentFields, Thinking,
     ThinkingBudget, TokenField,
@@ -19,144 +19,144 @@ use crate::ask::vendors::Vendor;
 use crate::error::{Error, Result};
 use crate::types::{FailureKind, LostAttempts, Reply};
 
-/// One model of an endpoint, asked with one set of parameters.
+/// A model of an endpoint with one set of parameters.
 #[derive(Debug)]
 pub struct Remote {
     endpoint: Arc<Endpoint>,
-    /// The model at the endpoint.
-    number: ModelNumber,
+    /// Index of the model at the endpoint.
+    index: ModelIndex,
     /// Headers for each replica of the endpoint.
     headers: Vec<HeaderMap>,
     parameters: Parameters,
-    /// The fields of the first request.
-    first: RequestFields,
-    /// The fields that the server accepts, as far as is known.
+    /// Fields of the first request.
+    initial: RequestFields,
+    /// Fields of the next request: adapted to all refusals so far.
     fields: Mutex<RequestFields>,
-    /// The outcome of the first question to the model. Until it has come to an end, the others wait: what the server refuses in all
-    /// requests is then found out by one.
-    scout: tokio::sync::Mutex<Scout>,
-    /// Whether the warning about an unconstrained reply was printed.
+    /// Outcome of the first question. The other questions wait for it, so that a refusal that concerns all requests costs a single one.
+    first_question: tokio::sync::Mutex<FirstQuestion>,
+    /// True after the warning about a reply that does not follow the constraint.
     warned_unconstrained: AtomicBool,
 }
 
-/// The outcome of the first question to a model.
+/// Outcome of the first question to a model.
 #[derive(Debug)]
-enum Scout {
-    /// None has come to an end.
-    Waiting,
-    /// It has a reply, or a failure that is its own.
+enum FirstQuestion {
+    /// No question has ended yet.
+    Pending,
+    /// The question has a reply, or a failure that does not concern other questions.
     Ended,
-    /// It has a failure that every other question would have, too.
+    /// The question failed in a way in which every other question would fail too.
     Refused(AskError),
 }
 
 impl Remote {
-    /// The model that `parameters` name; models of one endpoint share its connections and its pauses.
+    /// Prepares a model of an endpoint. All models of one endpoint share its connections and its rate limits.
     ///
     /// # Errors
-    /// If a header value has characters that HTTP does not allow, if `--thinking` cannot be said to the server, or if the user's own
-    /// fields contradict `--request constrain` or `--thinking`.
+    /// If a header value has characters that HTTP does not allow, if the server has no known switch for `--thinking`, or if fields of the
+    /// user contradict `--request constrain` or `--thinking`.
     pub fn open(endpoint: Arc<Endpoint>, parameters: Parameters) -> Result<Self> {
-        let first = RequestFields::first(&parameters, endpoint.base(), endpoint.vendor())?;
-        check_own_fields(&parameters, first)?;
+        let initial = RequestFields::initial(&parameters, endpoint.base(), endpoint.vendor())?;
+        check_user_fields(&parameters, initial)?;
         if let Some(vendor) = endpoint.vendor() {
             check_vendor(vendor, &parameters)?;
         }
         Ok(Self {
-            headers: endpoint.headers(parameters.wire.first())?,
-            fields: Mutex::new(first),
-            first,
-            number: endpoint.add_model(&parameters.model),
+            headers: endpoint.headers(parameters.wire.initial())?,
+            fields: Mutex::new(initial),
+            initial,
+            index: endpoint.add_model(&parameters.model),
             endpoint,
             parameters,
-            scout: tokio::sync::Mutex::new(Scout::Waiting),
+            first_question: tokio::sync::Mutex::new(FirstQuestion::Pending),
             warned_unconstrained: AtomicBool::new(false),
         })
     }
 
-    /// The name of the model at the endpoint.
+    /// Name of the model at the endpoint.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.parameters.model
     }
 
-    /// The endpoint at which the model is asked.
+    /// Endpoint of the model.
     #[must_use]
     pub fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
-    /// The number of requests that may be in flight now at the endpoint, within [`Sending::concurrency`](crate::ask::Sending).
+    /// Maximum number of requests in flight at the endpoint at the moment, within [`Sending::concurrency`](crate::ask::Sending).
     #[must_use]
     pub fn width(&self) -> usize {
-        self.endpoint.width(self.number)
+        self.endpoint.width(self.index)
     }
 
-    /// The parameters of every request.
+    /// Parameters of every request.
     #[must_use]
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
     }
 
-    /// The most tokens that a reply is charged, hidden reasoning included, if the server keeps to its limits; `None` if no limit holds
-    /// for all of them.
+    /// Maximum number of charged tokens of a reply, including hidden reasoning; `None` if not all of them are limited. The server may
+    /// exceed it.
     pub(super) fn reply_limit(&self) -> Option<u64> {
         let parameters = &self.parameters;
-        let field = self.fields().token_field;
-        let is_sent = field != TokenField::Omit && !parameters.extra.omits_token_limit();
+        let is_omitted = self.fields().token_field == TokenField::Omit;
+        if is_omitted || parameters.extra.omits_token_limit() {
+            return None;
+        }
         let limit = u64::from(parameters.max_tokens.get());
-        let budget = parameters.extra.thinking_budget();
-        let is_apart = self
+        let thinks_beyond_limit = self
             .endpoint
             .vendor()
             .is_some_and(|vendor| vendor.thinks_beyond_limit);
-        match budget {
-            _ if !is_sent => None,
+        match parameters.extra.thinking_budget() {
             Some(ThinkingBudget::Unlimited) => None,
-            _ if !is_apart || parameters.thinking == Some(Thinking::Off) => Some(limit),
+            _ if !thinks_beyond_limit || parameters.thinking == Some(Thinking::Off) => Some(limit),
             Some(ThinkingBudget::Tokens(tokens)) => Some(limit.saturating_add(tokens)),
             None => None,
         }
     }
 
-    /// The changes to requests after the server refused a field: settings that are left to the program (`auto`) are adapted
-    /// once for all requests, and never for a single one.
+    /// Changes to requests after the server refused a field. Only settings with the value `auto` are adapted, for all further requests.
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
-        self.fields().changes(self.first)
+        self.fields().changes(self.initial)
     }
 
-    /// The API and all parameters that can change a reply.
+    /// API and all parameters that can change a reply.
     pub(super) fn content(&self) -> Value {
         self.parameters.content()
     }
 
-    /// The path in a line of a Batch API's file.
+    /// Path of the API in the lines of a batch file.
     pub(super) fn batch_url(&self) -> &'static str {
         self.fields().wire.batch_url()
     }
 
-    /// Sends the single message of a conversation with this number of choices; 0 if the question is open.
+    /// Asks a question with this number of choices; 0 for an open question.
     pub async fn ask(&self, message: Message<'_>, choices: usize) -> Result<Reply, AskError> {
         self.ask_within(message, choices, None).await
     }
 
-    /// As [`Self::ask`]; each request holds the reservation while it is in flight.
+    /// Like [`Self::ask`]; the reservation covers the cost of each request.
     pub(super) async fn ask_within(
         &self,
         message: Message<'_>,
         choices: usize,
         reservation: Option<&Reservation>,
     ) -> Result<Reply, AskError> {
-        let mut scout = self.scout.lock().await;
-        match &*scout {
-            Scout::Waiting => {}
-            Scout::Ended => {
-                drop(scout);
-                let outcome = self.ask_adapting(message, choices, reservation).await;
-                return outcome.map_err(|error| reaching(error, Reach::Trial));
+        let mut first_question = self.first_question.lock().await;
+        match &*first_question {
+            FirstQuestion::Pending => {}
+            FirstQuestion::Ended => {
+                drop(first_question);
+                return self
+                    .ask_adapting(message, choices, reservation)
+                    .await
+                    .map_err(|error| resolve_alike(error, Reach::Trial));
             }
-            Scout::Refused(error) => {
+            FirstQuestion::Refused(error) => {
                 return Err(AskError {
                     attempts: 0,
                     lost: Box::default(),
@@ -164,17 +164,19 @@ impl Remote {
                 });
             }
         }
-        let outcome = self.ask_adapting(message, choices, reservation).await;
-        let outcome = outcome.map_err(|error| reaching(error, Reach::Endpoint));
-        *scout = match &outcome {
-            Err(error) if error.reach == Reach::Endpoint => Scout::Refused(error.clone()),
-            Err(error) if error.reach == Reach::Interrupted => Scout::Waiting,
-            _ => Scout::Ended,
+        let outcome = self
+            .ask_adapting(message, choices, reservation)
+            .await
+            .map_err(|error| resolve_alike(error, Reach::Endpoint));
+        *first_question = match &outcome {
+            Err(error) if error.reach == Reach::Endpoint => FirstQuestion::Refused(error.clone()),
+            Err(error) if error.reach == Reach::Interrupted => FirstQuestion::Pending,
+            _ => FirstQuestion::Ended,
         };
         outcome
     }
 
-    /// Asks, and again after each field that is adapted.
+    /// Asks a question, and again after each adaptation of a refused field.
     async fn ask_adapting(
         &self,
         message: Message<'_>,
@@ -197,9 +199,8 @@ impl Remote {
                     });
                 }
                 Ok(reply) => {
-                    let text = self.letter_or_text(reply.text, choices);
                     return Ok(Reply {
-                        text,
+                        text: self.letter_or_text(reply.text, choices),
                         attempts: attempts + reply.attempts,
                         lost: lost.plus(reply.lost),
                         ..reply
@@ -209,7 +210,7 @@ impl Remote {
         }
     }
 
-    /// The body of a request as it would be sent now, in one piece.
+    /// Body of a request as it would be sent now.
     ///
     /// # Errors
     /// If it cannot be written as JSON.
@@ -218,10 +219,10 @@ impl Remote {
         let body = fields
             .wire
             .body(&self.parameters, fields, message, choices)?;
-        Ok(body.joined())
+        Ok(body.concat())
     }
 
-    /// The body of a request in a batch, in one piece.
+    /// Body of a request in a batch.
     ///
     /// # Errors
     /// If it cannot be written as JSON.
@@ -233,9 +234,10 @@ impl Remote {
         let fields = self.fields();
         let wire = fields.wire.in_batch();
         let body = wire.body(&self.parameters, fields, message, choices)?;
-        Ok(body.joined())
+        Ok(body.concat())
     }
 
+    /// Asks a question with these fields.
     async fn ask_with(
         &self,
         fields: RequestFields,
@@ -244,16 +246,18 @@ impl Remote {
         reservation: Option<&Reservation>,
     ) -> Result<Reply, AskError> {
         let parameters = &self.parameters;
-        let body = fields.wire.body(parameters, fields, message, choices);
-        let body = body.map_err(|error| {
-            let message = format!("the request could not be written: {error}");
-            AskError {
-                attempts: 0,
-                ..AskError::new(FailureKind::Request, message)
-            }
-        })?;
+        let body = fields
+            .wire
+            .body(parameters, fields, message, choices)
+            .map_err(|error| {
+                let message = format!("the request could not be written: {error}");
+                AskError {
+                    attempts: 0,
+                    ..AskError::new(FailureKind::Request, message)
+                }
+            })?;
         let request = Request {
-            model: self.number,
+            model: self.index,
             wire: fields.wire,
             headers: &self.headers,
             body,
@@ -263,7 +267,7 @@ impl Remote {
                 has_image: !message.images.is_empty(),
                 has_key: self.endpoint.has_key(),
             },
-            affinity: affinity(message),
+            affinity: image_hash(message),
             reservation,
         };
         self.endpoint.ask(&request).await
@@ -273,17 +277,17 @@ impl Remote {
         *self.fields.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the field for which a request with the fields `sent` was refused, if its setting is `auto`. Returns whether to
-    /// ask again.
+    /// Changes the field for which a request with the fields `sent` was refused, if its setting is `auto`. Returns true to ask again.
     fn adapt(&self, sent: RequestFields, refused_field: Option<AdaptableField>) -> bool {
-        let mut now = self.fields.lock().unwrap_or_else(PoisonError::into_inner);
-        if *now != sent {
+        let Some(field) = refused_field else {
+            return false;
+        };
+        let mut current = self.fields.lock().unwrap_or_else(PoisonError::into_inner);
+        if *current != sent {
             // Another request has changed the fields in the meantime.
-            return refused_field.is_some();
+            return true;
         }
-        let adapted =
-            refused_field.and_then(|field| sent.after_refusal(field, self.first, &self.parameters));
-        let Some(adapted) = adapted else {
+        let Some(adapted) = sent.after_refusal(field, self.initial, &self.parameters) else {
             return false;
         };
         for change in adapted.changes(sent) {
@@ -292,22 +296,22 @@ impl Remote {
                 self.name()
             );
         }
-        *now = adapted;
+        *current = adapted;
         true
     }
 
-    /// Adapts further requests to a refused line of a batch; whether the request may succeed now.
+    /// Adapts further requests after the refusal of a line of a batch. Returns true if the request may succeed now.
     pub(super) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
         let fields = self.fields();
         if self.adapt(fields, self.refused_in_batch(status, body, fields)) {
             return true;
         }
-        // The batch may have been made before another one changed the fields.
-        let refused_field = self.refused_in_batch(status, body, self.first);
-        refused_field.is_some_and(|field| fields.differs(field, self.first))
+        // The batch may have been created before the fields were changed.
+        self.refused_in_batch(status, body, self.initial)
+            .is_some_and(|field| fields.differs(field, self.initial))
     }
 
-    /// The field for which a line of a batch with these fields was refused, if the program can send it in another way.
+    /// Field for which a line of a batch with these fields was refused, if the program can send it in another way.
     fn refused_in_batch(
         &self,
         status: u16,
@@ -321,17 +325,17 @@ impl Remote {
             has_key: self.endpoint.has_key(),
         };
         let wire = fields.wire.in_batch();
-        let complaint = wire.complaint(body);
-        AskError::refused(status, &complaint, wire, sent).refused_field
+        let api_error = wire.parse_error(body);
+        AskError::refused(status, &api_error, wire, sent).refused_field
     }
 
-    /// The letter in a constrained reply, else the text. Warns once if the server does not follow the constraint.
+    /// Letter in a constrained reply, otherwise the whole text. Warns once if the server does not follow the constraint.
     fn letter_or_text(&self, text: String, choices: usize) -> String {
         let constrain = self.parameters.constrain;
         if constrain == Constrain::None {
             return text;
         }
-        letter_of(constrain, choices, &text).unwrap_or_else(|| {
+        constrained_letter(constrain, choices, &text).unwrap_or_else(|| {
             if !self.warned_unconstrained.swap(true, Ordering::Relaxed) {
                 warn!(
                     "{}: a reply does not have the form that --request constrain={constrain} requests; the server may not support it, or the \
@@ -344,46 +348,51 @@ impl Remote {
     }
 }
 
-/// The error, with this reach if requests like it fail alike.
-fn reaching(error: AskError, reach: Reach) -> AskError {
+/// Replaces [`Reach::Alike`] by `reach`; other errors are unchanged.
+fn resolve_alike(error: AskError, reach: Reach) -> AskError {
     match error.reach {
         Reach::Alike => AskError { reach, ..error },
         _ => error,
     }
 }
 
-/// Refuses fields of the user's own that say the same as a flag.
-fn check_own_fields(parameters: &Parameters, first: RequestFields) -> Result<()> {
-    let own = &parameters.extra;
-    let refused = |field: &str, flag: &str| {
+/// Checks that the fields of `--extra-body` do not set the same as a flag.
+fn check_user_fields(parameters: &Parameters, initial: RequestFields) -> Result<()> {
+    let extra = &parameters.extra;
+    let conflict = |field: &str, flag: &str| {
         let problem = format_args!("{field} is set by {flag}; leave one of them out");
         Err(Error::usage("--extra-body", problem))
     };
-    let mut formats = ["response_format", "structured_outputs", "text"].into_iter();
     if parameters.constrain != Constrain::None
-        && let Some(field) = formats.find(|field| own.adds(field))
+        && let Some(field) = ["response_format", "structured_outputs", "text"]
+            .into_iter()
+            .find(|field| extra.adds(field))
     {
-        return refused(field, "--request constrain");
+        return conflict(field, "--request constrain");
     }
-    let mut switch = first.switch().into_iter().flat_map(Map::keys);
-    if let Some(field) = switch.find(|field| own.adds(field)) {
-        return refused(field, "--thinking");
+    if let Some(field) = initial
+        .thinking_body()
+        .into_iter()
+        .flat_map(Map::keys)
+        .find(|field| extra.adds(field))
+    {
+        return conflict(field, "--thinking");
     }
-    // The Responses API has it there, and OpenRouter takes it there.
-    if first.effort(parameters).is_some() && own.adds_below("reasoning", "effort") {
+    // The field of the Responses API, which OpenRouter also accepts in chat completions.
+    if initial.effort(parameters).is_some() && extra.adds_below("reasoning", "effort") {
         let flag = match parameters.reasoning_effort {
             Some(_) => "--reasoning-effort",
             None => "--thinking",
         };
-        return refused("reasoning.effort", flag);
+        return conflict("reasoning.effort", flag);
     }
-    if parameters.probabilities && own.adds("include") {
-        return refused("include", "--request probabilities");
+    if parameters.probabilities && extra.adds("include") {
+        return conflict("include", "--request probabilities");
     }
     Ok(())
 }
 
-/// Refuses a constraint and a request for probabilities that the vendor does not keep, and warns if requests to it are not repeatable.
+/// Checks that the vendor supports a requested constraint and requested probabilities. Warns if requests to it are not repeatable.
 fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
     if vendor.ignores_constraints() && parameters.constrain != Constrain::None {
         let problem = format_args!(
@@ -392,20 +401,17 @@ fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
         );
         return Err(Error::usage("--request constrain", problem));
     }
-    if let Some(instead) = vendor
-        .without_probabilities()
-        .filter(|_| parameters.probabilities)
+    if parameters.probabilities
+        && let Some(reason) = vendor.without_probabilities()
     {
         let problem = format_args!(
-            "{} {instead}, so the confidence of {} would not be known; leave it out",
+            "{} {reason}, so the confidence of {} would not be known; leave it out",
             vendor.name, parameters.model
         );
         return Err(Error::usage("--request probabilities", problem));
     }
-    if let Some(field) = vendor
-        .pin
-        .as_deref()
-        .filter(|field| !parameters.extra.adds(field))
+    if let Some(field) = &vendor.pin
+        && !parameters.extra.adds(field)
     {
         warn!(
             "{}: {} may answer each request in another way unless {field} is set in the body (--extra-body): the run may not be \
@@ -416,8 +422,8 @@ fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
     Ok(())
 }
 
-/// A number that is the same for all questions about the same images.
-fn affinity(message: Message<'_>) -> u64 {
+/// Hash of the images of a message, in any order.
+fn image_hash(message: Message<'_>) -> u64 {
     message
         .images
         .iter()

@@ -1,4 +1,4 @@
-//! A model whose replies come from a file: [`Script`].
+//! Model whose replies come from a file: [`Script`].
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -11,20 +11,21 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::{Condition, Digest, FailureKind, QuestionId, Reply};
 
-/// Replies from a JSONL file, one a line:
-/// `{"question": "<id>", "reply": ".."}`, the same with `"condition": "L3-noise"` for one condition, `{"default": ".."}` for the rest.
-/// The most specific line applies.
+/// Model that replies from a JSONL file.
+///
+/// A line is `{"question": "<id>", "reply": ".."}`, optionally with `"condition": "L3-noise"` for a single condition, or
+/// `{"default": ".."}` for all other questions. The most specific line applies.
 #[derive(Debug)]
 pub struct Script {
     name: String,
     path: PathBuf,
     digest: Digest,
-    replies: HashMap<Cue, String>,
+    replies: HashMap<Scope, String>,
 }
 
-/// The questions that a line answers.
+/// Questions to which a line applies.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Cue {
+enum Scope {
     InCondition(QuestionId, Condition),
     Question(QuestionId),
     Default,
@@ -32,21 +33,22 @@ enum Cue {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Line {
+struct ScriptLine {
     question: Option<QuestionId>,
     condition: Option<Condition>,
     reply: Option<String>,
     default: Option<String>,
 }
 
-impl Line {
-    fn read(self) -> Option<(Cue, String)> {
+impl ScriptLine {
+    /// The scope and the reply; `None` for an invalid combination of fields.
+    fn scope_and_reply(self) -> Option<(Scope, String)> {
         match (self.question, self.condition, self.reply, self.default) {
             (Some(id), Some(condition), Some(reply), None) => {
-                Some((Cue::InCondition(id, condition), reply))
+                Some((Scope::InCondition(id, condition), reply))
             }
-            (Some(id), None, Some(reply), None) => Some((Cue::Question(id), reply)),
-            (None, None, None, Some(reply)) => Some((Cue::Default, reply)),
+            (Some(id), None, Some(reply), None) => Some((Scope::Question(id), reply)),
+            (None, None, None, Some(reply)) => Some((Scope::Default, reply)),
             _ => None,
         }
     }
@@ -56,32 +58,32 @@ impl Script {
     /// Reads a file of replies.
     ///
     /// # Errors
-    /// If a line is broken, or has the same question and condition as an earlier line.
+    /// If the file cannot be read, a line is invalid, or two lines apply to the same question and condition.
     pub fn load(path: &Path) -> Result<Self> {
         let text = reading::text(path)?;
         let text = text.trim_start_matches('\u{feff}');
         let mut replies = HashMap::new();
-        let mut lines: HashMap<Cue, usize> = HashMap::new();
+        let mut line_numbers: HashMap<Scope, usize> = HashMap::new();
         for (number, line) in (1..).zip(text.lines()) {
             if line.trim().is_empty() {
                 continue;
             }
-            let line: Line = serde_json::from_str(line)
+            let line: ScriptLine = serde_json::from_str(line)
                 .map_err(|error| Error::json_line(path, number, &error))?;
-            let (cue, reply) = line.read().ok_or_else(|| {
+            let (scope, reply) = line.scope_and_reply().ok_or_else(|| {
                 Error::line(
                     path,
                     number,
                     r#"expected {"question": "<id>", "reply": ".."}, with "condition": "L3-noise" if it is for one condition, or {"default": ".."}"#,
                 )
             })?;
-            if let Some(first) = lines.insert(cue.clone(), number) {
+            if let Some(first) = line_numbers.insert(scope.clone(), number) {
                 let problem = format_args!(
                     "answers the same question as line {first}; keep one of the two lines"
                 );
                 return Err(Error::line(path, number, problem));
             }
-            replies.insert(cue, reply);
+            replies.insert(scope, reply);
         }
         Ok(Self {
             name: format!("script:{}", path.display()),
@@ -91,7 +93,7 @@ impl Script {
         })
     }
 
-    /// The name in records and tables: `script:` and the path.
+    /// Name in records and tables: `script:` and the path.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -106,20 +108,22 @@ impl Script {
         id: &QuestionId,
         condition: Option<&Condition>,
     ) -> Result<Reply, AskError> {
-        let reply = condition
+        condition
             .and_then(|condition| {
                 self.replies
-                    .get(&Cue::InCondition(id.clone(), condition.clone()))
+                    .get(&Scope::InCondition(id.clone(), condition.clone()))
             })
-            .or_else(|| self.replies.get(&Cue::Question(id.clone())))
-            .or_else(|| self.replies.get(&Cue::Default));
-        reply.cloned().map(Reply::local).ok_or_else(|| {
-            let message = format!(
-                r#"{} has no reply to question {id} and no {{"default": ".."}} line"#,
-                self.path.display()
-            );
-            AskError::new(FailureKind::Request, message)
-        })
+            .or_else(|| self.replies.get(&Scope::Question(id.clone())))
+            .or_else(|| self.replies.get(&Scope::Default))
+            .cloned()
+            .map(Reply::local)
+            .ok_or_else(|| {
+                let message = format!(
+                    r#"{} has no reply to question {id} and no {{"default": ".."}} line"#,
+                    self.path.display()
+                );
+                AskError::new(FailureKind::Request, message)
+            })
     }
 }
 
@@ -144,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_names_a_broken_line_once() {
+    fn errors_name_the_line_once() {
         let error = load("\n{\n").unwrap_err().to_string();
         assert!(
             error.ends_with(", line 2: EOF while parsing an object"),

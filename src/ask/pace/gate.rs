@@ -5,45 +5,40 @@ use std::time::Duration;
 
 use tokio::time::{Instant, sleep_until};
 
-use super::allowance::{PaceAdvice, RateLimits};
-use super::learned::LearnedRate;
-use super::quota::{Quota, QuotaWindow};
+use super::learned_rate::LearnedRate;
+use super::quota::{INITIAL_TOKENS, MAX_TOKENS, Quota, QuotaWindow};
+use super::rate_limits::{PaceAdvice, RateLimits};
 
-/// The maximum spacing that follows from the limits that a server reports, so that one report does not slow down the whole run.
-const WIDEST: Duration = Duration::from_secs(5);
+/// Maximum spacing between requests because of the limits that a server reports, so that one report cannot slow down the whole run.
+const MAX_SPACING: Duration = Duration::from_secs(5);
 
-/// The assumed number of tokens of a request until a reply states one: an image and a letter.
-const FIRST_TOKENS: f64 = 1200.0;
+/// Weight of the newest reply in the moving average of tokens per request.
+const NEWEST_WEIGHT: f64 = 0.1;
 
-/// The maximum number of tokens of a request; a larger number from a server is wrong and is cut to this one.
-const MOST_TOKENS: f64 = 1e7;
-
-/// The weight of the newest reply in the mean number of tokens.
-const NEWEST: f64 = 0.1;
-
-/// The rate limiter of an endpoint, the last thing before a request is sent. Requests pass one by one, in the order in which they came.
-/// Each waits for the user's quota, for the pauses that the endpoint asks for, for the rate that it was seen to accept, and for the
-/// limits that it reports.
+/// Rate limiter of an endpoint, directly before a request is sent. Requests pass one by one, in the order of their arrival.
+///
+/// Each request waits for the user's quota, for the pauses that the endpoint asks for, for the learned rate of the endpoint, and for
+/// the limits that the endpoint reports.
 #[derive(Debug)]
 pub(in crate::ask) struct Gate {
     state: Mutex<State>,
-    /// Held by the request whose turn is next.
-    turnstile: tokio::sync::Mutex<()>,
+    /// Locked by the request whose turn is next; the others queue for the lock.
+    queue: tokio::sync::Mutex<()>,
 }
 
 #[derive(Debug)]
 struct State {
     quota: QuotaWindow,
     learned: LearnedRate,
-    /// No request passes before this time: the endpoint has no capacity.
+    /// End of the pause in which no request passes, because the endpoint has no capacity.
     paused_until: Instant,
-    /// The time of the next request by the limits that the endpoint reports.
-    next: Instant,
-    /// The spacing that follows from these limits.
+    /// Earliest time of the next request according to `reported_spacing`.
+    next_at: Instant,
+    /// Time between requests that follows from the limits that the endpoint reports.
     reported_spacing: Duration,
-    /// The mean number of tokens of a request.
+    /// Moving average of tokens per request.
     tokens: f64,
-    /// The first of the refusals since the last success; `None` if there was none.
+    /// Time of the first refusal since the last success; `None` without one.
     refused_since: Option<Instant>,
 }
 
@@ -55,79 +50,79 @@ impl Gate {
                 quota: QuotaWindow::new(quota, now),
                 learned: LearnedRate::new(now, QuotaWindow::half_rate(quota)),
                 paused_until: now,
-                next: now,
+                next_at: now,
                 reported_spacing: Duration::ZERO,
-                tokens: FIRST_TOKENS,
+                tokens: INITIAL_TOKENS,
                 refused_since: None,
             }),
-            turnstile: tokio::sync::Mutex::new(()),
+            queue: tokio::sync::Mutex::new(()),
         }
     }
 
-    /// Waits until the request may be sent; the time at which it is.
+    /// Waits until a request may be sent, and returns the time of sending.
     pub(in crate::ask) async fn pass(&self) -> Instant {
-        let _turn = self.turnstile.lock().await;
+        let _turn = self.queue.lock().await;
         loop {
             let turn = {
                 let (now, mut state) = (Instant::now(), self.state());
-                let turn = state.turn(now);
+                let turn = state.next_turn(now);
                 if turn <= now {
-                    state.sends(now);
+                    state.record_sent(now);
                     return now;
                 }
                 turn
             };
-            // What comes meanwhile may move the turn: it is computed again.
+            // Replies that arrive during the sleep may move the turn: compute it again.
             sleep_until(turn).await;
         }
     }
 
-    /// The time at which a request could be sent if none waited.
+    /// Time at which a request could be sent if no other request were waiting.
     pub(in crate::ask) fn ready_at(&self) -> Instant {
         let (now, mut state) = (Instant::now(), self.state());
-        state.turn(now).max(now)
+        state.next_turn(now).max(now)
     }
 
-    /// Pauses all requests, because the endpoint has no capacity; no rate is learned from it.
+    /// Pauses all requests, because the endpoint has no capacity. The learned rate does not change.
     pub(in crate::ask) fn pause(&self, wait: Duration) {
         let (now, mut state) = (Instant::now(), self.state());
         state.refused_since.get_or_insert(now);
         state.pause_until(now.checked_add(wait).unwrap_or(now));
     }
 
-    /// Notes that a request that was sent at a time was turned away for its rate; `wait` is what the endpoint asks for.
-    pub(in crate::ask) fn rate_limited(&self, sent: Instant, wait: Option<Duration>) {
+    /// Records that the request sent at `sent` was rate limited; `wait` is the wait that the endpoint asked for.
+    pub(in crate::ask) fn record_rate_limited(&self, sent: Instant, wait: Option<Duration>) {
         let (now, mut state) = (Instant::now(), self.state());
         state.refused_since.get_or_insert(now);
-        state.learned.refused(now, sent, wait);
+        state.learned.record_refused(now, sent, wait);
     }
 
-    /// The time for which requests have been turned away without a success.
+    /// Time since the first refusal after the last success; zero without a refusal.
     pub(in crate::ask) fn refused_for(&self) -> Duration {
         let since = self.state().refused_since;
         since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 
-    /// Notes a success of a request that was sent at a time, its tokens and the remaining limits. Pauses of more than `max_wait` are
-    /// ignored.
-    pub(in crate::ask) fn succeeded(
+    /// Records the success of the request sent at `sent`, with its tokens and the limits that the response reports. Pauses longer than
+    /// `max_wait` are ignored.
+    pub(in crate::ask) fn record_success(
         &self,
         sent: Instant,
         tokens: Option<u64>,
-        allowance: RateLimits,
+        limits: RateLimits,
         max_wait: Duration,
     ) {
         let (now, mut state) = (Instant::now(), self.state());
         state.refused_since = None;
         if let Some(tokens) = tokens {
-            state.quota.used(sent, tokens);
-            let tokens = (tokens as f64).min(MOST_TOKENS);
-            state.tokens += NEWEST * (tokens - state.tokens);
+            state.quota.record_tokens(sent, tokens);
+            let tokens = (tokens as f64).min(MAX_TOKENS);
+            state.tokens += NEWEST_WEIGHT * (tokens - state.tokens);
         }
-        state.learned.took(now, sent);
-        state.reported_spacing = match allowance.asks(state.tokens) {
+        state.learned.record_accepted(now, sent);
+        state.reported_spacing = match limits.advice(state.tokens) {
             PaceAdvice::Nothing => Duration::ZERO,
-            PaceAdvice::Spacing(spacing) => spacing.min(WIDEST),
+            PaceAdvice::Spacing(spacing) => spacing.min(MAX_SPACING),
             PaceAdvice::Pause(wait) => {
                 let until = now.checked_add(wait);
                 if let Some(until) = until.filter(|_| wait <= max_wait) {
@@ -144,16 +139,19 @@ impl Gate {
 }
 
 impl State {
-    /// The time from which the next request may be sent.
-    fn turn(&mut self, now: Instant) -> Instant {
-        let limits = self.quota.turn(now).max(self.learned.turn());
-        limits.max(self.paused_until).max(self.next)
+    /// Earliest time at which the next request may be sent.
+    fn next_turn(&mut self, now: Instant) -> Instant {
+        self.quota
+            .next_turn(now)
+            .max(self.learned.next_turn())
+            .max(self.paused_until)
+            .max(self.next_at)
     }
 
-    fn sends(&mut self, now: Instant) {
-        self.quota.sends(now);
-        self.learned.sends(now);
-        self.next = now + self.reported_spacing;
+    fn record_sent(&mut self, now: Instant) {
+        self.quota.record_sent(now);
+        self.learned.record_sent(now);
+        self.next_at = now + self.reported_spacing;
     }
 
     fn pause_until(&mut self, until: Instant) {

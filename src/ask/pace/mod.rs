@@ -1,22 +1,22 @@
 //! The times at which requests are sent, and the number of requests in flight.
 //!
-//! All requests to one endpoint pass one [`Gate`]. It follows the user's limits (`--rpm`, `--tpm`), the remaining limits that the
-//! server reports ([`RateLimits`]) and the pauses that it asks for ([`asked_wait`]). The number in flight is set separately by the
-//! [`Window`]: a long pause must not narrow the window, and a wide window must not shorten a pause.
+//! All requests to one endpoint pass one [`Gate`]. It obeys the user's limits (`--rpm`, `--tpm`), the remaining limits that the
+//! server reports ([`RateLimits`]) and the pauses that the server asks for ([`retry_after()`]). The [`Window`] controls the number in
+//! flight independently: a long pause must not narrow the window, and a wide window must not shorten a pause.
 
-mod allowance;
 mod gate;
-mod learned;
+mod learned_rate;
 mod quota;
-mod wait;
+mod rate_limits;
+mod retry_after;
 mod wait_words;
 mod window;
 
-pub(super) use allowance::RateLimits;
 pub(super) use gate::Gate;
-pub(super) use wait::{asked_wait, protobuf_duration};
+pub(super) use rate_limits::RateLimits;
+pub(super) use retry_after::{protobuf_duration, retry_after};
 pub(super) use wait_words::wait_in_words;
 pub(super) use window::Window;
 
 pub use quota::Quota;
-pub(crate) use window::Bounds;
+pub(crate) use window::ConcurrencyBounds;

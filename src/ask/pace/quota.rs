@@ -1,4 +1,4 @@
-//! The user's limits per minute: [`Quota`], and what was sent under them, [`QuotaWindow`].
+//! The user's limits per minute ([`Quota`]), and the requests of the last minute that count toward them ([`QuotaWindow`]).
 
 use std::collections::VecDeque;
 use std::num::NonZeroU32;
@@ -20,37 +20,38 @@ pub struct Quota {
     pub tokens: Option<NonZeroU32>,
 }
 
-/// The time over which a quota counts: a minute, and half a second for clocks and networks that do not agree.
+/// Length of the sliding window of a quota: one minute, plus half a second of tolerance for clock and network differences.
 const WINDOW: Duration = Duration::from_millis(60_500);
 
-/// The assumed number of tokens of a request until a reply states one: an image and a letter.
-const FIRST_TOKENS: f64 = 1200.0;
+/// Assumed number of tokens of a request until a reply reports one: an image and a letter.
+pub(super) const INITIAL_TOKENS: f64 = 1200.0;
 
-/// The maximum number of tokens of a request; a larger number from a server is wrong and is cut to this one.
-const MOST_TOKENS: f64 = 1e7;
+/// Maximum number of tokens of a request. A server that reports more is wrong; its number is cut to this one.
+pub(super) const MAX_TOKENS: f64 = 1e7;
 
-/// Requests and tokens of the last minute. In any 60 seconds, from the first request to the last, at most the quota is sent, whatever fails:
-/// what a pause leaves unused is lost, not made up.
+/// Sliding window of the requests and tokens of the last minute.
+///
+/// In any 60 seconds of a run at most the quota is sent, whether or not requests fail. Quota that a pause leaves unused is lost.
 #[derive(Debug)]
 pub(super) struct QuotaWindow {
     quota: Quota,
     /// Requests of the last [`WINDOW`].
     sent: VecDeque<SentRequest>,
-    /// Sum of the tokens in `sent`.
+    /// Sum of the tokens of these requests.
     tokens: f64,
-    /// The largest number of tokens of a reply so far; `None` before the first.
+    /// Largest number of tokens reported for a request so far; `None` before the first.
     largest: Option<f64>,
-    /// The time of the next request by the spacing of the quota on requests.
-    next: Instant,
+    /// Earliest time of the next request, so that requests are spread evenly over the minute.
+    next_at: Instant,
 }
 
-/// A request and its tokens.
+/// A request in the window.
 #[derive(Debug, Clone, Copy)]
 struct SentRequest {
     at: Instant,
     tokens: f64,
-    /// Whether the tokens are those that its reply states; else they are expected.
-    is_stated: bool,
+    /// True if the reply reported the tokens; false if they are an estimate.
+    is_reported: bool,
 }
 
 impl QuotaWindow {
@@ -60,37 +61,37 @@ impl QuotaWindow {
             sent: VecDeque::new(),
             tokens: 0.0,
             largest: None,
-            next: now,
+            next_at: now,
         }
     }
 
-    /// Half of the quota on requests, per second; 0 without one. A learned rate need not be lower.
+    /// Half of the quota on requests, in requests per second; 0 without a quota. A learned rate need not be lower.
     pub(super) fn half_rate(quota: Quota) -> f64 {
         quota
             .requests
-            .map_or(0.0, |most| f64::from(most.get()) / 120.0)
+            .map_or(0.0, |max| f64::from(max.get()) / 120.0)
     }
 
-    /// The time from which the next request may be sent.
-    pub(super) fn turn(&mut self, now: Instant) -> Instant {
-        self.forget(now);
-        let mut turn = self.next;
-        if let Some(most) = self.quota.requests {
-            let most = most.get() as usize;
-            let before = self.sent.len().checked_sub(most);
-            if let Some(sent) = before.and_then(|index| self.sent.get(index)) {
+    /// Earliest time at which the next request may be sent.
+    pub(super) fn next_turn(&mut self, now: Instant) -> Instant {
+        self.drop_expired(now);
+        let mut turn = self.next_at;
+        if let Some(max) = self.quota.requests {
+            let max = max.get() as usize;
+            // The oldest request that must leave the window first.
+            let oldest = self.sent.len().checked_sub(max);
+            if let Some(sent) = oldest.and_then(|index| self.sent.get(index)) {
                 turn = turn.max(sent.at + WINDOW);
             }
         }
-        if let Some(most) = self.quota.tokens {
-            let room = f64::from(most.get()) - self.expected();
-            let mut left = self.tokens;
-            let mut sent = self.sent.iter();
+        if let Some(max) = self.quota.tokens {
             // A request that is larger than the whole quota is sent alone.
-            while left > room.max(0.0) {
-                let Some(sent) = sent.next() else {
+            let room = (f64::from(max.get()) - self.expected_tokens()).max(0.0);
+            let mut left = self.tokens;
+            for sent in &self.sent {
+                if left <= room {
                     break;
-                };
+                }
                 left -= sent.tokens;
                 turn = turn.max(sent.at + WINDOW);
             }
@@ -98,43 +99,49 @@ impl QuotaWindow {
         turn
     }
 
-    /// Notes that a request is sent.
-    pub(super) fn sends(&mut self, now: Instant) {
+    /// Records that a request is sent.
+    pub(super) fn record_sent(&mut self, now: Instant) {
         if self.quota == Quota::default() {
             return;
         }
-        let tokens = self.expected();
+        let tokens = self.expected_tokens();
         self.sent.push_back(SentRequest {
             at: now,
             tokens,
-            is_stated: false,
+            is_reported: false,
         });
         self.tokens += tokens;
-        if let Some(most) = self.quota.requests {
-            self.next = now + Duration::from_mins(1) / most.get();
+        if let Some(max) = self.quota.requests {
+            self.next_at = now + Duration::from_mins(1) / max.get();
         }
     }
 
-    /// Notes the tokens of the reply to a request that was sent at a time.
-    pub(super) fn used(&mut self, sent: Instant, tokens: u64) {
-        let tokens = (tokens as f64).min(MOST_TOKENS);
+    /// Records the tokens that the reply to the request sent at `sent` reports.
+    pub(super) fn record_tokens(&mut self, sent: Instant, tokens: u64) {
+        let tokens = (tokens as f64).min(MAX_TOKENS);
         self.largest = Some(self.largest.map_or(tokens, |largest| largest.max(tokens)));
-        // Several may have been sent at one instant.
-        let behind = self.sent.partition_point(|request| request.at <= sent);
-        let requests = self.sent.iter_mut().take(behind).rev();
-        let mut same = requests.take_while(|request| request.at == sent);
-        if let Some(request) = same.find(|request| !request.is_stated) {
+        // Several requests may have been sent at the same instant.
+        let end = self.sent.partition_point(|request| request.at <= sent);
+        let request = self
+            .sent
+            .iter_mut()
+            .take(end)
+            .rev()
+            .take_while(|request| request.at == sent)
+            .find(|request| !request.is_reported);
+        if let Some(request) = request {
             self.tokens += tokens - request.tokens;
-            (request.tokens, request.is_stated) = (tokens, true);
+            (request.tokens, request.is_reported) = (tokens, true);
         }
     }
 
-    /// The expected tokens of a request: those of the largest reply so far, so that the quota is kept.
-    fn expected(&self) -> f64 {
-        self.largest.unwrap_or(FIRST_TOKENS)
+    /// Estimated tokens of the next request: the largest number reported so far, so that the quota is not exceeded.
+    fn expected_tokens(&self) -> f64 {
+        self.largest.unwrap_or(INITIAL_TOKENS)
     }
 
-    fn forget(&mut self, now: Instant) {
+    /// Drops requests that have left the window.
+    fn drop_expired(&mut self, now: Instant) {
         while let Some(request) = self.sent.front()
             && now.saturating_duration_since(request.at) >= WINDOW
         {

@@ -1,4 +1,4 @@
-//! The number of requests in flight: [`Window`] within [`Bounds`].
+//! The maximum number of requests in flight ([`Window`]), adapted within [`ConcurrencyBounds`].
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -7,26 +7,26 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tokio::time::{Duration, Instant};
 
-/// The minimum, first and maximum number of requests in flight.
+/// Bounds of the number of requests in flight (`--concurrency`): minimum, initial value and maximum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Bounds {
-    least: NonZeroUsize,
-    first: NonZeroUsize,
-    most: NonZeroUsize,
+pub struct ConcurrencyBounds {
+    min: NonZeroUsize,
+    initial: NonZeroUsize,
+    max: NonZeroUsize,
 }
 
-impl Bounds {
-    /// The default: it starts at 8, rises to 32 while replies do not get slower, and falls to 1 if the server is overloaded.
+impl ConcurrencyBounds {
+    /// The default, `auto`: from 8 up to 32 while replies do not get slower, down to 1 if the server is overloaded.
     pub const DEFAULT: Self = Self {
-        least: NonZeroUsize::MIN,
-        first: NonZeroUsize::new(8).unwrap(),
-        most: NonZeroUsize::new(32).unwrap(),
+        min: NonZeroUsize::MIN,
+        initial: NonZeroUsize::new(8).unwrap(),
+        max: NonZeroUsize::new(32).unwrap(),
     };
 
-    /// The bounds of each of several replicas, so that the stated ones hold for all together, at least one each. The default holds
-    /// for each.
+    /// Bounds for each of `count` replicas, so that these bounds apply to all replicas together, with at least one request each. The
+    /// default bounds are not divided: each replica gets them whole.
     #[must_use]
-    pub(in crate::ask) fn share(self, count: usize) -> Self {
+    pub(in crate::ask) fn per_replica(self, count: usize) -> Self {
         if self == Self::DEFAULT {
             return self;
         }
@@ -34,125 +34,128 @@ impl Bounds {
             NonZeroUsize::new(number.get().div_ceil(count.max(1))).unwrap_or(NonZeroUsize::MIN)
         };
         Self {
-            least: share(self.least),
-            first: share(self.first),
-            most: share(self.most),
+            min: share(self.min),
+            initial: share(self.initial),
+            max: share(self.max),
         }
     }
 
     /// The maximum number of requests in flight.
     #[must_use]
-    pub fn most(self) -> usize {
-        self.most.get()
+    pub fn max(self) -> usize {
+        self.max.get()
     }
 }
 
-impl fmt::Display for Bounds {
+impl fmt::Display for ConcurrencyBounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.first == self.most {
-            write!(f, "{}", self.most)
+        if self.initial == self.max {
+            write!(f, "{}", self.max)
         } else {
-            write!(f, "{}-{}", self.first, self.most)
+            write!(f, "{}-{}", self.initial, self.max)
         }
     }
 }
 
-impl FromStr for Bounds {
+impl FromStr for ConcurrencyBounds {
     type Err = String;
 
-    /// Reads `32` (from there down to 1 and back), `4-64` (from 4 up to 64, never below 4) or `auto`.
+    /// Parses `32` (from 32 down to 1 and back), `4-64` (from 4 up to 64, never below 4) or `auto`.
     fn from_str(text: &str) -> Result<Self, String> {
         if text == "auto" {
             return Ok(Self::DEFAULT);
         }
-        let (first, most) = text.split_once('-').unwrap_or((text, text));
-        let range = text.contains('-');
-        match (first.trim().parse::<NonZeroUsize>(), most.trim().parse()) {
-            (Ok(first), Ok(most)) if first <= most => Ok(Self {
-                least: if range { first } else { NonZeroUsize::MIN },
-                first,
-                most,
+        let is_range = text.contains('-');
+        let (initial, max) = text.split_once('-').unwrap_or((text, text));
+        match (initial.trim().parse::<NonZeroUsize>(), max.trim().parse()) {
+            (Ok(initial), Ok(max)) if initial <= max => Ok(Self {
+                min: if is_range { initial } else { NonZeroUsize::MIN },
+                initial,
+                max,
             }),
             _ => Err("a number of requests from 1 on, or a range like 4-64, expected".to_owned()),
         }
     }
 }
 
-/// The factor by which an overload narrows the window.
-const CUT: f64 = 0.7;
+/// Factor by which an overload narrows the window; chosen.
+const DECREASE: f64 = 0.7;
 
-/// A round whose replies take this much longer than in the quickest round ends the widening: the server only queues further
-/// requests.
-const QUEUEING: f64 = 1.5;
+/// Ratio of a round's mean reply time to the fastest round's from which the window stays: the server only queues further requests.
+/// Chosen.
+const QUEUEING_RATIO: f64 = 1.5;
 
-/// The window of an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989, Comput. Netw. ISDN Syst. 17:1).
+/// Window of requests in flight at an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989, Comput. Netw. ISDN Syst.
+/// 17:1).
 ///
 /// Each round of successes widens it by one request while replies do not get slower. An overload (429, 503, 529, a timeout)
-/// narrows it by a third, once for all requests in flight at that time.
+/// narrows it by 30 %, once for all requests in flight at that time.
 #[derive(Debug)]
 pub(in crate::ask) struct Window {
-    bounds: Bounds,
+    bounds: ConcurrencyBounds,
     state: Mutex<State>,
 }
 
 #[derive(Debug)]
 struct State {
     width: f64,
-    /// The time of the last narrowing; overloads of requests that were sent before it are ignored.
-    cut_at: Option<Instant>,
-    /// The number of replies in the current round; `took` is their total time.
+    /// Time of the last decrease; overloads of requests that were sent before it are ignored.
+    decreased_at: Option<Instant>,
+    /// Number of replies in the current round.
     replies: u32,
-    took: Duration,
-    /// The mean time of a reply in the quickest round; `None` before the first round ends.
-    quickest: Option<Duration>,
-    /// Whether the last round was too slow to widen the window.
-    queueing: bool,
+    /// Sum of the times of these replies.
+    reply_time: Duration,
+    /// Mean reply time of the fastest round; `None` before the first round ends.
+    fastest: Option<Duration>,
+    /// True if the last round was too slow to widen the window.
+    is_queueing: bool,
 }
 
 impl Window {
-    pub(in crate::ask) fn new(bounds: Bounds) -> Self {
+    pub(in crate::ask) fn new(bounds: ConcurrencyBounds) -> Self {
         Self {
             bounds,
             state: Mutex::new(State {
-                width: bounds.first.get() as f64,
-                cut_at: None,
+                width: bounds.initial.get() as f64,
+                decreased_at: None,
                 replies: 0,
-                took: Duration::ZERO,
-                quickest: None,
-                queueing: false,
+                reply_time: Duration::ZERO,
+                fastest: None,
+                is_queueing: false,
             }),
         }
     }
 
-    /// The number of requests that may be in flight now.
+    /// Maximum number of requests in flight at the moment.
     pub(in crate::ask) fn width(&self) -> usize {
         self.state().width as usize
     }
 
-    /// Notes a reply that came after this time.
-    pub(in crate::ask) fn succeeded(&self, took: Duration) {
+    /// Records a reply and its duration.
+    pub(in crate::ask) fn record_success(&self, duration: Duration) {
         let mut state = self.state();
         state.replies += 1;
-        state.took += took;
+        state.reply_time += duration;
         if state.replies as f64 >= state.width {
-            let mean = state.took / state.replies;
-            let quickest = state.quickest.map_or(mean, |quickest| quickest.min(mean));
-            state.quickest = Some(quickest);
-            state.queueing = mean > quickest.mul_f64(QUEUEING);
-            (state.replies, state.took) = (0, Duration::ZERO);
+            let mean = state.reply_time / state.replies;
+            let fastest = state.fastest.map_or(mean, |fastest| fastest.min(mean));
+            state.fastest = Some(fastest);
+            state.is_queueing = mean > fastest.mul_f64(QUEUEING_RATIO);
+            state.replies = 0;
+            state.reply_time = Duration::ZERO;
         }
-        if !state.queueing {
+        if !state.is_queueing {
             let wider = state.width + 1.0 / state.width;
-            state.width = wider.min(self.bounds.most.get() as f64);
+            state.width = wider.min(self.bounds.max.get() as f64);
         }
     }
 
-    /// Notes the overload of a request that was sent at this time.
-    pub(in crate::ask) fn overloaded(&self, sent: Instant) {
+    /// Records that the request sent at `sent` overloaded the server.
+    pub(in crate::ask) fn record_overload(&self, sent: Instant) {
         let mut state = self.state();
-        if state.cut_at.is_none_or(|cut| sent > cut) {
-            state.cut_at = Some(Instant::now());
-            state.width = (state.width * CUT).max(self.bounds.least.get() as f64);
+        if state.decreased_at.is_none_or(|decreased| sent > decreased) {
+            state.decreased_at = Some(Instant::now());
+            state.width = (state.width * DECREASE).max(self.bounds.min.get() as f64);
         }
     }
 
@@ -166,46 +169,46 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_read_back() {
+    fn bounds_round_trip() {
         for text in ["1", "32", "4-64"] {
-            assert_eq!(text.parse::<Bounds>().unwrap().to_string(), text);
+            assert_eq!(text.parse::<ConcurrencyBounds>().unwrap().to_string(), text);
         }
-        assert_eq!(Bounds::DEFAULT.to_string(), "8-32");
+        assert_eq!(ConcurrencyBounds::DEFAULT.to_string(), "8-32");
         for wrong in ["", "0", "-4", "8-4", "4-", "a", "4-8-16"] {
-            assert!(wrong.parse::<Bounds>().is_err(), "{wrong}");
+            assert!(wrong.parse::<ConcurrencyBounds>().is_err(), "{wrong}");
         }
     }
 
     #[tokio::test(start_paused = true)]
-    async fn the_window_widens_by_one_and_narrows_by_a_third() {
+    async fn the_window_grows_slowly_and_shrinks_fast() {
         let window = Window::new("8-32".parse().unwrap());
         for _ in 0..9 {
-            window.succeeded(Duration::from_millis(200));
+            window.record_success(Duration::from_millis(200));
         }
         assert_eq!(window.width(), 9);
         for _ in 0..2000 {
-            window.succeeded(Duration::from_millis(200));
+            window.record_success(Duration::from_millis(200));
         }
         assert_eq!(window.width(), 32);
         let sent = Instant::now();
         tokio::time::advance(Duration::from_millis(100)).await;
         for _ in 0..32 {
-            window.overloaded(sent);
+            window.record_overload(sent);
         }
         assert_eq!(window.width(), 22, "simultaneous overloads count once");
         for _ in 0..20 {
             tokio::time::advance(Duration::from_millis(100)).await;
-            window.overloaded(Instant::now());
+            window.record_overload(Instant::now());
         }
         assert_eq!(window.width(), 8, "the lower bound");
     }
 
     #[test]
-    fn the_window_stays_if_the_server_only_queues() {
+    fn the_window_stays_while_the_server_queues() {
         let window = Window::new("4-64".parse().unwrap());
-        // The server answers one at a time: a reply waits for all that were sent before it.
+        // The server answers one request at a time: a reply waits for all requests sent before it.
         for _ in 0..2000 {
-            window.succeeded(Duration::from_millis(100 * window.width() as u64));
+            window.record_success(Duration::from_millis(100 * window.width() as u64));
         }
         assert!(window.width() <= 7, "{}", window.width());
     }

@@ -1,4 +1,4 @@
-//! Prompts: the text of questions, of this program and of OpenEQA.
+//! Prompt templates, of this program and of OpenEQA.
 
 pub(crate) mod openeqa;
 mod prompt;

@@ -1,4 +1,4 @@
-//! The text of questions to a model: [`Prompts`].
+//! Prompt templates for questions to a model: [`Prompts`].
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId, View}
 const CHOICE: &str = "choice.txt";
 const BLIND: &str = "blind.txt";
 
-/// The prompt templates: those of `prompts/`, or the user's.
+/// Prompt templates: the built-in ones of `prompts/`, or the user's.
 #[derive(Debug)]
 pub struct Prompts {
     templates: Environment<'static>,
@@ -21,18 +21,18 @@ pub struct Prompts {
 }
 
 impl Prompts {
-    /// The prompts that come with the program.
+    /// The built-in prompts.
     ///
     /// # Errors
-    /// None in practice: the tests render the embedded templates.
+    /// Never in practice: tests render the embedded templates.
     pub fn built_in() -> Result<Self> {
         Self::new(Sources::default())
     }
 
-    /// The prompts of a folder; for missing ones, the built-in prompts.
+    /// Reads the prompts in a folder; the built-in prompts replace missing ones.
     ///
     /// # Errors
-    /// If the folder has no prompt or another file, or if a template is broken or leaves out the question or a choice.
+    /// If the folder has no prompt or contains another file, or if a template is invalid or omits the question or a choice.
     pub fn load(dir: &Path) -> Result<Self> {
         let unreadable = |error| Error::file(dir, "read", error);
         let mut sources = Sources::default();
@@ -46,7 +46,7 @@ impl Prompts {
                 "README.md" => continue,
                 name if name.starts_with('.') => continue,
                 _ => {
-                    return Err(wrong(
+                    return Err(prompt_error(
                         &path.display().to_string(),
                         "no prompt has this name; a folder of prompts holds choice.txt and blind.txt, or one of them",
                     ));
@@ -57,7 +57,7 @@ impl Prompts {
             found = true;
         }
         if !found {
-            return Err(wrong(
+            return Err(prompt_error(
                 &dir.display().to_string(),
                 "the folder holds neither choice.txt nor blind.txt",
             ));
@@ -73,26 +73,26 @@ impl Prompts {
         for (name, source) in [(CHOICE, sources.choice), (BLIND, sources.blind)] {
             templates
                 .add_template_owned(name, source)
-                .map_err(|error| wrong(name, error))?;
+                .map_err(|error| prompt_error(name, error))?;
         }
         let prompts = Self { templates, digest };
-        let sample = sample()?;
+        let sample = sample_question()?;
         for view in [View::Image, View::Blind] {
             prompts.render(view, &sample)?;
         }
         Ok(prompts)
     }
 
-    /// The digest of all templates.
+    /// Digest of all templates.
     #[must_use]
     pub fn digest(&self) -> Digest {
         self.digest
     }
 
-    /// The prompt for one question. The texts of question and choices are inserted unchanged.
+    /// Renders the prompt for one question. The texts of the question and the choices are inserted unchanged.
     ///
     /// # Errors
-    /// If the template fails, or if its output lacks the question or a choice: such a prompt would cost money and measure
+    /// If the template fails, or if the question or a choice is missing in the prompt: such a prompt would cost money and measure
     /// nothing.
     pub fn render(&self, view: View, question: &Question) -> Result<String> {
         let name = match view {
@@ -105,20 +105,20 @@ impl Prompts {
             .zip(texts)
             .map(|(letter, text)| context! { letter => letter, text => text })
             .collect();
-        let words = context! { question => question.text.as_str(), choices => choices };
+        let values = context! { question => question.text.as_str(), choices => choices };
         let rendered = self
             .templates
             .get_template(name)
-            .and_then(|template| template.render(words))
-            .map_err(|error| wrong(name, error))?;
+            .and_then(|template| template.render(values))
+            .map_err(|error| prompt_error(name, error))?;
         if !rendered.contains(&question.text) {
-            return Err(wrong(
+            return Err(prompt_error(
                 name,
                 "the question does not occur in it; write {{ question }} where it belongs",
             ));
         }
         if let Some(text) = texts.iter().find(|text| !rendered.contains(*text)) {
-            return Err(wrong(
+            return Err(prompt_error(
                 name,
                 format_args!(
                     "choice {text:?} does not occur in it; go through all of `choices` and write {{{{ choice.text }}}}"
@@ -129,7 +129,7 @@ impl Prompts {
     }
 }
 
-/// The text of each template.
+/// Text of each template.
 struct Sources {
     choice: String,
     blind: String,
@@ -144,15 +144,15 @@ impl Default for Sources {
     }
 }
 
-fn wrong(name: &str, problem: impl std::fmt::Display) -> Error {
+fn prompt_error(name: &str, problem: impl std::fmt::Display) -> Error {
     Error::Prompt {
         name: name.to_owned(),
         problem: problem.to_string(),
     }
 }
 
-/// A question whose texts occur in no template by chance.
-fn sample() -> Result<Question> {
+/// Question whose texts occur in no template by chance.
+fn sample_question() -> Result<Question> {
     let texts = (1..=5).map(|i| format!("sample-choice-{i}-of-5")).collect();
     Ok(Question {
         id: QuestionId("sample".into()),
@@ -174,11 +174,11 @@ mod tests {
         Question {
             text: text.into(),
             choices: Choices::new(texts, 0).unwrap(),
-            ..sample().unwrap()
+            ..sample_question().unwrap()
         }
     }
 
-    fn loaded(files: &[(&str, &str)]) -> Result<Prompts> {
+    fn load(files: &[(&str, &str)]) -> Result<Prompts> {
         let dir = tempfile::tempdir().unwrap();
         for (name, text) in files {
             fs::write(dir.path().join(name), text).unwrap();
@@ -223,9 +223,9 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_replaces_the_prompts_that_it_has() {
+    fn a_folder_replaces_its_prompts_only() {
         let own = "Q: {{ question }}\r\n{% for c in choices %}({{ c.letter }}) {{ c.text }}\r\n{% endfor %}";
-        let prompts = loaded(&[("choice.txt", own), ("README.md", "x"), (".swp", "x")]).unwrap();
+        let prompts = load(&[("choice.txt", own), ("README.md", "x"), (".swp", "x")]).unwrap();
         let asked = question("Red?", &["yes", "no"]);
         assert_eq!(
             prompts.render(View::Image, &asked).unwrap(),
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_folders_are_errors() {
+    fn invalid_folders_are_errors() {
         let choices = "{% for c in choices %}{{ c.text }}{% endfor %}";
         for (files, expected) in [
             (vec![], "neither"),
@@ -260,7 +260,7 @@ mod tests {
             ),
             (vec![("choice.txt", "{% for %}")], "choice.txt"),
         ] {
-            let error = loaded(&files).unwrap_err().to_string();
+            let error = load(&files).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
     }

@@ -1,7 +1,7 @@
-//! JSON from a server, of which a bounded number of values is kept: [`parse`].
+//! Parsing of JSON from a server with bounded memory: [`parse`].
 //!
-//! A body of 16 MB of small objects takes 1.5 GB as a tree of values. No reply needs so many: lists and objects are read to their
-//! end, and what is beyond the bounds is left out, so that a field behind a long list is still found.
+//! A body of 16 MB of small objects would take 1.5 GB as a tree of values, and no reply needs so many. Lists and objects are read to their
+//! end, but values beyond the bounds are dropped, so that a field after a long list is still found.
 
 use std::cell::Cell;
 use std::fmt;
@@ -9,16 +9,16 @@ use std::fmt;
 use serde::de::{DeserializeSeed, Deserializer, Error, IgnoredAny, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
 
-/// The maximum number of values of one text; chosen: they take at most 150 MB.
-const MOST_VALUES: usize = 200_000;
+/// Maximum number of values in one text; chosen: they take at most 150 MB.
+const MAX_VALUES: usize = 200_000;
 
-/// The maximum number of items of one list, and of fields of one object; chosen.
-pub(in crate::ask) const MOST_ITEMS: usize = 10_000;
+/// Maximum number of items in a list, and of fields in an object; chosen.
+pub(in crate::ask) const MAX_ITEMS: usize = 10_000;
 
-/// The JSON value of a text.
+/// Parses a text that is one JSON value.
 ///
 /// # Errors
-/// If the text is not one whole JSON value.
+/// If the text is not a single complete JSON value.
 pub(in crate::ask) fn parse(text: &str) -> serde_json::Result<Value> {
     let mut json = serde_json::Deserializer::from_str(text);
     let value = bounded(&mut json)?;
@@ -26,10 +26,10 @@ pub(in crate::ask) fn parse(text: &str) -> serde_json::Result<Value> {
     Ok(value)
 }
 
-/// The JSON value that a text begins with.
+/// Parses the JSON value at the start of a text; the rest of the text is ignored.
 ///
 /// # Errors
-/// If the text begins with none.
+/// If the text does not start with a complete JSON value.
 pub(in crate::ask) fn parse_start(text: &str) -> serde_json::Result<Value> {
     bounded(&mut serde_json::Deserializer::from_str(text))
 }
@@ -37,20 +37,20 @@ pub(in crate::ask) fn parse_start(text: &str) -> serde_json::Result<Value> {
 fn bounded<'j>(
     json: impl Deserializer<'j, Error = serde_json::Error>,
 ) -> serde_json::Result<Value> {
-    let left = Cell::new(MOST_VALUES);
+    let left = Cell::new(MAX_VALUES);
     Bounded { left: &left }.deserialize(json)
 }
 
-/// Reads a value of which at most `left` values are kept.
+/// Deserializes a value, and keeps at most `left` values in it.
 struct Bounded<'l> {
     left: &'l Cell<usize>,
 }
 
 impl Bounded<'_> {
-    /// Takes room for a value beside `kept` others of its list; `None` if there is none.
-    fn take(&self, kept: usize) -> Option<Self> {
+    /// Reserves room for one more value in a list or object of `len` values; `None` at a bound.
+    fn reserve(&self, len: usize) -> Option<Self> {
         let left = self.left.get().checked_sub(1)?;
-        (kept < MOST_ITEMS).then(|| {
+        (len < MAX_ITEMS).then(|| {
             self.left.set(left);
             Self { left: self.left }
         })
@@ -102,7 +102,7 @@ impl<'j> Visitor<'j> for Bounded<'_> {
 
     fn visit_seq<A: SeqAccess<'j>>(self, mut list: A) -> Result<Value, A::Error> {
         let mut items = Vec::new();
-        while let Some(seed) = self.take(items.len()) {
+        while let Some(seed) = self.reserve(items.len()) {
             match list.next_element_seed(seed)? {
                 Some(item) => items.push(item),
                 None => return Ok(items.into()),
@@ -114,7 +114,7 @@ impl<'j> Visitor<'j> for Bounded<'_> {
 
     fn visit_map<A: MapAccess<'j>>(self, mut object: A) -> Result<Value, A::Error> {
         let mut fields = Map::new();
-        while let Some(seed) = self.take(fields.len()) {
+        while let Some(seed) = self.reserve(fields.len()) {
             match object.next_key::<String>()? {
                 Some(name) => fields.insert(name, object.next_value_seed(seed)?),
                 None => return Ok(fields.into()),
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn small_values_are_those_of_serde() {
+    fn small_values_match_serde() {
         for text in [
             r#"{"a":[1,-2,3.5,1e300,true,null,"x\n\ud83d\ude00"],"b":{},"c":[[]],"a ":18446744073709551615}"#,
             "[]",
@@ -154,18 +154,18 @@ mod tests {
     }
 
     #[test]
-    fn a_field_behind_a_long_list_is_found() {
+    fn a_field_after_a_long_list_is_found() {
         let items = "{\"a\":1},".repeat(50_000);
         let text = format!("{{\"x\":[{items}1],\"y\":2}}");
         let value = parse(&text).unwrap();
         assert_eq!(value["y"], 2);
-        assert_eq!(value["x"].as_array().unwrap().len(), MOST_ITEMS);
-        // What is beyond the bounds must be JSON, too.
+        assert_eq!(value["x"].as_array().unwrap().len(), MAX_ITEMS);
+        // Values beyond the bounds must be valid JSON too.
         assert!(parse(&text.replace(",1]", ",]")).is_err());
     }
 
     #[test]
-    fn no_more_values_are_kept_than_the_bound() {
+    fn the_number_of_values_is_bounded() {
         fn count(value: &Value) -> usize {
             match value {
                 Value::Array(items) => 1 + items.iter().map(count).sum::<usize>(),
@@ -175,6 +175,6 @@ mod tests {
         }
         let list = format!("[{}1]", "[1],".repeat(1_000));
         let text = format!("[{}1]", format!("{list},").repeat(300));
-        assert!(count(&parse(&text).unwrap()) <= 1 + MOST_VALUES);
+        assert!(count(&parse(&text).unwrap()) <= 1 + MAX_VALUES);
     }
 }

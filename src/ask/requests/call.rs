@@ -1,25 +1,25 @@
-//! One question to a model, [`Call`]: the question as a [`Query`] and as a [`Message`].
+//! One question to a model, [`Call`]: as a [`Query`] for models in this process and as a [`Message`] for remote models.
 
 use std::sync::Arc;
 
-use crate::ask::failures::{AskError, Reach};
 use serde::Serialize;
 
+use crate::ask::failures::{AskError, Reach};
 use crate::picture::Payload;
 use crate::types::text::image_mark::{MarkedPiece, pieces};
 use crate::types::{Condition, FailureKind, Question, QuestionId};
 
-/// A question to a model, with choices or open.
+/// A question to a model: multiple-choice or open.
 #[derive(Debug, Clone, Copy)]
 pub enum Query<'a> {
-    /// A question with choices.
+    /// A multiple-choice question.
     Choice(&'a Question),
-    /// An open question, by its name.
+    /// An open question, by its id.
     Open(&'a QuestionId),
 }
 
 impl<'a> Query<'a> {
-    /// The name of the question.
+    /// Id of the question.
     #[must_use]
     pub fn id(self) -> &'a QuestionId {
         match self {
@@ -28,17 +28,20 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The number of choices; 0 if the question is open.
+    /// Number of choices; 0 if the question is open.
     #[must_use]
-    pub fn choices(self) -> usize {
+    pub fn choice_count(self) -> usize {
         match self {
             Self::Choice(question) => question.choices.len(),
             Self::Open(_) => 0,
         }
     }
 
-    /// The question with choices; an error if it is open, for models that can only choose.
-    pub(in crate::ask) fn choice(self) -> Result<&'a Question, AskError> {
+    /// The multiple-choice question, for models that can only choose.
+    ///
+    /// # Errors
+    /// If the question is open.
+    pub(in crate::ask) fn require_choices(self) -> Result<&'a Question, AskError> {
         match self {
             Self::Choice(question) => Ok(question),
             Self::Open(id) => {
@@ -54,103 +57,103 @@ impl<'a> Query<'a> {
     }
 }
 
-/// Where the images of a message stand.
+/// Positions of the images in a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ImagePlaces {
-    /// All between the two texts.
+    /// All images between the two texts.
     #[default]
     Together,
-    /// Each at its first mark in a text, as `<image 2>` for the second; those without a mark between the two texts. A further mark of
-    /// an image stays as words, so that each image is sent once.
+    /// Each image at its first mark in a text, such as `<image 2>` for the second image; images without a mark between the two texts.
+    /// Further marks of the same image remain text, so that each image is sent once.
     Marked,
 }
 
-/// A part of a message.
+/// Part of a message.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::ask) enum MessagePart<'a> {
-    /// Words, which are not empty.
-    Words(&'a str),
-    /// An image.
+    /// Text; not empty.
+    Text(&'a str),
     Image(&'a Arc<Payload>),
 }
 
-/// The single message of a conversation: text, images, and the text after them.
+/// The only message of a conversation: text, images, and text after them.
 #[derive(Debug, Clone, Copy)]
 pub struct Message<'a> {
-    /// The text before the images; the whole text if there are none.
+    /// Text before the images; the whole text if there are no images.
     pub before: &'a str,
-    /// The images; empty for a question without images.
+    /// Images; empty for a question without images.
     pub images: &'a [Arc<Payload>],
-    /// The text after the images; may be empty.
-    pub behind: &'a str,
-    /// Where the images stand.
+    /// Text after the images; may be empty.
+    pub after: &'a str,
+    /// Positions of the images.
     pub places: ImagePlaces,
 }
 
 impl<'a> Message<'a> {
     /// A message of text, without images.
     #[must_use]
-    pub fn words(before: &'a str) -> Self {
+    pub fn text_only(text: &'a str) -> Self {
         Self {
-            before,
+            before: text,
             images: &[],
-            behind: "",
+            after: "",
             places: ImagePlaces::Together,
         }
     }
 
-    /// The parts of the message in their order.
+    /// Parts of the message, in order.
     pub(in crate::ask) fn parts(&self) -> Vec<MessagePart<'a>> {
-        let mut is_shown = vec![false; self.images.len()];
-        let mut of_text = |text: &'a str| {
-            let pieces = pieces(text, |index| {
-                let is_free = is_shown.get_mut(index).filter(|is_shown| !**is_shown);
-                let is_place = self.places == ImagePlaces::Marked && is_free.is_some();
-                if let Some(is_shown) = is_free.filter(|_| is_place) {
-                    *is_shown = true;
-                }
-                is_place
-            });
-            pieces
-                .into_iter()
-                .map(|piece| match piece {
-                    MarkedPiece::Words(words) => MessagePart::Words(words),
-                    MarkedPiece::Image(index) => MessagePart::Image(&self.images[index]),
-                })
-                .collect::<Vec<_>>()
-        };
-        let [before, behind] = [of_text(self.before), of_text(self.behind)];
-        let others = self
+        let mut is_placed = vec![false; self.images.len()];
+        let before = self.text_parts(self.before, &mut is_placed);
+        let after = self.text_parts(self.after, &mut is_placed);
+        let unmarked = self
             .images
             .iter()
-            .zip(is_shown)
-            .filter(|(_, is_shown)| !is_shown)
+            .zip(is_placed)
+            .filter(|(_, is_placed)| !is_placed)
             .map(|(image, _)| MessagePart::Image(image));
-        before.into_iter().chain(others).chain(behind).collect()
+        before.into_iter().chain(unmarked).chain(after).collect()
+    }
+
+    /// Parts of one text of the message, with the marked images that are not yet placed.
+    fn text_parts(&self, text: &'a str, is_placed: &mut [bool]) -> Vec<MessagePart<'a>> {
+        let is_place = |index: usize| match is_placed.get_mut(index) {
+            Some(is_placed) if self.places == ImagePlaces::Marked => {
+                !std::mem::replace(is_placed, true)
+            }
+            _ => false,
+        };
+        pieces(text, is_place)
+            .into_iter()
+            .map(|piece| match piece {
+                MarkedPiece::Words(text) => MessagePart::Text(text),
+                MarkedPiece::Image(index) => MessagePart::Image(&self.images[index]),
+            })
+            .collect()
     }
 }
 
-/// The images among the parts of a message, in their order.
+/// Images among the parts of a message, in order.
 pub(in crate::ask) fn images<'a>(
     parts: &[MessagePart<'a>],
 ) -> impl Iterator<Item = &'a Arc<Payload>> + Clone {
     parts.iter().filter_map(|part| match part {
-        MessagePart::Words(_) => None,
+        MessagePart::Text(_) => None,
         MessagePart::Image(image) => Some(*image),
     })
 }
 
-/// Everything a model needs to answer one question.
+/// Everything that a model needs to answer one question.
 #[derive(Debug, Clone, Copy)]
 pub struct Call<'a> {
-    /// The question; models in this process read it, remote models read the message.
+    /// The question, for models in this process.
     pub query: Query<'a>,
-    /// The condition of the images; `None` if there are no images.
+    /// Condition of the images; `None` without images.
     pub condition: Option<&'a Condition>,
-    /// The text of the question, with its images.
+    /// The question as text, with its images, for remote models.
     pub message: Message<'a>,
-    /// The number of times the question was asked before, in any order of its choices.
+    /// Number of times the question was asked before, in any order of its choices.
     pub turn: u32,
 }
 
@@ -160,8 +163,8 @@ mod tests {
     use crate::picture::PayloadFormat;
     use crate::types::Rgb;
 
-    /// The parts of a message with images of 1, 2, … pixels width: words, and the widths of images.
-    fn parts([before, behind]: [&str; 2], images: usize, places: ImagePlaces) -> Vec<String> {
+    /// Parts of a message with images of 1, 2, … pixels width: texts, and the widths of images.
+    fn parts([before, after]: [&str; 2], images: usize, places: ImagePlaces) -> Vec<String> {
         let images: Vec<Arc<Payload>> = (1..=images)
             .map(|width| {
                 let image = Rgb::black(1, width);
@@ -171,21 +174,21 @@ mod tests {
         let message = Message {
             before,
             images: &images,
-            behind,
+            after,
             places,
         };
         message
             .parts()
             .into_iter()
             .map(|part| match part {
-                MessagePart::Words(words) => words.to_owned(),
+                MessagePart::Text(text) => text.to_owned(),
                 MessagePart::Image(image) => image.facts().width.to_string(),
             })
             .collect()
     }
 
     #[test]
-    fn images_stand_together_or_at_their_marks() {
+    fn images_are_together_or_at_their_marks() {
         use ImagePlaces::{Marked, Together};
         let text = "Is <image 2> like <image 1>?";
         for (texts, images, places, expected) in [

@@ -1,14 +1,14 @@
-//! Replies that are constrained to one letter: the JSON schema in the request, and [`letter_of`] a reply.
+//! Replies constrained to one letter: the JSON [`schema`] in the request, and the [`constrained_letter`] in the reply.
 
 use serde_json::{Value, json};
 
 use super::parameters::Constrain;
 use crate::types::questions::letter;
 
-/// The name of the only field in a reply with `--request constrain=json`.
+/// Name of the only field in a reply with `--request constrain=json`.
 pub(in crate::ask) const ANSWER: &str = "answer";
 
-/// The JSON schema of an object whose only field is one of the letters.
+/// JSON schema of an object whose only field is one of the letters.
 pub(in crate::ask) fn schema(letters: &[char]) -> Value {
     json!({
         "type": "object", "additionalProperties": false, "required": [ANSWER],
@@ -16,8 +16,8 @@ pub(in crate::ask) fn schema(letters: &[char]) -> Value {
     })
 }
 
-/// The letter in a constrained reply; `None` without a constraint, or if the server did not follow it.
-pub(in crate::ask) fn letter_of(
+/// Letter in a constrained reply; `None` without a constraint, or if the server did not follow it.
+pub(in crate::ask) fn constrained_letter(
     constrain: Constrain,
     choices: usize,
     reply: &str,
@@ -56,7 +56,11 @@ mod tests {
             (Choice, "a", None),
             (Choice, "B. yes", None),
         ] {
-            assert_eq!(letter_of(constrain, 2, reply).as_deref(), letter, "{reply}");
+            assert_eq!(
+                constrained_letter(constrain, 2, reply).as_deref(),
+                letter,
+                "{reply}"
+            );
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The fields of a request that not all servers accept: [`RequestField`] is one of them, [`RequestFields`] are those that the
-//! program adapts.
+//! Request fields that not all servers accept: [`RequestField`] describes one field for the analysis of a refusal, [`RequestFields`] has
+//! the values of the fields that the program adapts.
 
 use serde_json::{Map, Value};
 
@@ -7,70 +7,72 @@ use super::parameters::{Parameters, Temperature};
 use super::thinking::ThinkingSwitch;
 use super::token_field::TokenField;
 use crate::ask::endpoints::BaseUrl;
-use crate::ask::failures::Complaint;
+use crate::ask::failures::ApiError;
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::{Wire, WireSetting};
 use crate::error::{Error, Result};
 
-/// A field that a server may refuse and that the program can send in another way.
+/// Field that a server may refuse and that the program can send in another way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AdaptableField {
-    /// The token limit, which has two names.
+    /// Token limit, which has two names.
     TokenField,
-    /// The temperature; some models accept only their default.
+    /// Temperature; some models accept only their default.
     Temperature,
-    /// The wire, to the one that the server asks for.
+    /// API, to the one that the server asks for.
     Wire(Wire),
-    /// The request for the number of tokens in a stream.
+    /// Request for token counts in a stream.
     StreamUsage,
-    /// The request for the probabilities of tokens.
+    /// Request for token probabilities.
     Logprobs,
-    /// How many of the likeliest tokens are asked for.
+    /// Number of top tokens whose probabilities are requested.
     TopLogprobs,
 }
 
-/// The adaptable fields of a request, as found out once for a whole run.
+/// Values of the adaptable fields. They are the same for all requests of a run, except after a refusal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::ask) struct RequestFields {
     /// The API.
     pub(in crate::ask) wire: Wire,
-    /// The name of the token limit, never `Auto`.
+    /// Name of the token limit; never `Auto`.
     pub(in crate::ask) token_field: TokenField,
-    /// The temperature; `None` if none is sent.
+    /// Temperature; `None` to send none.
     pub(in crate::ask) temperature: Option<f64>,
-    /// Whether a stream is asked for the number of its tokens.
+    /// True to request token counts in a stream.
     pub(in crate::ask) stream_usage: bool,
-    /// How many of the likeliest tokens are asked for; `None` if their probabilities are not.
+    /// Number of top tokens whose probabilities are requested; `None` to request none.
     pub(in crate::ask) top_logprobs: Option<u8>,
-    /// The switch for thinking; `None` if requests do not mention it.
+    /// Switch that turns thinking on or off; `None` to send none.
     pub(in crate::ask) thinking: Option<&'static ThinkingSwitch>,
 }
 
-/// The most likeliest tokens that OpenAI's API states, and most servers after it.
+/// Maximum number of top tokens of OpenAI's API and most other servers.
 const TOP_LOGPROBS: u8 = 20;
 
-/// The most that others state, Text Generation Inference among them.
+/// Maximum number of top tokens of some servers, such as Text Generation Inference.
 const FEWER_LOGPROBS: u8 = 5;
 
 impl RequestFields {
-    /// The fields of the first request to a server.
+    /// Fields of the first request to a server.
     ///
     /// # Errors
-    /// If `--thinking` cannot be said to the server, or is said twice.
-    pub(in crate::ask) fn first(
+    /// If the server has no known switch for `--thinking`, or if the switch is the reasoning effort and `--reasoning-effort` is also set.
+    pub(in crate::ask) fn initial(
         parameters: &Parameters,
         base: &BaseUrl,
         vendor: Option<&Vendor>,
     ) -> Result<Self> {
-        let thinking = parameters.thinking.map(|thinking| thinking.at(base));
-        let thinking = thinking.transpose()?;
-        let says_effort = thinking.is_some_and(|switch| switch.effort.is_some());
-        if says_effort && parameters.reasoning_effort.is_some() {
+        let thinking = parameters
+            .thinking
+            .map(|thinking| thinking.switch_for(base))
+            .transpose()?;
+        let sets_effort = thinking.is_some_and(|switch| switch.effort.is_some());
+        if sets_effort && parameters.reasoning_effort.is_some() {
             let problem = "this server takes it as the reasoning effort, which --reasoning-effort sets already";
             return Err(Error::usage("--thinking", problem));
         }
         Ok(Self {
-            wire: parameters.wire.first(),
+            wire: parameters.wire.initial(),
             token_field: Vendor::token_field_at(vendor, parameters.token_field),
             temperature: match parameters.temperature {
                 Temperature::Auto => Some(0.0),
@@ -83,20 +85,22 @@ impl RequestFields {
         })
     }
 
-    /// The reasoning effort: as the user set it, or as the server's switch for thinking.
+    /// Reasoning effort: from the user, or from the switch for thinking.
     pub(in crate::ask) fn effort<'p>(&self, parameters: &'p Parameters) -> Option<&'p str> {
-        let own = parameters.reasoning_effort.as_deref();
-        own.or_else(|| self.thinking?.effort.as_deref())
+        parameters
+            .reasoning_effort
+            .as_deref()
+            .or_else(|| self.thinking?.effort.as_deref())
     }
 
-    /// The fields that tell the server whether the model thinks.
-    pub(in crate::ask) fn switch(&self) -> Option<&'static Map<String, Value>> {
+    /// Body fields of the switch for thinking.
+    pub(in crate::ask) fn thinking_body(&self) -> Option<&'static Map<String, Value>> {
         self.thinking.map(|switch| &switch.body)
     }
 
-    /// The fields of the switch for thinking, as a server may refuse them.
-    pub(in crate::ask) fn switched<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
-        self.switch()
+    /// Body fields of the switch for thinking, as fields that a server may refuse.
+    pub(in crate::ask) fn thinking_fields<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
+        self.thinking_body()
             .into_iter()
             .flat_map(Map::keys)
             .map(|name| RequestField {
@@ -107,12 +111,12 @@ impl RequestFields {
             })
     }
 
-    /// These fields after a server refused one of them; `None` if the user set it, or if it was changed before: a token limit is sent
-    /// by its other name and then not at all.
+    /// Adapts the fields after the refusal of one of them; `None` if the user set the field, or if no other way is left. A token limit is
+    /// first sent under its other name and then omitted.
     pub(in crate::ask) fn after_refusal(
         self,
         field: AdaptableField,
-        first: Self,
+        initial: Self,
         parameters: &Parameters,
     ) -> Option<Self> {
         let adapted = match field {
@@ -120,13 +124,13 @@ impl RequestFields {
                 Self { wire, ..self }
             }
             AdaptableField::TokenField if parameters.token_field == TokenField::Auto => {
-                let is_first = self.token_field == first.token_field;
+                let is_initial = self.token_field == initial.token_field;
                 let token_field = match self.token_field {
-                    TokenField::MaxTokens if is_first => TokenField::MaxCompletionTokens,
-                    _ if is_first => TokenField::MaxTokens,
+                    TokenField::MaxTokens if is_initial => TokenField::MaxCompletionTokens,
+                    _ if is_initial => TokenField::MaxTokens,
                     _ => TokenField::Omit,
                 };
-                // The Responses API has one name for it.
+                // The Responses API has only one name.
                 let token_field = match self.wire {
                     Wire::Responses => TokenField::Omit,
                     _ => token_field,
@@ -158,44 +162,47 @@ impl RequestFields {
         (adapted != self).then_some(adapted)
     }
 
-    /// Whether a field is sent in another way than in the `first` request.
-    pub(in crate::ask) fn differs(self, field: AdaptableField, first: Self) -> bool {
+    /// True if a field differs from the `initial` fields.
+    pub(in crate::ask) fn differs(self, field: AdaptableField, initial: Self) -> bool {
         match field {
-            AdaptableField::Wire(_) => self.wire != first.wire,
-            AdaptableField::TokenField => self.token_field != first.token_field,
-            AdaptableField::Temperature => self.temperature != first.temperature,
-            AdaptableField::StreamUsage => self.stream_usage != first.stream_usage,
+            AdaptableField::Wire(_) => self.wire != initial.wire,
+            AdaptableField::TokenField => self.token_field != initial.token_field,
+            AdaptableField::Temperature => self.temperature != initial.temperature,
+            AdaptableField::StreamUsage => self.stream_usage != initial.stream_usage,
             AdaptableField::Logprobs | AdaptableField::TopLogprobs => {
-                self.top_logprobs != first.top_logprobs
+                self.top_logprobs != initial.top_logprobs
             }
         }
     }
 
-    /// Changes since the `first` request, in words.
-    pub(in crate::ask) fn changes(self, first: Self) -> Vec<String> {
+    /// Differences from the `initial` fields, as phrases for messages.
+    pub(in crate::ask) fn changes(self, initial: Self) -> Vec<String> {
         let wire = match self.wire {
-            wire if wire == first.wire => None,
+            wire if wire == initial.wire => None,
             Wire::Responses => Some("it is asked through the Responses API".to_owned()),
             _ => Some("its replies are streamed".to_owned()),
         };
-        let field = (self.token_field != first.token_field).then(|| match self.token_field {
+        let field = (self.token_field != initial.token_field).then(|| match self.token_field {
             TokenField::Omit => "no token limit is sent".to_owned(),
             field => format!("the token limit is sent as {field}"),
         });
-        let temperature = (self.temperature != first.temperature)
+        let temperature = (self.temperature != initial.temperature)
             .then(|| "no temperature is sent: the server's own is used".to_owned());
-        let usage = (self.stream_usage != first.stream_usage)
+        let usage = (self.stream_usage != initial.stream_usage)
             .then(|| "a stream is not asked for the number of its tokens".to_owned());
-        let logprobs = (self.top_logprobs != first.top_logprobs).then(|| match self.top_logprobs {
-            Some(top) => format!("the probabilities of {top} tokens are asked for"),
-            None => "it states no probabilities: its confidence is not available".to_owned(),
-        });
-        let changes = [wire, field, temperature, usage, logprobs];
-        changes.into_iter().flatten().collect()
+        let logprobs =
+            (self.top_logprobs != initial.top_logprobs).then(|| match self.top_logprobs {
+                Some(top) => format!("the probabilities of {top} tokens are asked for"),
+                None => "it states no probabilities: its confidence is not available".to_owned(),
+            });
+        [wire, field, temperature, usage, logprobs]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 }
 
-/// The contents of a request that a server may refuse.
+/// Content of a request, for the analysis of a refusal.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::ask) struct SentFields<'a> {
     pub(in crate::ask) parameters: &'a Parameters,
@@ -205,26 +212,28 @@ pub(in crate::ask) struct SentFields<'a> {
 }
 
 impl<'a> SentFields<'a> {
-    /// The user's own fields.
-    pub(in crate::ask) fn own(self) -> impl Iterator<Item = RequestField<'a>> {
+    /// Fields that the user adds: the system message and `--extra-body`.
+    pub(in crate::ask) fn user_fields(self) -> impl Iterator<Item = RequestField<'a>> {
         let extra = &self.parameters.extra;
-        let of_body = extra.body.keys().map(|name| RequestField {
+        let body_fields = extra.body.keys().map(|name| RequestField {
             name,
             state: FieldState::Sent,
             adaptable: None,
             hint: "leave this field out of --extra-body, or give a value that the server takes",
         });
-        let of_system = ["system", "instructions"].map(|name| RequestField {
-            name,
-            state: FieldState::set(extra.system.is_some()),
-            adaptable: None,
-            hint: "leave --system out: the model takes no system message",
-        });
-        of_system.into_iter().chain(of_body)
+        ["system", "instructions"]
+            .into_iter()
+            .map(move |name| RequestField {
+                name,
+                state: FieldState::sent_if(extra.system.is_some()),
+                adaptable: None,
+                hint: "leave --system out: the model takes no system message",
+            })
+            .chain(body_fields)
     }
 }
 
-/// Words by which servers state that they do not support a field or its value, and not that the value is wrong.
+/// Phrases for an unsupported field or value, as opposed to a wrong value.
 const UNSUPPORTED: [&str; 24] = [
     "unsupported",
     "not supported",
@@ -252,26 +261,26 @@ const UNSUPPORTED: [&str; 24] = [
     "instead",
 ];
 
-/// Whether a field is in a request.
+/// Presence of a field in a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::ask) enum FieldState {
-    /// It is.
+    /// The field is sent.
     Sent,
-    /// It is not sent any more, because the server refused it before.
+    /// The field is no longer sent, because the server refused it.
     Withdrawn,
-    /// It was never sent, so it is not the cause of a refusal.
+    /// The field was never sent, so it cannot be the cause of a refusal.
     Absent,
 }
 
 impl FieldState {
-    /// The state of a field that is sent if it is set.
-    pub(in crate::ask) fn set(sent: bool) -> Self {
+    /// State of a field that the program does not adapt.
+    pub(in crate::ask) fn sent_if(sent: bool) -> Self {
         if sent { Self::Sent } else { Self::Absent }
     }
 
-    /// The state of a field that is sent until the server refuses it, unless the user leaves it out.
-    pub(in crate::ask) fn until_refused(sent: bool, left_out: bool) -> Self {
-        match (sent, left_out) {
+    /// State of an adaptable field. If it is not sent, either it was omitted from the start or the server has refused it.
+    pub(in crate::ask) fn until_refused(sent: bool, omitted: bool) -> Self {
+        match (sent, omitted) {
             (true, _) => Self::Sent,
             (false, true) => Self::Absent,
             (false, false) => Self::Withdrawn,
@@ -279,68 +288,72 @@ impl FieldState {
     }
 }
 
-/// Names of fields that are ordinary words, too: in a message they count only in quotation marks.
+/// Field names that are also ordinary words: in an error message they count only in quotation marks.
 const ORDINARY_WORDS: [&str; 5] = ["detail", "effort", "format", "reasoning", "seed"];
 
-/// A field of a request, with the remedy if it is refused.
+/// Field of a request, with the remedy if it is refused.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::ask) struct RequestField<'a> {
     pub(in crate::ask) name: &'a str,
-    /// Whether the field was sent.
+    /// Presence in the request.
     pub(in crate::ask) state: FieldState,
-    /// The remedy for the user: the flag that changes the field.
+    /// Remedy for the user: the flag that changes the field.
     pub(in crate::ask) hint: &'static str,
-    /// The kind of field, if the program can send it in another way.
+    /// The adaptable field, if the program can send it in another way.
     pub(in crate::ask) adaptable: Option<AdaptableField>,
 }
 
 impl RequestField<'_> {
-    /// Whether the server names the field as the cause: in the error's own field for it, or in words of refusal that name it.
-    pub(in crate::ask) fn is_named(&self, complaint: &Complaint) -> bool {
-        if self.is_param(complaint) {
+    /// True if the server names the field as the cause: in the `param` of the error, or in a message about an unsupported field.
+    pub(in crate::ask) fn is_named(&self, api_error: &ApiError) -> bool {
+        if self.is_param(api_error) {
             return true;
         }
-        let is_ordinary = ORDINARY_WORDS.contains(&self.name);
-        let in_words = self.is_mentioned(complaint) && !is_ordinary;
-        is_unsupported(complaint) && (in_words || self.is_quoted(complaint))
+        let is_unquoted_name = !ORDINARY_WORDS.contains(&self.name) && self.is_mentioned(api_error);
+        is_unsupported(api_error) && (is_unquoted_name || self.is_quoted(api_error))
     }
 
-    /// Whether the error's own field for it names the field, alone or at the end of a path.
-    pub(in crate::ask) fn is_param(&self, complaint: &Complaint) -> bool {
-        let param = complaint.param.as_deref();
-        let param = param.and_then(|param| param.rsplit(['.', '/']).next());
-        param == Some(self.name)
+    /// True if the `param` of the error is the field, alone or at the end of a path.
+    pub(in crate::ask) fn is_param(&self, api_error: &ApiError) -> bool {
+        api_error
+            .param
+            .as_deref()
+            .is_some_and(|path| last_segment(path) == self.name)
     }
 
-    /// Whether the server's text mentions the field.
-    pub(in crate::ask) fn is_mentioned(&self, complaint: &Complaint) -> bool {
-        mentions(&complaint.message.to_lowercase(), self.name)
+    /// True if the error message mentions the field.
+    pub(in crate::ask) fn is_mentioned(&self, api_error: &ApiError) -> bool {
+        mentions(&api_error.message.to_lowercase(), self.name)
     }
 
-    /// Whether the server's text has the field in quotation marks, alone or at the end of a path.
-    fn is_quoted(&self, complaint: &Complaint) -> bool {
-        let quoted = complaint
+    /// True if the error message has the field in quotation marks, alone or at the end of a path.
+    fn is_quoted(&self, api_error: &ApiError) -> bool {
+        api_error
             .message
-            .split(['`', '\'', '"', '“', '”', '‘', '’']);
-        quoted
+            .split(['`', '\'', '"', '“', '”', '‘', '’'])
             .skip(1)
             .step_by(2)
-            .any(|path| path.rsplit(['.', '/']).next() == Some(self.name))
+            .any(|path| last_segment(path) == self.name)
     }
 }
 
-/// Whether the server states that it does not support a field or a kind of value.
-pub(in crate::ask) fn is_unsupported(complaint: &Complaint) -> bool {
+/// Last segment of a path with dots or slashes.
+fn last_segment(path: &str) -> &str {
+    path.rsplit(['.', '/']).next().unwrap_or(path)
+}
+
+/// True if the error is about an unsupported field or value.
+pub(in crate::ask) fn is_unsupported(api_error: &ApiError) -> bool {
     let codes = [
         "unsupported_parameter",
         "unsupported_value",
         "unknown_parameter",
     ];
-    complaint.mentions_any(&UNSUPPORTED) || complaint.has_code(&codes)
+    api_error.mentions_any(&UNSUPPORTED) || api_error.has_code(&codes)
 }
 
-/// Whether a text has a name as a whole word: `max_tokens` is not in `max_tokens_total`.
+/// True if a text contains a name as a whole word: `max_tokens` is not in `max_tokens_total`.
 fn mentions(text: &str, name: &str) -> bool {
-    let is_name = |c: char| c.is_alphanumeric() || c == '_';
-    text.split(|c: char| !is_name(c)).any(|word| word == name)
+    text.split(|c: char| !c.is_alphanumeric() && c != '_')
+        .any(|word| word == name)
 }

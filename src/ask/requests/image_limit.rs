@@ -1,41 +1,41 @@
-//! The maximum size of an image that an endpoint accepts: [`ImageLimit`].
+//! Limits on the images in requests to an endpoint: [`ImageLimit`].
 
 use crate::ask::endpoints::Access;
 use crate::error::{Error, Result};
 use crate::types::ImageFacts;
 
-/// The maximum size of images that an endpoint accepts.
+/// Limits on the images that an endpoint accepts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ImageLimit {
-    /// The maximum size of the encoded file, in bytes.
+    /// Maximum size of the encoded file, in bytes.
     pub bytes: usize,
-    /// The maximum length of a side, in pixels; `None` for any.
+    /// Maximum length of a side, in pixels; `None` for any.
     pub side: Option<u32>,
-    /// The provider or setting that the limit comes from.
+    /// Provider or setting that the limit comes from.
     pub origin: &'static str,
-    /// The limits of requests with several images.
+    /// Limits on requests with several images.
     request: RequestLimit,
 }
 
-/// The limits of a request with several images; `None` for any, or where none is known.
+/// Limits on a request with several images; `None` for no or an unknown limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct RequestLimit {
-    /// The most images.
-    images: Option<Known<usize>>,
-    /// The longest side of an image, in pixels, if there are more than [`MANY`].
-    side_many: Option<Known<u32>>,
-    /// The largest body, in bytes.
-    bytes: Option<Known<usize>>,
+    /// Maximum number of images.
+    images: Option<ProviderLimit<usize>>,
+    /// Maximum side of an image, in pixels, in a request with more than [`MANY`] images.
+    side_many: Option<ProviderLimit<u32>>,
+    /// Maximum size of the body, in bytes.
+    bytes: Option<ProviderLimit<usize>>,
 }
 
-/// A limit, with the provider that has it.
+/// A limit and the name of the provider.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Known<T> {
-    most: T,
+struct ProviderLimit<T> {
+    max: T,
     origin: &'static str,
 }
 
-/// The number of images beyond which Anthropic takes smaller ones alone (platform.claude.com/docs, "Vision").
+/// Number of images beyond which Anthropic accepts only smaller images (platform.claude.com/docs, "Vision").
 const MANY: usize = 20;
 
 const fn limit(bytes: usize, side: Option<u32>, origin: &'static str) -> ImageLimit {
@@ -52,10 +52,10 @@ const fn limit(bytes: usize, side: Option<u32>, origin: &'static str) -> ImageLi
 }
 
 impl ImageLimit {
-    /// The limit for unknown endpoints: 20 MB; no hosted model accepts more.
+    /// Limit for unknown endpoints: 20 MB, the maximum of all hosted models.
     pub(crate) const UNKNOWN: Self = limit(20_000_000, None, "the default");
 
-    /// The limit of an endpoint.
+    /// Limit on single images at an endpoint.
     #[must_use]
     pub(crate) fn from_access(access: &Access) -> Self {
         let Some(vendor) = access.vendor else {
@@ -67,73 +67,69 @@ impl ImageLimit {
         }
     }
 
-    /// This limit, and that of requests with several images to a model at an endpoint that sees them.
+    /// Adds the limits on requests with several images to an endpoint.
     #[must_use]
     pub(crate) fn with_requests_to(mut self, access: &Access) -> Self {
         let Some(vendor) = access.vendor else {
             return self;
         };
-        let (origin, own) = (&*vendor.name, &mut self.request);
-        own.images = stricter(own.images, vendor.images, origin);
-        own.side_many = stricter(own.side_many, vendor.image_side_many, origin);
-        own.bytes = stricter(own.bytes, vendor.request_bytes, origin);
+        let (origin, request) = (&*vendor.name, &mut self.request);
+        request.images = stricter(request.images, vendor.images, origin);
+        request.side_many = stricter(request.side_many, vendor.image_side_many, origin);
+        request.bytes = stricter(request.bytes, vendor.request_bytes, origin);
         self
     }
 
-    /// Checks that a request with so many images is within the limit. `image` is the largest of them, if it is known. A body that
-    /// may be too large is not refused here, as the other images may be smaller: see [`Self::may_exceed`].
+    /// Checks the number of images in a request, and the side of the largest one, `image`, if it is known. The size of the body is not
+    /// checked, because the other images may be smaller: see [`Self::may_exceed`].
     ///
     /// # Errors
-    /// [`Error::Data`] about the request, with what to do.
+    /// [`Error::Data`] about the request, with the remedy.
     pub(crate) fn check_request(&self, images: usize, image: Option<&ImageFacts>) -> Result<()> {
-        if let Some(Known { most, origin }) =
-            self.request.images.filter(|known| images > known.most)
+        if let Some(ProviderLimit { max, origin }) = self.request.images
+            && images > max
         {
             let problem = format!(
-                "{images} images in a request are more than the {most} of {origin}; show fewer frames, or ask another endpoint"
+                "{images} images in a request are more than the {max} of {origin}; show fewer frames, or ask another endpoint"
             );
             return Err(Error::data("request", problem));
         }
-        let long = image.map_or(0, |image| image.width.max(image.height));
-        let many = self.request.side_many.filter(|_| images > MANY);
-        match many.filter(|known| long > known.most as usize) {
-            None => Ok(()),
-            Some(Known { most, origin }) => {
-                let problem = format!(
-                    "a side of {long} pixels is more than the {most} of {origin} for requests with more than {MANY} images; make images \
-                     smaller with --image max-side={most}"
-                );
-                Err(Error::data("request", problem))
-            }
+        let side = image.map_or(0, |image| image.width.max(image.height));
+        if let Some(ProviderLimit { max, origin }) = self.request.side_many
+            && images > MANY
+            && side > max as usize
+        {
+            let problem = format!(
+                "a side of {side} pixels is more than the {max} of {origin} for requests with more than {MANY} images; make images \
+                 smaller with --image max-side={max}"
+            );
+            return Err(Error::data("request", problem));
         }
+        Ok(())
     }
 
-    /// The reason why a request with `images` images, of which `image` is the largest, may be refused: as base64 they may exceed what a
-    /// body may have. `None` if they fit.
+    /// Warning that the body of a request with `images` images, with `image` as the largest, may be too large in base64. `None` if the
+    /// images fit in any case.
     #[must_use]
     pub(crate) fn may_exceed(&self, images: usize, image: &ImageFacts) -> Option<String> {
         let bytes = images * image.bytes.div_ceil(3) * 4;
-        let Known { most, origin } = self.request.bytes.filter(|known| bytes > known.most)?;
-        let megabytes = |bytes: usize| bytes as f64 / 1e6;
+        let ProviderLimit { max, origin } = self.request.bytes.filter(|limit| bytes > limit.max)?;
         Some(format!(
             "a request may have up to {:.1} MB, with {images} images, and {origin} takes {} MB; make images smaller with --image max-side=N, or \
              with --image jpeg:95",
             megabytes(bytes),
-            megabytes(most)
+            megabytes(max)
         ))
     }
 
-    /// Checks that an image is within the limit.
+    /// Checks the file size and the sides of an image.
     ///
     /// # Errors
     /// [`Error::Data`] about the image, with the flags that make it smaller.
     pub(crate) fn check(&self, image: &ImageFacts) -> Result<()> {
-        let long = image.width.max(image.height);
         let remedy = "make it smaller with --image max-side=N, or with --image jpeg:95";
-        let wrong = |problem: String| Err(Error::data("image", problem));
-        let megabytes = |bytes: usize| bytes as f64 / 1e6;
         if image.bytes > self.bytes {
-            return wrong(format!(
+            let problem = format!(
                 "{} × {} pixels are {:.1} MB as {}, more than the {} MB of {}; {remedy}, or set another limit with --image max-mb",
                 image.width,
                 image.height,
@@ -141,18 +137,23 @@ impl ImageLimit {
                 image.format,
                 megabytes(self.bytes),
                 self.origin,
-            ));
+            );
+            return Err(Error::data("image", problem));
         }
-        match self.side {
-            Some(side) if long > side as usize => wrong(format!(
-                "a side of {long} pixels is more than the {side} of {}; {remedy}",
+        let side = image.width.max(image.height);
+        if let Some(max) = self.side
+            && side > max as usize
+        {
+            let problem = format!(
+                "a side of {side} pixels is more than the {max} of {}; {remedy}",
                 self.origin
-            )),
-            _ => Ok(()),
+            );
+            return Err(Error::data("image", problem));
         }
+        Ok(())
     }
 
-    /// The limit that holds if both do; the origin is that of the smaller file.
+    /// The stricter value of each limit; the origin is that of the smaller file size.
     #[must_use]
     pub(crate) fn stricter(self, other: Self) -> Self {
         let (small, large) = if self.bytes <= other.bytes {
@@ -174,21 +175,25 @@ impl ImageLimit {
         }
     }
 
-    /// The limit that the user set by `--image max-mb`.
+    /// Limit from `--image max-mb`.
     #[must_use]
-    pub(crate) fn stated(bytes: usize) -> Self {
+    pub(crate) fn from_user(bytes: usize) -> Self {
         limit(bytes, None, "--image max-mb")
     }
 }
 
-/// The stricter of a limit and that of another provider.
+fn megabytes(bytes: usize) -> f64 {
+    bytes as f64 / 1e6
+}
+
+/// The stricter of a limit and the limit `max` of the provider `origin`.
 fn stricter<T: Ord>(
-    known: Option<Known<T>>,
-    most: Option<T>,
+    limit: Option<ProviderLimit<T>>,
+    max: Option<T>,
     origin: &'static str,
-) -> Option<Known<T>> {
-    let other = most.map(|most| Known { most, origin });
-    known.into_iter().chain(other).min()
+) -> Option<ProviderLimit<T>> {
+    let other = max.map(|max| ProviderLimit { max, origin });
+    limit.into_iter().chain(other).min()
 }
 
 #[cfg(test)]
@@ -196,11 +201,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn limits_are_known_by_host() {
-        let of = |base: &str| ImageLimit::from_access(&Access::new(base.parse().unwrap()));
-        assert_eq!(of("https://api.anthropic.com/v1").side, Some(8000));
-        assert_eq!(of("https://r.openai.azure.com/openai/v1").origin, "Azure");
-        assert_eq!(of("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
+    fn the_host_decides_the_limit() {
+        let limit_at = |base: &str| ImageLimit::from_access(&Access::new(base.parse().unwrap()));
+        assert_eq!(limit_at("https://api.anthropic.com/v1").side, Some(8000));
+        assert_eq!(
+            limit_at("https://r.openai.azure.com/openai/v1").origin,
+            "Azure"
+        );
+        assert_eq!(limit_at("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
     }
 
     /// A PNG file of this many bytes and this width.
@@ -218,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_beyond_the_limit_is_an_error_with_a_remedy() {
+    fn images_beyond_the_limit_are_errors() {
         let limit = ImageLimit::from_access(&Access::new(
             "https://api.anthropic.com/v1".parse().unwrap(),
         ));
@@ -230,18 +238,18 @@ mod tests {
                 "{error}"
             );
         }
-        let both = limit.stricter(ImageLimit::stated(5));
+        let both = limit.stricter(ImageLimit::from_user(5));
         assert_eq!(
             (both.bytes, both.side, both.origin),
             (5, Some(8000), "--image max-mb")
         );
-        assert!(ImageLimit::stated(5).check(&image(6, 10)).is_err());
+        assert!(ImageLimit::from_user(5).check(&image(6, 10)).is_err());
     }
 
     #[test]
-    fn several_images_in_a_request_have_limits_of_their_own() {
+    fn requests_with_several_images_have_limits() {
         let at = |base: &str| {
-            ImageLimit::stated(1).with_requests_to(&Access::new(base.parse().unwrap()))
+            ImageLimit::from_user(1).with_requests_to(&Access::new(base.parse().unwrap()))
         };
         let groq = at("https://api.groq.com/openai/v1");
         assert!(groq.check_request(5, None).is_ok());
@@ -262,13 +270,13 @@ mod tests {
         // 50 images of 300 kB are 20 MB of base64.
         let gemini = at("https://generativelanguage.googleapis.com/v1beta/openai");
         assert_eq!(gemini.may_exceed(50, &image(300_000, 10)), None);
-        let words = gemini.may_exceed(50, &image(300_003, 10)).unwrap();
-        assert!(words.contains("Gemini takes 20 MB"), "{words}");
-        // The stricter of two, and none at a server that is not known.
+        let warning = gemini.may_exceed(50, &image(300_003, 10)).unwrap();
+        assert!(warning.contains("Gemini takes 20 MB"), "{warning}");
+        // The stricter of two limits, and no limit at an unknown server.
         let both = groq.stricter(anthropic);
         assert!(both.check_request(6, None).is_err() && both.check_request(5, Some(&wide)).is_ok());
-        let own = at("http://127.0.0.1:8000/v1");
-        assert!(own.check_request(1000, Some(&wide)).is_ok());
-        assert_eq!(own.may_exceed(1000, &wide), None);
+        let unknown = at("http://127.0.0.1:8000/v1");
+        assert!(unknown.check_request(1000, Some(&wide)).is_ok());
+        assert_eq!(unknown.may_exceed(1000, &wide), None);
     }
 }

@@ -1,6 +1,5 @@
-//! Requests: the question, its parameters and the fields of the body.
+//! Requests: the question, the parameters and the fields of the body.
 
-mod body;
 mod call;
 pub(super) mod constraint;
 mod extra_fields;
@@ -8,10 +7,10 @@ mod field;
 mod image_limit;
 mod parameters;
 mod request;
+mod request_body;
 mod thinking;
 mod token_field;
 
-pub(super) use body::Parts;
 pub(crate) use call::ImagePlaces;
 pub use call::{Call, Message, Query};
 pub(super) use call::{MessagePart, images};
@@ -25,5 +24,6 @@ pub(crate) use image_limit::ImageLimit;
 pub(crate) use parameters::by_flag;
 pub use parameters::{Constrain, ImageDetail, Parameters, Temperature};
 pub(super) use request::Request;
+pub(super) use request_body::RequestBody;
 pub use thinking::Thinking;
 pub use token_field::TokenField;

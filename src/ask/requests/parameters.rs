@@ -1,4 +1,4 @@
-//! The model's name and sampling settings in a request: [`Parameters`].
+//! Model name and sampling settings of requests: [`Parameters`].
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -39,7 +39,7 @@ pub struct Parameters {
     /// A letter needs 16; a reasoning model uses hundreds before it.
     #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
     pub max_tokens: NonZeroU32,
-    /// The smaller limit that the run began with, which stays in the keys of its trials; `None` if it has not grown.
+    /// Smaller token limit with which the run began, which remains in the keys of its trials; `None` if the limit was not raised.
     #[arg(skip)]
     #[serde(skip)]
     pub first_max_tokens: Option<NonZeroU32>,
@@ -62,27 +62,27 @@ pub struct Parameters {
     #[arg(long, value_name = "WIRE", value_enum, default_value_t, add = Decides::Reply)]
     #[serde(skip)]
     pub wire: WireSetting,
-    /// The seed of the server's sampling, if the server supports it: replies at a temperature above 0 are then more alike.
+    /// Seed of the server's sampling, for servers that support it: replies at a temperature above 0 are then more reproducible.
     #[arg(skip)]
     pub seed: Option<u64>,
-    /// The constraint that the server puts on the model's reply.
+    /// Constraint that the server enforces on the reply.
     #[arg(skip)]
     pub constrain: Constrain,
-    /// Whether the probabilities of the likeliest tokens are asked for.
+    /// True to request the probabilities of the top tokens.
     #[arg(skip)]
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub probabilities: bool,
-    /// Fields that the user adds to requests or leaves out.
+    /// Fields that the user adds to requests or omits.
     #[arg(skip)]
     #[serde(flatten)]
     pub extra: ExtraFields,
 }
 
 impl Parameters {
-    /// The default of the token limit; chosen.
+    /// Default token limit; chosen.
     pub const MAX_TOKENS: NonZeroU32 = NonZeroU32::new(1024).unwrap();
 
-    /// The settings that every server accepts: temperature 0, and enough tokens for a reply with reasoning.
+    /// Settings that every server accepts: temperature 0, and enough tokens for a reply with reasoning.
     #[must_use]
     pub fn new(model: String) -> Self {
         Self {
@@ -103,19 +103,19 @@ impl Parameters {
         }
     }
 
-    /// The token limit that is sent; `None` if none is sent.
+    /// Token limit in requests; `None` to send none.
     pub(in crate::ask) fn limit(&self) -> Option<u32> {
         (self.token_field != TokenField::Omit).then_some(self.max_tokens.get())
     }
 
-    /// The token limit that is sent, if it is larger than the one that the run began with.
-    pub(in crate::ask) fn grown_limit(&self) -> Option<u32> {
+    /// Token limit in requests, if it was raised after the run began.
+    pub(in crate::ask) fn raised_limit(&self) -> Option<u32> {
         self.limit().filter(|_| self.first_max_tokens.is_some())
     }
 
-    /// The same settings in a run that began with a smaller token limit, which stays in the keys of its trials; `None` if this one is not
-    /// larger or not sent.
-    pub(crate) fn grown_from(&self, first: NonZeroU32) -> Option<Self> {
+    /// The same settings for a run that began with the smaller token limit `first`, which remains in the keys of its trials. `None` if the
+    /// limit of these settings is not larger or not sent.
+    pub(crate) fn raised_from(&self, first: NonZeroU32) -> Option<Self> {
         let is_larger = self.limit()? > first.get();
         is_larger.then(|| Self {
             first_max_tokens: Some(first),
@@ -123,27 +123,27 @@ impl Parameters {
         })
     }
 
-    /// The same settings in a run that has this column of the model, with a smaller token limit; `None` if another setting differs, too.
-    pub(crate) fn grown_from_column(&self, column: &Value) -> Option<Self> {
+    /// The same settings for a run whose column of the model differs only in a smaller token limit; otherwise `None`.
+    pub(crate) fn raised_from_column(&self, column: &Value) -> Option<Self> {
         let first = u32::try_from(column["--max-tokens"].as_u64()?).ok()?;
-        self.grown_from(NonZeroU32::new(first)?)
-            .filter(|grown| grown.are_of_column(column))
+        self.raised_from(NonZeroU32::new(first)?)
+            .filter(|raised| raised.match_column(column))
     }
 
-    /// Whether the settings that decide a reply are those of a run's column, whose address is left aside.
-    pub(crate) fn are_of_column(&self, column: &Value) -> bool {
-        let Value::Object(own) = self.content() else {
+    /// True if the settings that decide a reply equal those in a run's column of the model; the address is ignored.
+    pub(crate) fn match_column(&self, column: &Value) -> bool {
+        let Value::Object(content) = self.content() else {
             return false;
         };
         let mut column = column.as_object().cloned().unwrap_or_default();
         column.remove("--base-url");
-        by_flag(own) == column
+        by_flag(content) == column
     }
 
-    /// Checks that the temperature does not change the probabilities of tokens.
+    /// Checks that the temperature does not change token probabilities.
     ///
     /// # Errors
-    /// [`Error::Usage`] if it is another one than 0 or the server's own.
+    /// [`Error::Usage`] unless the temperature is 0 or the server's default.
     pub(crate) fn require_greedy(&self) -> Result<()> {
         match self.temperature {
             Temperature::Of(value) if value > 0.0 => Err(Error::usage(
@@ -154,7 +154,7 @@ impl Parameters {
         }
     }
 
-    /// The settings that can change a reply, the API among them. Whether a token limit is sent is one of them; the name of its field is not.
+    /// Settings that can change a reply, including the API and the token limit, but not the name of its field.
     pub(in crate::ask) fn content(&self) -> Value {
         let mut content = json!(self);
         let first = self.first_max_tokens.map(NonZeroU32::get);
@@ -164,36 +164,37 @@ impl Parameters {
     }
 }
 
-/// The settings of a model, by the flag that sets each.
+/// Renames the keys of a model's settings to flags.
 pub(crate) fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
     content
         .into_iter()
-        .map(|(name, value)| (flag(&name), value))
+        .map(|(name, value)| (flag_name(&name), value))
         .collect()
 }
 
-/// The flag that sets a parameter.
-fn flag(parameter: &str) -> String {
+/// Flag that sets a parameter.
+fn flag_name(parameter: &str) -> String {
     match parameter {
         "seed" => "--sampling-seed".to_owned(),
-        // Keys of a file of models that are no flags.
+        // Keys of a models file that are not flags.
         "deployment" => "deployment".to_owned(),
         "reply_headers" => "reply-headers".to_owned(),
         name => format!("--{}", name.replace('_', "-")),
     }
 }
 
-/// Reads a probability above 0.
+/// Parses a probability above 0.
 fn probability(text: &str) -> std::result::Result<f64, String> {
-    let value = text.parse().ok();
-    let value = value.filter(|value| 0.0 < *value && *value <= 1.0);
-    value.ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
+    text.parse()
+        .ok()
+        .filter(|value| 0.0 < *value && *value <= 1.0)
+        .ok_or_else(|| "a number above 0 and up to 1 expected".to_owned())
 }
 
-/// The sampling temperature of a request.
+/// Sampling temperature of a request.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Temperature {
-    /// 0, which gives the likeliest answer. If the model refuses it, as reasoning models do, the server's default.
+    /// 0, for the likeliest answer; or the server's default if the model refuses 0, as reasoning models do.
     Auto,
     /// The server's default: no temperature is sent.
     Server,
@@ -260,7 +261,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_read_back() {
+    fn names_round_trip() {
         for name in ["auto", "max_tokens", "max_completion_tokens", "none"] {
             let field = TokenField::from_str(name, false).unwrap();
             assert_eq!(field.to_string(), name);
@@ -274,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn settings_that_decide_a_reply_change_the_content() {
+    fn settings_that_affect_replies_change_the_content() {
         let base = Parameters::new("m".into());
         let mut others = vec![base.clone(); 15];
         others[0].model = "n".into();
@@ -301,15 +302,15 @@ mod tests {
             ..base.clone()
         };
         assert_eq!(renamed.content(), base.content());
-        let mut grown = base.clone();
-        grown.max_tokens = NonZeroU32::new(4096).unwrap();
-        assert_ne!(grown.content(), base.content());
-        let grown = grown.grown_from(base.max_tokens).unwrap();
-        assert_eq!(grown.content(), base.content());
+        let mut raised = base.clone();
+        raised.max_tokens = NonZeroU32::new(4096).unwrap();
+        assert_ne!(raised.content(), base.content());
+        let raised = raised.raised_from(base.max_tokens).unwrap();
+        assert_eq!(raised.content(), base.content());
         assert_eq!(
-            (grown.limit(), grown.grown_limit()),
+            (raised.limit(), raised.raised_limit()),
             (Some(4096), Some(4096))
         );
-        assert_eq!(base.grown_from(grown.max_tokens), None);
+        assert_eq!(base.raised_from(raised.max_tokens), None);
     }
 }

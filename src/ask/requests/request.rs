@@ -2,23 +2,23 @@
 
 use reqwest::header::HeaderMap;
 
-use super::body::Parts;
 use super::field::SentFields;
+use super::request_body::RequestBody;
 use crate::ask::costs::Reservation;
-use crate::ask::endpoints::ModelNumber;
+use crate::ask::endpoints::ModelIndex;
 use crate::ask::wire_kind::Wire;
 
 /// One request, which may be sent several times.
 pub(in crate::ask) struct Request<'a> {
-    /// The model at the endpoint.
-    pub(in crate::ask) model: ModelNumber,
+    /// Index of the model at the endpoint.
+    pub(in crate::ask) model: ModelIndex,
     pub(in crate::ask) wire: Wire,
-    /// The headers for each replica.
+    /// Headers for each replica.
     pub(in crate::ask) headers: &'a [HeaderMap],
-    pub(in crate::ask) body: Parts,
+    pub(in crate::ask) body: RequestBody,
     pub(in crate::ask) sent: SentFields<'a>,
-    /// A number that is the same for requests about the same images.
+    /// Hash of the images: requests about the same images prefer the same replica.
     pub(in crate::ask) affinity: u64,
-    /// The dollars that each sending holds; `None` if the model has no known price.
+    /// Reservation of the cost of each attempt; `None` if the model has no known price.
     pub(in crate::ask) reservation: Option<&'a Reservation>,
 }

@@ -1,6 +1,6 @@
-//! Whether a model thinks before it answers ([`Thinking`]), and how a server is told ([`ThinkingSwitch`]).
+//! Setting whether a model thinks before it answers ([`Thinking`]), and the request fields for it ([`ThinkingSwitch`]).
 //!
-//! Every vendor has fields of its own for it; they are in `thinking.toml`, by host.
+//! The fields differ between vendors; `thinking.toml` lists them by host.
 
 use std::sync::LazyLock;
 
@@ -12,7 +12,7 @@ use crate::ask::endpoints::BaseUrl;
 use crate::error::{Error, Result};
 use crate::types::flags::flag_words;
 
-/// The table that comes with the program.
+/// The built-in table.
 static TABLE: LazyLock<Table> = LazyLock::new(|| {
     let text = include_str!("../thinking.toml");
     toml::from_str(text).unwrap_or_else(|e| unreachable!("a test reads thinking.toml: {e}"))
@@ -30,7 +30,7 @@ pub enum Thinking {
 
 flag_words!(Thinking);
 
-/// The servers that are known, with the date of the table.
+/// Table of servers, with its date.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct Table {
@@ -39,63 +39,68 @@ struct Table {
     server: Vec<ServerRow>,
 }
 
-/// Servers that are told in the same way.
+/// Servers with the same switch.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ServerRow {
-    /// Ends of their hosts' names.
+    /// Suffixes of their host names.
     #[serde(default)]
     hosts: Vec<String>,
-    /// Ports of servers on this machine.
+    /// Ports of such servers on this machine.
     #[serde(default)]
     ports: Vec<u16>,
     off: Option<ThinkingSwitch>,
     on: Option<ThinkingSwitch>,
 }
 
-/// The part of a request that controls thinking.
+/// Request fields that turn thinking on or off.
 #[derive(Debug, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(in crate::ask) struct ThinkingSwitch {
-    /// The reasoning effort; `None` if it is not the switch.
+    /// Reasoning effort; `None` if the switch does not use it.
     pub(super) effort: Option<String>,
-    /// Fields at the top of the request.
+    /// Top-level fields of the body.
     #[serde(default)]
     pub(super) body: Map<String, Value>,
 }
 
 impl Thinking {
-    /// The switch that this server understands.
+    /// Switch for the server at a base URL.
     ///
     /// # Errors
-    /// [`Error::Usage`] if nothing is known of the server's switch.
-    pub(super) fn at(self, base: &BaseUrl) -> Result<&'static ThinkingSwitch> {
+    /// [`Error::Usage`] if the switch of the server is unknown.
+    pub(super) fn switch_for(self, base: &BaseUrl) -> Result<&'static ThinkingSwitch> {
         let servers = &TABLE.server;
-        let row = servers.iter().find(|row| row.is_of(base));
-        let row = row.or_else(|| servers.iter().find(|row| row.is_of_others()));
-        let switch = row.and_then(|row| match self {
-            Self::Off => row.off.as_ref(),
-            Self::On => row.on.as_ref(),
-        });
-        switch.ok_or_else(|| {
-            let problem = format_args!(
-                "how to turn thinking {self} at {base} is not known; set it with --reasoning-effort, in the server's words"
-            );
-            Error::usage("--thinking", problem)
-        })
+        servers
+            .iter()
+            .find(|row| row.matches(base))
+            .or_else(|| servers.iter().find(|row| row.is_fallback()))
+            .and_then(|row| match self {
+                Self::Off => row.off.as_ref(),
+                Self::On => row.on.as_ref(),
+            })
+            .ok_or_else(|| {
+                let problem = format_args!(
+                    "how to turn thinking {self} at {base} is not known; set it with --reasoning-effort, in the server's words"
+                );
+                Error::usage("--thinking", problem)
+            })
     }
 }
 
 impl ServerRow {
-    fn is_of(&self, base: &BaseUrl) -> bool {
-        let named = self.hosts.iter().any(|host| {
-            let whole = base.host() == host.trim_start_matches('.');
-            whole || (host.starts_with('.') && base.host().ends_with(&**host))
+    /// True if the row lists the host, or the port of a server on this machine.
+    fn matches(&self, base: &BaseUrl) -> bool {
+        let has_host = self.hosts.iter().any(|suffix| {
+            base.host() == suffix.trim_start_matches('.')
+                || (suffix.starts_with('.') && base.host().ends_with(suffix.as_str()))
         });
-        named || (base.is_loopback() && base.port().is_some_and(|port| self.ports.contains(&port)))
+        has_host
+            || (base.is_loopback() && base.port().is_some_and(|port| self.ports.contains(&port)))
     }
 
-    fn is_of_others(&self) -> bool {
+    /// True for the row of all servers that no other row lists.
+    fn is_fallback(&self) -> bool {
         self.hosts.is_empty() && self.ports.is_empty()
     }
 }
@@ -106,12 +111,12 @@ mod tests {
 
     use super::*;
 
-    fn at(base: &str, thinking: Thinking) -> Result<&'static ThinkingSwitch> {
-        thinking.at(&base.parse().unwrap())
+    fn switch_for(base: &str, thinking: Thinking) -> Result<&'static ThinkingSwitch> {
+        thinking.switch_for(&base.parse().unwrap())
     }
 
     #[test]
-    fn every_server_is_told_in_its_own_words() {
+    fn each_server_has_its_switch() {
         let template = json!({"chat_template_kwargs": {"enable_thinking": false}});
         for (base, effort, body) in [
             ("https://api.openai.com/v1", Some("none"), json!({})),
@@ -132,32 +137,32 @@ mod tests {
             ),
             ("http://127.0.0.1:11434/v1", Some("none"), json!({})),
             ("http://127.0.0.1:8000/v1", None, template.clone()),
-            // The port reveals nothing about another machine, nor a name of another domain.
+            // Ports count only on this machine, and suffixes only as whole domains.
             ("http://gpu7:11434/v1", None, template.clone()),
             ("https://api.openai.com.example/v1", None, template),
         ] {
-            let switch = at(base, Thinking::Off).unwrap();
+            let switch = switch_for(base, Thinking::Off).unwrap();
             assert_eq!(switch.effort.as_deref(), effort, "{base}");
             assert_eq!(json!(switch.body), body, "{base}");
         }
     }
 
     #[test]
-    fn a_switch_that_is_not_known_is_refused() {
+    fn unknown_switches_are_errors() {
         for (base, thinking) in [
             ("https://api.mistral.ai/v1", Thinking::Off),
             ("https://api.openai.com/v1", Thinking::On),
         ] {
-            let error = at(base, thinking).unwrap_err().to_string();
+            let error = switch_for(base, thinking).unwrap_err().to_string();
             assert!(error.contains("--thinking"), "{error}");
             assert!(error.contains("--reasoning-effort"), "{error}");
         }
     }
 
-    /// No switch sets what the program sets, and none says nothing.
+    /// No switch is empty or sets a field of the program.
     #[test]
-    fn the_table_holds_switches_alone() {
-        let own = [
+    fn switches_set_only_thinking_fields() {
+        let program_fields = [
             "model",
             "messages",
             "input",
@@ -167,15 +172,19 @@ mod tests {
             "reasoning_effort",
             "logprobs",
         ];
-        let others = TABLE.server.iter().filter(|row| row.is_of_others());
-        assert_eq!(others.count(), 1);
+        let fallbacks = TABLE.server.iter().filter(|row| row.is_fallback());
+        assert_eq!(fallbacks.count(), 1);
         for row in &TABLE.server {
             for switch in row.off.iter().chain(&row.on) {
                 assert!(
                     switch.effort.is_some() || !switch.body.is_empty(),
                     "{row:?}"
                 );
-                assert!(own.iter().all(|field| !switch.body.contains_key(*field)));
+                assert!(
+                    program_fields
+                        .iter()
+                        .all(|field| !switch.body.contains_key(*field))
+                );
             }
         }
     }

@@ -1,12 +1,12 @@
-//! Secrets in the fields that the user adds to the body of requests: [`refuse_secrets`].
+//! Check of `--extra-body` for secrets: [`refuse_secrets`].
 
 use serde_json::{Map, Value};
 
 use super::key_form::{is_secret_name, is_secret_value};
 use crate::error::{Error, Result};
 
-/// Ends of names of fields that hold nothing but secrets, in small letters and without hyphens and the like.
-const SECRETS: [&str; 8] = [
+/// Suffixes of field names whose values are always secrets; lower-case letters and digits only.
+const SECRET_SUFFIXES: [&str; 8] = [
     "apikey",
     "accesskey",
     "secretkey",
@@ -17,16 +17,16 @@ const SECRETS: [&str; 8] = [
     "authtoken",
 ];
 
-/// Fields whose names tell of a secret and whose long values are none.
-const NO_SECRETS: [&str; 2] = ["prompt_cache_key", "tokenizer"];
+/// Fields whose names look secret but whose long values are not.
+const NOT_SECRET: [&str; 2] = ["prompt_cache_key", "tokenizer"];
 
-/// The number of characters from which the value of a field with a telling name is taken for a secret; chosen.
-const LONG: usize = 20;
+/// Minimum length at which the value of a field with a secret-looking name counts as a secret; chosen.
+const MIN_LENGTH: usize = 20;
 
-/// Refuses fields that look like secrets, wherever they stand: bodies are written to the manifest and to files of batches.
+/// Checks that no field, at any depth, looks like a secret: bodies are written to the manifest and to batch files.
 ///
 /// # Errors
-/// [`Error::Usage`] with the name of the field, without its value.
+/// [`Error::Usage`] with the name of a field that looks like a secret, without its value.
 pub(in crate::ask) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> {
     fields
         .iter()
@@ -34,7 +34,7 @@ pub(in crate::ask) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> 
 }
 
 fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
-    let refused = |name: &str| {
+    let secret_error = |name: &str| {
         let problem = format_args!(
             "{name} looks like a secret, which is not shown here and must not be in a body, because bodies are written to files: \
              put it into a variable, and name that with --header-env or --api-key-env"
@@ -42,10 +42,10 @@ fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
         Err(Error::usage("--extra-body", problem))
     };
     if is_secret_value(name) {
-        return refused("the name of a field");
+        return secret_error("the name of a field");
     }
     match value {
-        Value::String(text) if is_secret(name, text) => refused(name),
+        Value::String(text) if is_secret(name, text) => secret_error(name),
         Value::Array(items) => items
             .iter()
             .try_for_each(|item| refuse_in_field(name, item)),
@@ -54,21 +54,25 @@ fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
     }
 }
 
-/// Whether the text of a field looks like a secret: it begins as a key does, or its field holds nothing else, or has a telling name and
-/// a long text of letters and digits.
+/// True if the text of a field looks like a secret: it has the prefix of a key, or the field name always means a secret, or the field
+/// name looks secret and the text is a long mixture of letters and digits.
 fn is_secret(name: &str, text: &str) -> bool {
     let letters: String = name
         .chars()
         .filter(char::is_ascii_alphanumeric)
-        .collect::<String>()
-        .to_lowercase();
-    let named = !text.is_empty() && SECRETS.iter().any(|end| letters.ends_with(end));
-    let in_key = |c: char| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c);
-    let long = text.len() >= LONG
-        && text.chars().all(in_key)
+        .map(|c| c.to_ascii_lowercase())
+        .collect();
+    let has_secret_suffix = SECRET_SUFFIXES
+        .iter()
+        .any(|suffix| letters.ends_with(suffix));
+    let is_key_char = |c: char| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c);
+    let is_long_key = text.len() >= MIN_LENGTH
+        && text.chars().all(is_key_char)
         && text.contains(|c: char| c.is_ascii_digit());
-    let tells = is_secret_name(name) && !NO_SECRETS.contains(&name);
-    is_secret_value(text) || named || (tells && long)
+    let has_secret_name = is_secret_name(name) && !NOT_SECRET.contains(&name);
+    is_secret_value(text)
+        || (has_secret_suffix && !text.is_empty())
+        || (has_secret_name && is_long_key)
 }
 
 #[cfg(test)]
@@ -78,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn secrets_are_refused_by_field_and_not_shown() {
+    fn secret_fields_are_refused() {
         let body = |body: &Value| {
             refuse_secrets(body.as_object().unwrap()).map_err(|error| error.to_string())
         };

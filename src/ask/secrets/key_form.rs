@@ -1,28 +1,29 @@
-//! Recognises text that looks like a secret: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`].
+//! Recognition of text that looks like a secret: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`].
 
-/// How keys of common vendors begin.
-const BEGINNINGS: [&str; 6] = ["sk-", "AIza", "gsk_", "xai-", "hf_", "Bearer "];
+/// Prefixes of the keys of common vendors.
+const KEY_PREFIXES: [&str; 6] = ["sk-", "AIza", "gsk_", "xai-", "hf_", "Bearer "];
 
-/// The number of characters from which a mixture of letters and digits is taken for a key; chosen.
-const LONG: usize = 20;
+/// Minimum length at which a mixture of letters and digits counts as a key; chosen.
+const MIN_LENGTH: usize = 20;
 
-/// Whether a text that should be the name of a variable looks like a key: it begins as one, has a character that no name of a
-/// variable has, or is a long mixture of letters and digits without an underscore.
+/// True if a text that should be the name of a variable looks like a key: it has the prefix of a key, a character that variable names do
+/// not have, or is a long mixture of letters and digits without an underscore.
 pub(crate) fn looks_like_key(name: &str) -> bool {
-    let is_name = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let mixed =
-        name.len() >= LONG && !name.contains('_') && name.contains(|c: char| c.is_ascii_digit());
-    is_secret_value(name) || !name.chars().all(is_name) || mixed
+    let is_variable_name = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    let is_long_mixture = name.len() >= MIN_LENGTH
+        && !name.contains('_')
+        && name.contains(|c: char| c.is_ascii_digit());
+    is_secret_value(name) || !is_variable_name || is_long_mixture
 }
 
-/// Whether a value begins as a key does.
+/// True if a value has the prefix of a key.
 pub(crate) fn is_secret_value(value: &str) -> bool {
-    BEGINNINGS
+    KEY_PREFIXES
         .iter()
-        .any(|begin| value.starts_with(begin) && value.len() > begin.len())
+        .any(|prefix| value.starts_with(prefix) && value.len() > prefix.len())
 }
 
-/// Whether a header of this name usually holds a secret.
+/// True if a header or field of this name usually contains a secret.
 pub(crate) fn is_secret_name(name: &str) -> bool {
     let name = name.to_lowercase();
     ["auth", "key", "token", "secret", "cookie"]
@@ -35,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_told_from_names_of_variables() {
+    fn keys_differ_from_variable_names() {
         for name in ["OPENAI_API_KEY", "HF_TOKEN", "none", "key", "my_key_2", "K"] {
             assert!(!looks_like_key(name), "{name}");
         }

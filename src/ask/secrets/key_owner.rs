@@ -1,15 +1,15 @@
-//! Whether a key may go to an address by its looks: [`check_owner`].
+//! Check that a key belongs to the vendor of an address: [`check_owner`].
 
 use super::secret::Secret;
 use crate::ask::endpoints::BaseUrl;
 use crate::ask::vendors::VendorTable;
 use crate::error::{Error, Result};
 
-/// Refuses a key that looks like one of a vendor at an address of another: a wrong variable, or an address that a stranger wrote, would
-/// give it away. An address of this machine may be a gateway that passes it on.
+/// Checks that a key does not look like the key of another vendor: a wrong variable, or an address from someone else, would disclose it.
+/// Any key may be sent to this machine, which may run a gateway.
 ///
 /// # Errors
-/// Names the vendor of the key and the address, and never the key.
+/// If the key belongs to another vendor. The error names the vendor and the address, but never the key.
 pub(in crate::ask) fn check_owner(
     key: &Secret,
     base: &BaseUrl,
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_key_goes_to_its_own_vendor() {
+    fn keys_are_sent_only_to_their_vendor() {
         let rows = tempfile::NamedTempFile::new().unwrap();
         let text = "[[vendor]]\nname = \"Campus\"\nhosts = [\"llm.example\"]\nkey = [\"K\"]\nkey-form = [\"camp-\", \"sk-proj-\"]\n";
         std::fs::write(rows.path(), text).unwrap();
@@ -61,7 +61,7 @@ mod tests {
             );
             assert!(!error.contains("sk-ant"), "{error}");
         }
-        // A table of the user states how more keys look, and which of its hosts may be given another vendor's.
+        // The user's table can add key forms. Its hosts may receive keys of these forms, even if they are another vendor's.
         let gateway = "https://llm.example/v1";
         assert_eq!(check(own, "camp-123", gateway), Ok(()));
         assert_eq!(check(own, "sk-proj-123", gateway), Ok(()));

@@ -1,4 +1,4 @@
-//! Keys and other secrets: how they are recognised, sent to their owner alone, and removed from text.
+//! Keys and other secrets: recognition, checks of where they are sent, and removal from text.
 
 mod body_secrets;
 mod key_form;

@@ -1,24 +1,24 @@
-//! The texts of a reply as a record keeps them, without keys and not too long: [`without_secrets`].
+//! Removal of keys from replies, and limits on the length of their texts: [`without_secrets`].
 
 use super::secret::Scrub;
 use crate::types::{Finish, Reply, TokenChances, TokenPosition};
 
-/// The longest text of a reply that a record keeps, in bytes; chosen: four times a reply of 4,096 tokens.
-const LONGEST: usize = 64 << 10;
+/// Maximum length of the text of a recorded reply, in bytes; chosen: four times a reply of 4,096 tokens.
+const MAX_TEXT: usize = 64 << 10;
 
-/// The most bytes of the note in the place of what is not kept.
-const NOTE: usize = 64;
+/// Maximum length of the note about omitted bytes, in bytes.
+const MAX_NOTE: usize = 64;
 
-/// The longest name of a model or provider, and the longest token, in bytes; chosen.
-const LONGEST_NAME: usize = 200;
+/// Maximum length of the name of a model or provider, and of a token, in bytes; chosen.
+const MAX_NAME: usize = 200;
 
-/// The reply without keys that a server or a model repeats in it, and with texts of bounded length.
+/// Removes keys that a server or a model repeats in a reply, and limits the length of its texts.
 pub(in crate::ask) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
-    // Shortened last: otherwise a part of a key could remain.
+    // Shorten last: otherwise a part of a key could remain.
     let text = |text: String| shortened(scrub.reply(text));
     let name = |mut name: String| {
         name = scrub.reply(name);
-        name.truncate(name.floor_char_boundary(LONGEST_NAME));
+        name.truncate(name.floor_char_boundary(MAX_NAME));
         name
     };
     Reply {
@@ -31,18 +31,18 @@ pub(in crate::ask) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
             finish => finish,
         }
         .shortened(),
-        chances: reply.chances.map(|chances| without_keys(chances, name)),
+        chances: reply.chances.map(|chances| map_tokens(chances, name)),
         ..reply
     }
 }
 
-/// A text of at most [`LONGEST`] bytes. Of a longer one its beginning and its end are kept, because a long answer states its choice
-/// at its end, with a note of the bytes between them.
+/// Cuts the middle of a text longer than [`MAX_TEXT`] and replaces it by a note. The end remains, because a long answer states its choice
+/// there.
 fn shortened(text: String) -> String {
-    if text.len() <= LONGEST {
+    if text.len() <= MAX_TEXT {
         return text;
     }
-    let half = (LONGEST - NOTE) / 2;
+    let half = (MAX_TEXT - MAX_NOTE) / 2;
     let start = text.floor_char_boundary(half);
     let end = text.ceil_char_boundary(text.len() - half);
     let omitted = end - start;
@@ -53,20 +53,21 @@ fn shortened(text: String) -> String {
     )
 }
 
-/// The likeliest tokens without keys.
-fn without_keys(chances: TokenChances, scrubbed: impl Fn(String) -> String) -> TokenChances {
-    let position = |position: TokenPosition| {
-        let likeliest = position
-            .likeliest
-            .into_iter()
-            .map(|(token, logprob)| (scrubbed(token), logprob));
-        TokenPosition {
-            likeliest: likeliest.collect(),
-            token: scrubbed(position.token),
-        }
-    };
+/// Applies a function to all tokens.
+fn map_tokens(chances: TokenChances, map: impl Fn(String) -> String) -> TokenChances {
     TokenChances {
-        positions: chances.positions.into_iter().map(position).collect(),
+        positions: chances
+            .positions
+            .into_iter()
+            .map(|position| TokenPosition {
+                likeliest: position
+                    .likeliest
+                    .into_iter()
+                    .map(|(token, logprob)| (map(token), logprob))
+                    .collect(),
+                token: map(position.token),
+            })
+            .collect(),
         ..chances
     }
 }
@@ -76,30 +77,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_text_keeps_both_its_ends() {
-        let kept = "é".repeat(LONGEST / 2);
+    fn long_texts_lose_their_middle() {
+        let kept = "é".repeat(MAX_TEXT / 2);
         assert_eq!(shortened(kept.clone()), kept);
-        let long = shortened(format!("start é{} the end", "é".repeat(LONGEST)));
-        assert!(long.len() <= LONGEST, "{}", long.len());
+        let long = shortened(format!("start é{} the end", "é".repeat(MAX_TEXT)));
+        assert!(long.len() <= MAX_TEXT, "{}", long.len());
         assert!(long.starts_with("start é") && long.ends_with("é the end"));
         assert!(long.contains("bytes omitted …]"));
         assert_eq!(shortened(long.clone()), long);
     }
 
     #[test]
-    fn names_and_tokens_are_short_and_have_no_key() {
+    fn names_are_short_and_without_keys() {
         let key = "sk-0123456789abcdef";
-        let long = "x".repeat(LONGEST_NAME - 4) + key;
+        let long = "x".repeat(MAX_NAME - 4) + key;
         let reply = Reply {
             served_model: Some(long.clone()),
             provider: Some(long),
-            ..Reply::local(format!("{}{key}", "x".repeat(LONGEST)))
+            ..Reply::local(format!("{}{key}", "x".repeat(MAX_TEXT)))
         };
         let reply = without_secrets(reply, &Scrub::new([key.to_owned()]));
         let names = [reply.served_model, reply.provider].map(Option::unwrap);
         for text in names.iter().chain([&reply.text]) {
             assert!(!text.contains("sk-"), "{text}");
         }
-        assert_eq!(names[0].len(), LONGEST_NAME);
+        assert_eq!(names[0].len(), MAX_NAME);
     }
 }

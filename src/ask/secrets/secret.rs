@@ -7,18 +7,18 @@ use super::secret_parts::{MASK, SecretParts};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// The most bytes of a file that holds a key. Chosen: the longest tokens have half of it.
-const MOST_BYTES: u64 = 4096;
+/// Maximum size of a key file, in bytes. Chosen: twice the longest tokens.
+const MAX_FILE: u64 = 4096;
 
 /// An API key that is never printed.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Secret(String);
 
 impl Secret {
-    /// A key without the spaces around it; `origin` is its variable or file, for the error.
+    /// Creates a key from a text, without surrounding white space; `origin` is its variable or file, for errors.
     ///
     /// # Errors
-    /// If it is empty or has characters other than visible ASCII, which an HTTP header cannot carry. The error does not show
+    /// If the key is empty or has characters other than visible ASCII, which an HTTP header cannot carry. The error does not show
     /// the key.
     pub fn new(text: &str, origin: &str) -> Result<Self> {
         let key = text.trim();
@@ -37,13 +37,13 @@ impl Secret {
         Ok(Self(key.to_owned()))
     }
 
-    /// The key in a file.
+    /// Reads a key from a file.
     ///
     /// # Errors
-    /// If the file cannot be read, or holds anything but one line of visible ASCII, as a file does that was named by mistake. The error
-    /// shows nothing of it.
+    /// If the file cannot be read, or is not a single line of visible ASCII, such as a file named by mistake. The error does not show its
+    /// content.
     pub(in crate::ask) fn read(path: &Path) -> Result<Self> {
-        let bytes = reading::at_most(path, MOST_BYTES)?;
+        let bytes = reading::at_most(path, MAX_FILE)?;
         let origin = format!("--api-key-file {}", path.display());
         let text = String::from_utf8_lossy(&bytes);
         if text.contains("-----BEGIN") {
@@ -66,32 +66,31 @@ impl fmt::Debug for Secret {
     }
 }
 
-/// The maximum number of characters of a server's text; chosen.
+/// Maximum length of a line of server text, in characters; chosen.
 const MAX_LINE: usize = 300;
 
-/// The number of bytes of a server's text that are read for its line; chosen.
+/// Number of bytes of a server text to inspect for such a line; chosen.
 const MAX_READ: usize = 64 << 10;
 
-/// The minimum length of a secret that is removed. Shorter ones are placeholders like `x` for servers that accept any key;
-/// their removal would destroy ordinary words.
+/// Minimum length of a secret to remove, in bytes. Shorter ones are placeholders such as `x` for servers that accept any key; their removal
+/// would damage ordinary words.
 const MIN_SECRET: usize = 4;
 
-/// The minimum length of a secret that is removed from a model's reply. Real keys are longer, and an answer may need a shorter
+/// Minimum length of a secret to remove from the reply of a model, in bytes. Real keys are longer, and an answer may contain a shorter
 /// word.
 const MIN_SECRET_IN_REPLY: usize = 16;
 
-/// A filter that makes the text of a server safe for a terminal, a log and a table: one short line without control characters
-/// and secrets.
+/// Filter that makes the text of a server safe for terminals, logs and tables: removes secrets and control characters, and shortens it.
 #[derive(Clone, Default)]
 pub(in crate::ask) struct Scrub {
-    /// The longest first: if one secret contains another, no part of the longer one must remain.
+    /// Secrets, longest first: if one secret contains another, no part of the longer one must remain.
     secrets: Vec<String>,
-    /// The parts of those that are removed from replies.
+    /// Parts of the secrets that are long enough for [`MIN_SECRET_IN_REPLY`].
     parts: SecretParts,
 }
 
 impl Scrub {
-    /// The filter for these secrets.
+    /// Creates a filter for these secrets.
     pub(in crate::ask) fn new(secrets: impl IntoIterator<Item = String>) -> Self {
         let mut secrets: Vec<String> = secrets
             .into_iter()
@@ -103,35 +102,36 @@ impl Scrub {
         Self { secrets, parts }
     }
 
-    /// Whether there are no secrets to remove.
+    /// True if there are no secrets to remove.
     pub(in crate::ask) fn is_empty(&self) -> bool {
         self.secrets.is_empty()
     }
 
-    /// A model's reply without keys that it repeats, whole, in parts or in base64; otherwise unchanged.
+    /// Removes keys, whole, in parts or in base64, from the reply of a model; the rest is unchanged.
     pub(super) fn reply(&self, text: String) -> String {
         self.parts.masked(self.without_whole_keys(text))
     }
 
-    /// A line of JSON without keys; its strings stay apart, and the id of a request in a batch loses whole keys alone.
+    /// Removes keys from a line of JSON. Each string is filtered alone. Ids of requests in a batch are not searched for parts of keys.
     pub(in crate::ask) fn json_line(&self, line: String) -> String {
         let line = self.without_whole_keys(line);
-        let pieces: Vec<&str> = line.split('"').collect();
-        pieces
+        let parts: Vec<&str> = line.split('"').collect();
+        parts
             .iter()
             .enumerate()
-            .map(|(at, piece)| {
-                let is_id = at >= 2 && pieces[at - 2] == "custom_id";
+            .map(|(index, part)| {
+                let is_id = index >= 2 && parts[index - 2] == "custom_id";
                 if is_id {
-                    (*piece).to_owned()
+                    (*part).to_owned()
                 } else {
-                    self.parts.masked((*piece).to_owned())
+                    self.parts.masked((*part).to_owned())
                 }
             })
             .collect::<Vec<_>>()
             .join("\"")
     }
 
+    /// Replaces whole keys, but not parts of them.
     fn without_whole_keys(&self, text: String) -> String {
         keys(&self.secrets).fold(text, |text, key| {
             if text.contains(key) {
@@ -142,11 +142,11 @@ impl Scrub {
         })
     }
 
-    /// The text on one line of at most 300 characters, without secrets.
+    /// Puts a text on one line of at most 300 characters, without secrets and hidden characters.
     pub(in crate::ask) fn line(&self, text: &str) -> String {
         let text = &text[..text.floor_char_boundary(MAX_READ)];
-        let shown: String = text.chars().filter(|c| !is_hidden(*c)).collect();
-        let words: Vec<&str> = shown.split_whitespace().collect();
+        let visible: String = text.chars().filter(|c| !is_hidden(*c)).collect();
+        let words: Vec<&str> = visible.split_whitespace().collect();
         let mut line = words.join(" ");
         // Shorten last: otherwise the first half of a secret could remain.
         for secret in &self.secrets {
@@ -160,7 +160,7 @@ impl Scrub {
     }
 }
 
-/// The secrets that are removed from replies.
+/// Secrets that are long enough to remove from replies.
 fn keys(secrets: &[String]) -> impl Iterator<Item = &str> {
     secrets
         .iter()
@@ -168,7 +168,7 @@ fn keys(secrets: &[String]) -> impl Iterator<Item = &str> {
         .filter(|secret| secret.len() >= MIN_SECRET_IN_REPLY)
 }
 
-/// Whether a character is a control other than white space, or a mark that reverses or hides text.
+/// True for control characters other than white space, and for characters that reverse or hide text.
 fn is_hidden(c: char) -> bool {
     (c.is_control() && !c.is_whitespace())
         || matches!(c, '\u{200B}'..='\u{200F}' | '\u{202A}'..='\u{202E}' | '\u{2060}'..='\u{2069}' | '\u{FEFF}')
@@ -185,7 +185,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn keys_are_checked_and_never_shown() {
+    fn invalid_keys_are_refused_and_not_shown() {
         let key = Secret::new(" sk-abc\n", "KEY").unwrap();
         assert_eq!(key.expose(), "sk-abc");
         assert!(!format!("{key:?}").contains("abc"));
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_holds_no_key_is_refused_unseen() {
+    fn files_without_a_key_are_refused() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let read = |text: &[u8]| {
             std::fs::write(file.path(), text).unwrap();
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn secrets_are_removed_before_the_text_is_shortened() {
+    fn secrets_are_removed_before_shortening() {
         let scrub = Scrub::new(["sk-abcdef".to_owned(), "sk-abcdef-long".to_owned()]);
         assert_eq!(
             scrub.line("key \u{1b}[31msk-abc\u{200b}def-long,\r\n\tsk-abcdef"),

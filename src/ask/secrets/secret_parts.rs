@@ -1,4 +1,4 @@
-//! Parts of keys, and keys in base64, in the text of a server: [`SecretParts`].
+//! Detection of parts of keys, and of keys in base64, in text: [`SecretParts`].
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -6,75 +6,72 @@ use std::ops::Range;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
 
-/// Letters and digits in a row by which a part of a key is recognized; chosen. A random text of 64 kB has such a part with a probability
-/// of 1e-6.
+/// Number of consecutive letters and digits that identify a part of a key; chosen. A random text of 64 kB contains such a part with a
+/// probability of 1e-6.
 const PART: usize = 8;
 
-/// Length from which a part without digits is recognized; chosen. Names of gateways have words in their keys, and so have replies.
-const WORDS: usize = 10;
+/// Minimum length of a part without digits; chosen. Keys of gateways contain words that also occur in replies.
+const MIN_WORD_PART: usize = 10;
 
-/// The text in the place of a key.
+/// Replacement of a key.
 pub(super) const MASK: &str = "[secret]";
 
-/// The letters and digits of keys, [`PART`] in a row, as they are and in base64; without regard to case.
+/// All sequences of [`PART`] consecutive letters and digits of keys, in plain text and in base64; in lower case.
 #[derive(Clone, Default)]
 pub(super) struct SecretParts(HashSet<[u8; PART]>);
 
 impl SecretParts {
-    /// The parts of these keys.
+    /// Collects the parts of these keys.
     pub(super) fn new<'s>(keys: impl Iterator<Item = &'s str>) -> Self {
-        let forms = keys.flat_map(|key| {
-            let plain = std::iter::once(key.to_owned());
-            plain.chain((0..3).map(|shift| in_base64(key, shift)))
-        });
         let mut parts = HashSet::new();
-        for form in forms {
-            let letters: Vec<u8> = letters(&form).map(|letter| letter.value).collect();
-            parts.extend(letters.windows(PART).filter_map(|part| {
-                let part: Result<[u8; PART], _> = part.try_into();
-                part.ok()
-            }));
+        for key in keys {
+            let in_base64 = (0..3).map(|offset| base64_letters(key, offset));
+            for form in in_base64.chain([key.to_owned()]) {
+                let letters: Vec<u8> = letters(&form).map(|letter| letter.value).collect();
+                let windows = letters.windows(PART);
+                parts.extend(windows.filter_map(|part| <[u8; PART]>::try_from(part).ok()));
+            }
         }
         Self(parts)
     }
 
-    /// The text with `[secret]` in the place of each part, whatever stands between its letters.
+    /// Replaces each part by `[secret]`, including any other characters between its letters.
     pub(super) fn masked(&self, text: String) -> String {
-        let places = self.places(&text);
-        if places.is_empty() {
+        let ranges = self.find(&text);
+        if ranges.is_empty() {
             return text;
         }
         let mut masked = String::with_capacity(text.len());
         let mut copied = 0;
-        for place in places {
-            masked += &text[copied..place.start];
+        for range in ranges {
+            masked += &text[copied..range.start];
             masked += MASK;
-            copied = place.end;
+            copied = range.end;
         }
         masked + &text[copied..]
     }
 
-    /// The parts in a text, in bytes.
-    fn places(&self, text: &str) -> Vec<Range<usize>> {
+    /// Byte ranges of the parts in a text.
+    fn find(&self, text: &str) -> Vec<Range<usize>> {
         if self.0.is_empty() {
             return Vec::new();
         }
         let letters: Vec<Letter> = letters(text).collect();
         let mut runs: Vec<Range<usize>> = Vec::new();
-        for (at, window) in letters.windows(PART).enumerate() {
+        for (index, window) in letters.windows(PART).enumerate() {
             let part: [u8; PART] = std::array::from_fn(|i| window[i].value);
             if !self.0.contains(&part) {
                 continue;
             }
             match runs.last_mut() {
-                Some(run) if run.end >= at => run.end = at + PART,
-                _ => runs.push(at..at + PART),
+                Some(run) if run.end >= index => run.end = index + PART,
+                _ => runs.push(index..index + PART),
             }
         }
         let is_part = |run: &&[Letter]| {
             let has_digit = run.iter().any(|letter| letter.value.is_ascii_digit());
             let has_letter = run.iter().any(|letter| letter.value.is_ascii_alphabetic());
-            (has_digit && has_letter) || run.len() >= WORDS
+            (has_digit && has_letter) || run.len() >= MIN_WORD_PART
         };
         runs.into_iter()
             .map(|run| &letters[run])
@@ -84,26 +81,27 @@ impl SecretParts {
     }
 }
 
-/// The letters of base64 that a key has behind `shift` unknown bytes, as far as the key alone decides them.
-fn in_base64(key: &str, shift: usize) -> String {
-    let bytes = [&[0; 2][..shift], key.as_bytes()].concat();
+/// Base64 encoding of a key after `offset` unknown bytes, without the letters that depend on other bytes.
+fn base64_letters(key: &str, offset: usize) -> String {
+    let bytes = [&[0; 2][..offset], key.as_bytes()].concat();
     let encoded = STANDARD_NO_PAD.encode(&bytes);
     let unknown = usize::from(!bytes.len().is_multiple_of(3));
-    let known = (shift * 8).div_ceil(6)..encoded.len() - unknown;
+    let known = (offset * 8).div_ceil(6)..encoded.len() - unknown;
     encoded[known].to_owned()
 }
 
-/// A letter or digit of a text.
+/// Letter or digit in a text.
 struct Letter {
-    /// In lower case.
+    /// ASCII code, in lower case.
     value: u8,
-    /// Where it stands, in bytes.
+    /// Byte offset of its start.
     start: usize,
+    /// Byte offset of its end.
     end: usize,
 }
 
-/// The ASCII letters and digits of a text. Those that JSON or an address escapes, as `\u0073` or `%73`, are read; other escapes of one
-/// letter, as `\n`, are none.
+/// ASCII letters and digits of a text, including escaped ones such as `\u0073` in JSON or `%73` in a URL. The letter of other escapes,
+/// such as `\n`, does not count.
 fn letters(text: &str) -> impl Iterator<Item = Letter> {
     let bytes = text.as_bytes();
     let mut start = 0;
@@ -125,7 +123,7 @@ fn letters(text: &str) -> impl Iterator<Item = Letter> {
     })
 }
 
-/// The first letter of these bytes, and how many bytes it takes.
+/// First character of these bytes, unescaped, and its length in bytes.
 fn letter(bytes: &[u8]) -> (u8, usize) {
     let escaped = |digits: Range<usize>| {
         let end = digits.end;
@@ -152,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_in_base64_is_masked_at_any_place() {
+    fn keys_in_base64_are_masked_at_any_offset() {
         for before in ["", "a", "ab", "Bearer ", "user:"] {
             for after in ["", "x", "xy"] {
                 let encoded = STANDARD_NO_PAD.encode(format!("{before}{KEY}{after}"));
@@ -161,7 +159,7 @@ mod tests {
                     panic!("{text}");
                 };
                 let left = head.len() + tail.len() - "It is , ok".len();
-                // What is left encodes the text around it, and at most two bytes of the key.
+                // The rest encodes the surrounding text and at most two bytes of the key.
                 let around = (before.len() + after.len()) * 4 / 3;
                 assert!(left <= around + 5, "{encoded}: {text}");
             }
@@ -169,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_key_in_parts_is_masked() {
+    fn keys_in_parts_are_masked() {
         for (text, expected) in [
             ("sk-proj-Ab12Cd34 and Ef56Gh78Ij90", "[secret] and [secret]"),
             ("s k - p r o j - A b 1 2 C d 3 4", "[secret]"),
@@ -182,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn other_words_stay() {
+    fn other_text_is_unchanged() {
         for text in [
             "sk-proj",
             "the project Ab12",

@@ -11,7 +11,7 @@ use crate::ask::requests::TokenField;
 use crate::ask::secrets::KeyHeader;
 use crate::error::Error;
 
-/// A vendor that hosts models, and what its endpoints accept. `None` means unknown, unless a field says otherwise.
+/// A vendor that hosts models, and the properties of its endpoints. `None` means unknown, unless a field states otherwise.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Vendor {
@@ -143,7 +143,7 @@ impl Vendor {
             .any(|suffix| matches_host_suffix(host, suffix))
     }
 
-    /// Checks what the types do not: that `hosts` is a non-empty list of host name suffixes.
+    /// Checks that `hosts` is a non-empty list of host name suffixes, which the types do not ensure.
     ///
     /// # Errors
     /// The message names the field.
@@ -254,11 +254,11 @@ mod tests {
         let count = hosts.len();
         hosts.sort();
         hosts.dedup();
-        assert_eq!(hosts.len(), count, "a host stands twice");
+        assert_eq!(hosts.len(), count, "a host is listed twice");
     }
 
     #[test]
-    fn a_key_tells_its_vendor() {
+    fn keys_identify_their_vendor() {
         let vendor_name = |key: &str| Vendor::by_key(key).map(|vendor| &*vendor.name);
         assert_eq!(vendor_name("sk-ant-api03-x"), Some("Anthropic"));
         assert_eq!(vendor_name("sk-proj-x"), Some("OpenAI"));
@@ -280,7 +280,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_needs_the_path_that_its_vendor_has() {
+    fn some_vendors_require_a_path() {
         let check = |text: &str| {
             let base: BaseUrl = text.parse().unwrap();
             Vendor::at_host(base.host()).map(|vendor| vendor.check_address(&base))
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_is_known_by_its_end() {
+    fn hosts_match_by_suffix() {
         assert_eq!(vendor_at("api.openai.com"), Some("OpenAI"));
         assert_eq!(vendor_at("eu.api.openai.com"), Some("OpenAI"));
         assert_eq!(vendor_at("r.openai.azure.com"), Some("Azure"));

@@ -4,31 +4,31 @@ use std::num::{NonZeroU64, NonZeroUsize};
 
 use serde::Deserialize;
 
-/// The Batch API of a vendor; a field that is `None` is that of OpenAI.
+/// Batch API of a vendor; `None` in a field means the value of OpenAI.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(in crate::ask) struct VendorBatch {
     #[serde(default)]
     pub(in crate::ask) form: BatchForm,
-    /// The purpose under which files are uploaded.
+    /// Purpose under which files are uploaded.
     pub(in crate::ask) purpose: Option<String>,
-    /// The largest file, in MB.
+    /// Maximum size of a file, in MB.
     pub(in crate::ask) file_size: Option<NonZeroU64>,
-    /// The most requests in a file.
+    /// Maximum number of requests in a file.
     pub(in crate::ask) requests: Option<NonZeroUsize>,
-    /// The path of chat completions in a line.
+    /// Path of chat completions in the lines of a file.
     pub(in crate::ask) url: Option<String>,
 }
 
-/// The form of a Batch API.
+/// Form of a Batch API.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(in crate::ask) enum BatchForm {
-    /// Files of requests and batches of files, as at OpenAI.
+    /// Batches of uploaded files, as at OpenAI.
     #[default]
     Files,
     /// Another form.
     Other,
-    /// There is no Batch API.
+    /// The vendor has no Batch API.
     None,
 }

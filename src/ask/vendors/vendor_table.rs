@@ -1,4 +1,4 @@
-//! Vendors that the user adds: [`VendorTable`], a file in the form of `vendors.toml`.
+//! Vendors from the user's file, in the form of `vendors.toml`: [`VendorTable`].
 
 use std::path::Path;
 
@@ -10,28 +10,28 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::text::TomlFault;
 
-/// The vendors of a file, above those of the built-in table. The default has none.
+/// Vendors of a file, with priority over the built-in table; empty by default.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::ask) struct VendorTable(&'static [Vendor]);
 
-/// The content of a file.
+/// Content of a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct Rows {
-    /// The date of the table, for its readers.
+    /// Date of the table.
     #[expect(dead_code, reason = "for readers of the table")]
     as_of: Option<String>,
     vendor: Vec<Vendor>,
 }
 
 impl VendorTable {
-    /// Reads a file. The vendors live as long as the program, as those of the built-in table do.
+    /// Reads a file. Its vendors live as long as the program, like those of the built-in table.
     ///
     /// # Errors
-    /// If it cannot be read, has no vendor or unknown fields, or names a key in place of a variable, which is not shown.
+    /// If the file cannot be read or parsed, has no vendor, or has a key in place of a variable name; the error does not show the key.
     pub(in crate::ask) fn read(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
-        let wrong = |problem: String| {
+        let invalid = |problem: String| {
             let expected =
                 "expected tables [[vendor]] with name, hosts and key, as in src/ask/vendors.toml";
             let problem = format!("{}: {problem}; {expected}", path.display());
@@ -39,29 +39,29 @@ impl VendorTable {
         };
         let Rows { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
             let TomlFault { line, problem } = TomlFault::new(&text, &e);
-            wrong(format!("line {line}: {problem}"))
+            invalid(format!("line {line}: {problem}"))
         })?;
         if rows.is_empty() {
-            return Err(wrong("there is no [[vendor]] in it".to_owned()));
+            return Err(invalid("there is no [[vendor]] in it".to_owned()));
         }
         for vendor in &rows {
             vendor
                 .check()
-                .map_err(|problem| wrong(format!("{}: {problem}", vendor.name)))?;
+                .map_err(|problem| invalid(format!("{}: {problem}", vendor.name)))?;
             if vendor.batch.is_some() {
                 let problem = "batch: what a Batch API takes is not read from a file; set it with --file-size, --file-requests, --url and \
                                --purpose";
-                return Err(wrong(format!("{}: {problem}", vendor.name)));
+                return Err(invalid(format!("{}: {problem}", vendor.name)));
             }
             if vendor.key.iter().any(|name| looks_like_key(name)) {
                 let problem = "the value of key looks like a key, which is not shown here: name the variable that holds it";
-                return Err(wrong(format!("{}: {problem}", vendor.name)));
+                return Err(invalid(format!("{}: {problem}", vendor.name)));
             }
         }
         Ok(Self(Box::leak(rows.into_boxed_slice())))
     }
 
-    /// The vendor of a host: of the file, else of the built-in table; `None` if neither has it.
+    /// Finds the vendor of a host in the file or else in the built-in table.
     pub(in crate::ask) fn at_host(self, host: &str) -> Option<&'static Vendor> {
         self.0
             .iter()
@@ -69,7 +69,7 @@ impl VendorTable {
             .or_else(|| Vendor::at_host(host))
     }
 
-    /// The vendor whose keys look like this one, in the same order as [`Self::at_host`].
+    /// Finds the vendor whose keys have the form of this one, in the file or else in the built-in table.
     pub(in crate::ask) fn by_key(self, key: &str) -> Option<&'static Vendor> {
         self.0
             .iter()
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_of_the_user_are_above_the_built_in_ones() {
+    fn user_rows_have_priority() {
         let table = read(
             "[[vendor]]\nname = \"Mine\"\nhosts = [\"llm.example\", \"api.openai.com\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\n",
         );
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_used_is_named() {
+    fn invalid_tables_are_errors() {
         let row = "[[vendor]]\nname = \"Mine\"\n";
         for (text, part) in [
             ("", "line 1: missing field `vendor`"),

@@ -1,27 +1,30 @@
-//! The fields of a chat completion's request that servers may refuse: [`fields`].
+//! Fields of chat completion requests that servers may refuse: [`fields`].
 
 use crate::ask::requests::{
     AdaptableField, Constrain, FieldState, RequestField, SentFields, Temperature, TokenField,
 };
 use crate::ask::wire_kind::Wire;
 
-/// The remedy for a server that states no probabilities.
-pub(super) const PROBABILITIES: &str = "leave --request probabilities out: the server states none";
+/// Remedy for a server without token probabilities.
+pub(super) const OMIT_PROBABILITIES: &str =
+    "leave --request probabilities out: the server states none";
 
-/// The number of likeliest tokens, as Text Generation Inference calls it in its refusals.
-const TOP_TOKENS: &str = "top_n_tokens";
+/// Name of `top_logprobs` in the refusals of Text Generation Inference.
+const TGI_TOP_LOGPROBS: &str = "top_n_tokens";
 
-/// The fields that a server may refuse.
+/// Fields that a server may refuse.
 pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
-    [&sampling(sent)[..], &form(sent)].concat()
+    [sampling_fields(sent), format_fields(sent)].concat()
 }
 
-/// The fields that decide how tokens are drawn.
-fn sampling(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
+/// Fields that control sampling.
+fn sampling_fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
     let parameters = sent.parameters;
-    let never = parameters.token_field == TokenField::Omit;
-    let now = sent.fields.token_field;
-    let limit = |field| FieldState::until_refused(now == field, never || now != TokenField::Omit);
+    let is_omitted = parameters.token_field == TokenField::Omit;
+    let current = sent.fields.token_field;
+    let limit_state = |field| {
+        FieldState::until_refused(current == field, is_omitted || current != TokenField::Omit)
+    };
     Vec::from([
         RequestField {
             name: "temperature",
@@ -34,50 +37,50 @@ fn sampling(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
         },
         RequestField {
             name: "top_p",
-            state: FieldState::set(parameters.top_p.is_some()),
+            state: FieldState::sent_if(parameters.top_p.is_some()),
             adaptable: None,
             hint: "leave --top-p out: the model takes no other than its own",
         },
         RequestField {
             name: "max_tokens",
-            state: limit(TokenField::MaxTokens),
+            state: limit_state(TokenField::MaxTokens),
             adaptable: Some(AdaptableField::TokenField),
             hint: "send the limit in another field: --request token-field=max_completion_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "max_completion_tokens",
-            state: limit(TokenField::MaxCompletionTokens),
+            state: limit_state(TokenField::MaxCompletionTokens),
             adaptable: Some(AdaptableField::TokenField),
             hint: "send the limit in another field: --request token-field=max_tokens (or none), or another --max-tokens",
         },
         RequestField {
             name: "reasoning_effort",
-            state: FieldState::set(sent.fields.effort(parameters).is_some()),
+            state: FieldState::sent_if(sent.fields.effort(parameters).is_some()),
             adaptable: None,
             hint: "leave --reasoning-effort (or --thinking) out, or give a value the model takes",
         },
     ])
 }
 
-/// The fields that decide the form of images and replies.
-fn form(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
+/// Fields that control the form of images and replies.
+fn format_fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
     let parameters = sent.parameters;
     Vec::from([
         RequestField {
             name: "detail",
-            state: FieldState::set(sent.has_image && parameters.detail.is_some()),
+            state: FieldState::sent_if(sent.has_image && parameters.detail.is_some()),
             adaptable: None,
             hint: "leave --image detail out, or give a value the server takes",
         },
         RequestField {
             name: "response_format",
-            state: FieldState::set(parameters.constrain == Constrain::Json),
+            state: FieldState::sent_if(parameters.constrain == Constrain::Json),
             adaptable: None,
             hint: "leave --request constrain out: the server does not take it",
         },
         RequestField {
             name: "structured_outputs",
-            state: FieldState::set(parameters.constrain == Constrain::Choice),
+            state: FieldState::sent_if(parameters.constrain == Constrain::Choice),
             adaptable: None,
             hint: "leave --request constrain out, or try --request constrain=json",
         },
@@ -88,19 +91,19 @@ fn form(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
                 !parameters.probabilities,
             ),
             adaptable: Some(AdaptableField::Logprobs),
-            hint: PROBABILITIES,
+            hint: OMIT_PROBABILITIES,
         },
         RequestField {
             name: "top_logprobs",
-            state: FieldState::set(sent.fields.top_logprobs.is_some()),
+            state: FieldState::sent_if(sent.fields.top_logprobs.is_some()),
             adaptable: Some(AdaptableField::TopLogprobs),
-            hint: PROBABILITIES,
+            hint: OMIT_PROBABILITIES,
         },
         RequestField {
-            name: TOP_TOKENS,
-            state: FieldState::set(sent.fields.top_logprobs.is_some()),
+            name: TGI_TOP_LOGPROBS,
+            state: FieldState::sent_if(sent.fields.top_logprobs.is_some()),
             adaptable: Some(AdaptableField::TopLogprobs),
-            hint: PROBABILITIES,
+            hint: OMIT_PROBABILITIES,
         },
         RequestField {
             name: "stream_options",

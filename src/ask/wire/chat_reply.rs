@@ -1,4 +1,4 @@
-//! Replies of OpenAI's chat completions, read leniently, because servers differ: [`read`].
+//! Lenient parsing of chat completions, because servers differ: [`read`].
 
 use serde_json::Value;
 
@@ -7,80 +7,78 @@ use super::json_body;
 use super::logprobs;
 use super::stream;
 use super::usage;
-use crate::ask::failures::{Complaint, Unreadable, UnreadableReply, Wording};
+use crate::ask::failures::{ApiError, ReplyError, Unreadable, Wording};
 use crate::types::{Finish, Reply, TokenChances, Usage};
 
-/// Reads a body; `latency_ms` and `attempts` stay zero.
+/// Parses a response body; `latency_ms` and `attempts` remain zero.
 ///
-/// Errors are searched first at the top level and then in the choice, because gateways send both with status 200. Unimportant
-/// fields may be missing, null or of another type; hidden reasoning is never read. Invalid UTF-8 and escapes of no character
-/// become replacement characters: a small model at temperature 0 would send them again at each retry. An event stream that was
-/// not requested is joined.
-pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
-    let completion = parsed(&json_body::text(body), content_type)?;
-    // A completion may have its own field "message", so only `error` counts there.
-    let complaint = match completion.get("choices") {
-        Some(_) => Complaint::in_error(&completion),
-        None => Complaint::from_json(&completion),
+/// Errors may be at the top level or in the choice, because gateways send both with status 200. Optional fields may be missing, null
+/// or of another type; hidden reasoning is ignored. Invalid UTF-8 and unpaired surrogates become replacement characters, because a small
+/// model at temperature 0 would send them again in each retry. An event stream is accepted even if it was not requested.
+pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
+    let completion = parse(&json_body::text(body), content_type)?;
+    // A completion may have a field "message", so only the field `error` counts there.
+    let api_error = match completion.get("choices") {
+        Some(_) => ApiError::in_error(&completion),
+        None => ApiError::from_json(&completion),
     };
-    if let Some(complaint) = complaint {
-        return Err(UnreadableReply::Complaint(Box::new(complaint)));
+    if let Some(api_error) = api_error {
+        return Err(ReplyError::Api(Box::new(api_error)));
     }
     let usage = usage::read(completion.get("usage"));
-    let charged = |what| Unreadable::new(what).charged(usage);
-    let choice = choice(&completion).map_err(charged)?;
+    let unreadable = |description| Unreadable::new(description).with_usage(usage);
+    let choice = first_choice(&completion).map_err(unreadable)?;
     if let Some(error) = choice.get("error").filter(|error| !error.is_null()) {
-        return Err(UnreadableReply::Complaint(Box::new(Complaint::from_error(
-            error,
-        ))));
+        return Err(ReplyError::Api(Box::new(ApiError::from_error(error))));
     }
-    let word = choice.get("finish_reason").and_then(Value::as_str);
-    let finish = finish_reason::read(word.unwrap_or_default(), usage)
-        .map_err(|broken| error_in_text(choice).unwrap_or_else(|| broken.into()))?;
+    let reason = choice.get("finish_reason").and_then(Value::as_str);
+    let finish = finish_reason::read(reason.unwrap_or_default(), usage)
+        .map_err(|incomplete| error_in_text(choice).unwrap_or_else(|| incomplete.into()))?;
     let message = choice
         .get("message")
         .filter(|message| message.is_object())
-        .ok_or_else(|| charged("a choice without a message"))?;
-    let (text, refusal_part) = content(message.get("content")).map_err(charged)?;
-    let positions = logprobs::positions(choice.get("logprobs"));
-    let chances = positions.map(|positions| TokenChances {
+        .ok_or_else(|| unreadable("a choice without a message"))?;
+    let (text, refusal_part) = content(message.get("content")).map_err(unreadable)?;
+    let chances = logprobs::positions(choice.get("logprobs")).map(|positions| TokenChances {
         positions,
         thought: logprobs::thought(message, completion.get("usage"), &text),
     });
-    let refusal = message.get("refusal").and_then(Value::as_str);
-    let refusal = refusal
-        .filter(|words| !words.is_empty())
+    let refusal = message
+        .get("refusal")
+        .and_then(Value::as_str)
+        .filter(|text| !text.is_empty())
         .map(str::to_owned)
         .or(refusal_part);
     let is_empty = text.is_empty() && refusal.is_none() && !logprobs::has_reasoning(message);
     if is_empty && is_lost(&finish, usage) {
-        return Err(charged(LOST).into());
+        return Err(unreadable(LOST).into());
     }
     Ok(Reply {
         refusal,
         finish,
         usage,
-        served_model: json_body::word(&completion, "model"),
-        provider: json_body::word(&completion, "provider"),
+        served_model: json_body::string_field(&completion, "model"),
+        provider: json_body::string_field(&completion, "provider"),
         attempts: 0,
         chances,
         ..Reply::local(text)
     })
 }
 
-fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
+/// Parses a completion from JSON or an event stream.
+fn parse(text: &str, content_type: &str) -> Result<Value, ReplyError> {
     if stream::is_stream(text, content_type) {
         return stream::assemble(text).map_err(|usage| {
-            let what = "an event stream without a complete chat completion";
+            let description = "an event stream without a complete chat completion";
             let usage = usage::read(usage.as_ref());
-            Unreadable::new(what).charged(usage).into()
+            Unreadable::new(description).with_usage(usage).into()
         });
     }
-    json_body::parsed(text, content_type)
+    json_body::parse_lenient(text, content_type)
 }
 
-/// The choice with index 0, or the first one if none has it.
-fn choice(completion: &Value) -> Result<&Value, &'static str> {
+/// The choice with index 0, or the first one if none has that index.
+fn first_choice(completion: &Value) -> Result<&Value, &'static str> {
     let choices = completion
         .get("choices")
         .and_then(Value::as_array)
@@ -92,15 +90,15 @@ fn choice(completion: &Value) -> Result<&Value, &'static str> {
         .ok_or("a completion with no choices in it")
 }
 
-/// The error that stands in the text of a reply that broke off, if its wording is known: LMDeploy sends errors in this way.
-fn error_in_text(choice: &Value) -> Option<UnreadableReply> {
+/// Error in the text of an incomplete reply, if its wording is known: LMDeploy sends errors in this way.
+fn error_in_text(choice: &Value) -> Option<ReplyError> {
     let text = choice.pointer("/message/content")?.as_str()?;
-    let complaint = Complaint::from_body(text);
-    Wording::find(&complaint, true)?;
-    Some(UnreadableReply::Complaint(Box::new(complaint)))
+    let api_error = ApiError::from_body(text);
+    Wording::find(&api_error, true)?;
+    Some(ReplyError::Api(Box::new(api_error)))
 }
 
-/// The text of a message, and the text of a refusal among its parts.
+/// Text of a message, and the text of the refusals among its parts.
 fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static str> {
     let parts = match content {
         None | Some(Value::Null) => return Ok((String::new(), None)),
@@ -114,7 +112,7 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static
         match part.get("type").and_then(Value::as_str) {
             Some("text" | "output_text") => text += words("text"),
             Some("refusal") => refusal += words("refusal"),
-            // A part without a type is a text, or has a field `text`.
+            // A part without a type is a string, or has a field `text`.
             None => text += part.as_str().unwrap_or_else(|| words("text")),
             Some(_) => {}
         }
@@ -122,10 +120,10 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static
     Ok((text, (!refusal.is_empty()).then_some(refusal)))
 }
 
-/// The words for a reply that was lost.
+/// Description of a lost reply.
 const LOST: &str = "an empty reply for which it counts no token, so that it was lost";
 
-/// Whether a reply without content was lost on its way: it is called complete, and no token of it is counted.
+/// True if a reply without content was lost in transit: the server calls it complete, but counts no tokens.
 fn is_lost(finish: &Finish, usage: Option<Usage>) -> bool {
     let tokens = usage.map(|usage| usage.completion_tokens);
     matches!(finish, Finish::Stop | Finish::Unknown) && matches!(tokens, Some(Some(0)))
@@ -135,7 +133,7 @@ fn is_lost(finish: &Finish, usage: Option<Usage>) -> bool {
 mod tests {
     use super::*;
 
-    fn json(body: &str) -> Result<Reply, UnreadableReply> {
+    fn json(body: &str) -> Result<Reply, ReplyError> {
         read(body.as_bytes(), "application/json")
     }
 
@@ -144,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn contents_of_every_shape_are_read() {
+    fn contents_of_every_shape_are_parsed() {
         for (content, text) in [
             (r#"{"content":"B"}"#, "B"),
             (r#"{"content":null}"#, ""),
@@ -173,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_choice_of_index_zero_is_taken() {
+    fn the_choice_with_index_zero_is_used() {
         let two = r#"{"choices":[{"index":1,"message":{"content":"A"}},{"index":0,"message":{"content":"B"}}]}"#;
         assert_eq!(json(two).unwrap().text, "B");
         let odd = r#"{"choices":[{"index":1,"message":{"content":"A"}},{"index":2,"message":{"content":"B"}}]}"#;
@@ -181,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn optional_fields_are_read_if_present() {
+    fn optional_fields_are_parsed() {
         let whole = "\n\n \r\n{\"model\":\"m-1\",\"choices\":[{\"finish_reason\":\"length\",\"message\":{\"content\":\"\"}}],\"usage\":{\"prompt_tokens\":9,\"completion_tokens\":\"many\"},\"timings\":{}}";
         let reply = json(whole).unwrap();
         assert_eq!(reply.finish, Finish::Length);
@@ -217,37 +215,37 @@ mod tests {
     }
 
     #[test]
-    fn errors_with_a_status_of_success_are_found() {
+    fn errors_with_a_success_status_are_found() {
         for body in [
             r#"{"error":{"message":"m","code":502},"choices":[{"message":{"content":"B"}}]}"#,
             r#"{"error":"m"}"#,
             r#"{"choices":[{"error":{"message":"m"},"message":{"content":"B"}}]}"#,
         ] {
-            let Err(UnreadableReply::Complaint(complaint)) = json(body) else {
+            let Err(ReplyError::Api(api_error)) = json(body) else {
                 panic!("{body}");
             };
-            assert_eq!(complaint.message, "m");
+            assert_eq!(api_error.message, "m");
         }
     }
 
     #[test]
-    fn an_error_in_the_text_of_a_reply_that_broke_off_is_found() {
+    fn errors_in_the_text_of_incomplete_replies_are_found() {
         let body = |text: &str| {
             format!(
                 r#"{{"choices":[{{"finish_reason":"error","message":{{"content":"{text}"}}}}]}}"#
             )
         };
         let text = "internal error happened, status code ResponseType.INPUT_LENGTH_ERROR";
-        let Err(UnreadableReply::Complaint(complaint)) = json(&body(text)) else {
-            panic!("no complaint");
+        let Err(ReplyError::Api(api_error)) = json(&body(text)) else {
+            panic!("no API error");
         };
-        assert_eq!(complaint.message, text);
+        assert_eq!(api_error.message, text);
         let other = json(&body("The answer is"));
-        assert!(matches!(other, Err(UnreadableReply::Other(_))));
+        assert!(matches!(other, Err(ReplyError::Unreadable(_))));
     }
 
     #[test]
-    fn a_body_that_is_not_a_completion_is_described() {
+    fn other_bodies_are_described() {
         let deep = "[".repeat(1000);
         for (body, content_type, expected) in [
             ("", "application/json", "empty"),
@@ -275,15 +273,15 @@ mod tests {
             ("<html><title>Welcome</title>", "text/html", "Welcome"),
             (&deep, "application/json", "not complete JSON"),
         ] {
-            let Err(UnreadableReply::Other(found)) = read(body.as_bytes(), content_type) else {
+            let Err(ReplyError::Unreadable(found)) = read(body.as_bytes(), content_type) else {
                 panic!("{body}");
             };
-            assert!(found.what.contains(expected), "{found:?}");
+            assert!(found.description.contains(expected), "{found:?}");
         }
     }
 
     #[test]
-    fn an_empty_reply_without_tokens_was_lost() {
+    fn empty_replies_without_tokens_are_lost() {
         let body = |content: &str, finish: &str, usage: &str| {
             format!(
                 r#"{{"choices":[{{"finish_reason":"{finish}","message":{{"content":{content},"refusal":null}}}}],"usage":{usage}}}"#
@@ -292,23 +290,23 @@ mod tests {
         let none = r#"{"prompt_tokens":0,"completion_tokens":0}"#;
         for usage in [none, r#"{"prompt_tokens":300,"completion_tokens":0}"#] {
             for content in ["null", "\"\"", "[]"] {
-                let Err(UnreadableReply::Other(lost)) = json(&body(content, "stop", usage)) else {
+                let Err(ReplyError::Unreadable(lost)) = json(&body(content, "stop", usage)) else {
                     panic!("{content} {usage}");
                 };
-                assert!(lost.what.contains("lost") && !lost.is_final);
+                assert!(lost.description.contains("lost") && !lost.is_final);
             }
         }
         let ended = r#"{"prompt_tokens":300,"completion_tokens":1}"#;
         assert!(
             json(&body("null", "stop", ended)).is_ok(),
-            "the model said nothing"
+            "the model returned no text"
         );
         assert!(json(&body("null", "length", none)).is_ok());
         assert!(json(&body("\"B\"", "stop", none)).is_ok());
     }
 
     #[test]
-    fn tokens_of_a_body_without_a_reply_are_known() {
+    fn bodies_without_a_reply_have_usage() {
         let usage = r#""usage":{"prompt_tokens":300,"completion_tokens":1024}"#;
         for body in [
             format!(r#"{{"choices":[],{usage}}}"#),
@@ -317,7 +315,7 @@ mod tests {
             ),
             format!("data: {{\"choices\":[],{usage}}}\n\ndata: [DONE]\n\n"),
         ] {
-            let Err(UnreadableReply::Other(found)) = json(&body) else {
+            let Err(ReplyError::Unreadable(found)) = json(&body) else {
                 panic!("{body}");
             };
             assert_eq!(
@@ -329,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_text_does_not_lose_the_reply() {
+    fn invalid_utf8_is_replaced() {
         let body = b"\xef\xbb\xbf{\"choices\":[{\"message\":{\"content\":\"B \xff\xfe\"}}]}";
         assert_eq!(read(body, "").unwrap().text, "B \u{FFFD}\u{FFFD}");
         assert_eq!(message(r#"{"content":"B \ud83d"}"#).text, "B \u{FFFD}");

@@ -1,17 +1,17 @@
-//! Requests of OpenAI's chat completions: the JSON [`body`].
+//! Requests for chat completions: [`body`].
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::image_places::with_images;
 use crate::ask::requests::{
-    Constrain, ImageDetail, Message, MessagePart, Parameters, Parts, RequestFields, TokenField,
-    constraint, images,
+    Constrain, ImageDetail, Message, MessagePart, Parameters, RequestBody, RequestFields,
+    TokenField, constraint, images,
 };
 use crate::ask::wire_kind::Wire;
 use crate::types::questions::letter;
 
-/// The body of a request without its messages, which stand at its end.
+/// Body of a request without its messages, which are appended.
 #[derive(Serialize)]
 struct ChatRequest<'a> {
     model: &'a str,
@@ -40,20 +40,20 @@ struct ChatRequest<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     stream_options: Option<Value>,
     #[serde(flatten)]
-    switch: Option<&'a Map<String, Value>>,
+    thinking: Option<&'a Map<String, Value>>,
 }
 
 #[derive(Serialize)]
-struct Turn<'a> {
+struct ChatMessage<'a> {
     role: &'static str,
     content: Content<'a>,
 }
 
-// Text without images is sent as a plain string: text-only servers may not support parts.
+/// Content of a message. Text without images is sent as a string, because text-only servers may not support parts.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Content<'a> {
-    Words(&'a str),
+    Text(&'a str),
     Parts(Vec<Part<'a>>),
 }
 
@@ -71,77 +71,78 @@ struct ImageUrl {
     url: &'static str,
 }
 
-/// The place of an image.
-const PLACE: &str = r#""url":"""#;
+/// Placeholder of an image URL in the JSON.
+const IMAGE_PLACE: &str = r#""url":"""#;
 
-/// The body of one request: text, images, and the text after them.
+/// Writes the body of one request.
 pub(super) fn body(
     parameters: &Parameters,
     fields: RequestFields,
     message: Message<'_>,
     choices: usize,
-) -> Result<Parts, serde_json::Error> {
-    let limit = |name| parameters.limit().filter(|_| fields.token_field == name);
+) -> Result<RequestBody, serde_json::Error> {
+    let limit_in = |field| parameters.limit().filter(|_| fields.token_field == field);
     let is_stream = fields.wire == Wire::ChatStream;
     let letters: Vec<char> = (0..choices).map(letter).collect();
-    let constrained =
-        |kind, value: fn(&[char]) -> Value| (parameters.constrain == kind).then(|| value(&letters));
+    let constrain = parameters.constrain;
     let head = serde_json::to_string(&ChatRequest {
         model: &parameters.model,
         temperature: fields.temperature,
         top_p: parameters.top_p,
         seed: parameters.seed,
-        max_tokens: limit(TokenField::MaxTokens),
-        max_completion_tokens: limit(TokenField::MaxCompletionTokens),
+        max_tokens: limit_in(TokenField::MaxTokens),
+        max_completion_tokens: limit_in(TokenField::MaxCompletionTokens),
         reasoning_effort: fields.effort(parameters),
-        response_format: constrained(Constrain::Json, format),
-        structured_outputs: constrained(Constrain::Choice, |letters| json!({"choice": letters})),
+        response_format: (constrain == Constrain::Json).then(|| response_format(&letters)),
+        structured_outputs: (constrain == Constrain::Choice).then(|| json!({"choice": letters})),
         logprobs: fields.top_logprobs.map(|_| true),
         top_logprobs: fields.top_logprobs,
         stream: is_stream.then_some(true),
         stream_options: (is_stream && fields.stream_usage).then(|| json!({"include_usage": true})),
-        switch: fields.switch(),
+        thinking: fields.thinking_body(),
     })?;
     let head = parameters.extra.apply(head)?;
-    let system = parameters.extra.system.as_deref().map(|words| Turn {
+    let system = parameters.extra.system.as_deref().map(|text| ChatMessage {
         role: "system",
-        content: Content::Words(words),
+        content: Content::Text(text),
     });
     let parts = message.parts();
-    let question = Turn {
+    let question = ChatMessage {
         role: "user",
         content: content(&parts, parameters.detail),
     };
-    let messages: Vec<Turn<'_>> = system.into_iter().chain([question]).collect();
+    let messages: Vec<ChatMessage<'_>> = system.into_iter().chain([question]).collect();
     let messages = serde_json::to_string(&messages)?;
     Ok(with_images(
         &head,
         "messages",
         &messages,
-        PLACE,
+        IMAGE_PLACE,
         images(&parts),
     ))
 }
 
-/// The content of a message, with a place for each image.
+/// Content of a message, with a placeholder for each image.
 fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Content<'a> {
     match parts {
-        [] => Content::Words(""),
-        [MessagePart::Words(words)] => Content::Words(words),
-        parts => {
-            let parts = parts.iter().map(|part| match part {
-                MessagePart::Words(text) => Part::Text { text },
-                MessagePart::Image(_) => Part::ImageUrl {
-                    image_url: ImageUrl { detail, url: "" },
-                },
-            });
-            Content::Parts(parts.collect())
-        }
+        [] => Content::Text(""),
+        [MessagePart::Text(text)] => Content::Text(text),
+        parts => Content::Parts(
+            parts
+                .iter()
+                .map(|part| match part {
+                    MessagePart::Text(text) => Part::Text { text },
+                    MessagePart::Image(_) => Part::ImageUrl {
+                        image_url: ImageUrl { detail, url: "" },
+                    },
+                })
+                .collect(),
+        ),
     }
 }
 
 /// OpenAI's `json_schema` format for an object with one of the letters.
-fn format(letters: &[char]) -> Value {
+fn response_format(letters: &[char]) -> Value {
     let schema = constraint::schema(letters);
     json!({"type": "json_schema", "json_schema": {"name": constraint::ANSWER, "strict": true, "schema": schema}})
 }

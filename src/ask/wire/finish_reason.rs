@@ -27,8 +27,8 @@ static REASONS: LazyLock<Reasons> =
 ///
 /// # Errors
 /// If the reason means that the reply is incomplete, or if the reason is unknown. The error includes `usage`, the tokens charged.
-pub(super) fn read(word: &str, usage: Option<Usage>) -> Result<Finish, Unreadable> {
-    let name = word.trim().to_ascii_lowercase().replace('-', "_");
+pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Finish, Unreadable> {
+    let name = reason.trim().to_ascii_lowercase().replace('-', "_");
     let reasons = &*REASONS;
     let is_in = |list: &[String]| list.contains(&name);
     if name.is_empty() {
@@ -36,7 +36,7 @@ pub(super) fn read(word: &str, usage: Option<Usage>) -> Result<Finish, Unreadabl
     } else if is_in(&reasons.stop) {
         Ok(Finish::Stop)
     } else if is_in(&reasons.other) {
-        Ok(Finish::Other(word.to_owned()))
+        Ok(Finish::Other(reason.to_owned()))
     } else if is_in(&reasons.length) {
         Ok(Finish::Length)
     } else if is_in(&reasons.filter) {
@@ -45,26 +45,26 @@ pub(super) fn read(word: &str, usage: Option<Usage>) -> Result<Finish, Unreadabl
         Err(Unreadable {
             usage,
             is_final: true,
-            finish: Some(word.to_owned()),
+            finish: Some(reason.to_owned()),
             ..Unreadable::new(format!(
-                "a reply that ended at the model's context length: its finish_reason is {word:?} (send smaller images: --image max-side=N, or a \
+                "a reply that ended at the model's context length: its finish_reason is {reason:?} (send smaller images: --image max-side=N, or a \
                  smaller --max-tokens)"
             ))
         })
     } else if is_in(&reasons.broken) {
         Err(Unreadable {
             usage,
-            finish: Some(word.to_owned()),
+            finish: Some(reason.to_owned()),
             ..Unreadable::new(format!(
-                "a reply that broke off: its finish_reason is {word:?}"
+                "a reply that broke off: its finish_reason is {reason:?}"
             ))
         })
     } else {
         Err(Unreadable {
             usage,
-            finish: Some(word.to_owned()),
+            finish: Some(reason.to_owned()),
             ..Unreadable::new(format!(
-                "a reply whose finish_reason {word:?} is not known, so that it may have broken off"
+                "a reply whose finish_reason {reason:?} is not known, so that it may have broken off"
             ))
         })
     }
@@ -103,7 +103,7 @@ mod tests {
         ] {
             let broken = read(word, None).unwrap_err();
             assert!(
-                !broken.is_final && broken.what.contains("broke off"),
+                !broken.is_final && broken.description.contains("broke off"),
                 "{word}"
             );
         }
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn unknown_reason_is_an_error() {
         let unknown = read("zeitgeist", None).unwrap_err();
-        assert!(unknown.what.contains("\"zeitgeist\" is not known"));
+        assert!(unknown.description.contains("\"zeitgeist\" is not known"));
     }
 
     #[test]

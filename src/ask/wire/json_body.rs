@@ -1,19 +1,14 @@
-//! The JSON in the body of a reply, read leniently: [`parsed`].
+//! Lenient parsing of the JSON in a response body: [`parse_lenient`].
 
 use std::borrow::Cow;
 
 use serde_json::Value;
 
-use crate::ask::failures::{Unreadable, UnreadableReply, page_title};
+use crate::ask::failures::{ReplyError, Unreadable, page_title};
 use crate::ask::replies::bounded_json::parse;
 use crate::ask::replies::escapes;
 
-/// The reason why a body is not a reply, in words.
-pub(super) fn other(what: &str) -> UnreadableReply {
-    Unreadable::new(what).into()
-}
-
-/// A body as text, without a byte order mark; invalid UTF-8 becomes replacement characters.
+/// Decodes a body as UTF-8 without a byte order mark; invalid bytes become replacement characters.
 pub(super) fn text(body: &[u8]) -> Cow<'_, str> {
     match String::from_utf8_lossy(body) {
         Cow::Borrowed(text) => text.trim_start_matches('\u{FEFF}').into(),
@@ -21,25 +16,26 @@ pub(super) fn text(body: &[u8]) -> Cow<'_, str> {
     }
 }
 
-/// The JSON of a text; escapes of no character become replacement characters.
-pub(super) fn parsed(text: &str, content_type: &str) -> Result<Value, UnreadableReply> {
+/// Parses JSON; unpaired surrogates become replacement characters.
+pub(super) fn parse_lenient(text: &str, content_type: &str) -> Result<Value, ReplyError> {
     parse(text).or_else(|error| {
-        let repaired = escapes::repaired(text).and_then(|text| parse(&text).ok());
-        repaired.ok_or_else(|| unreadable(text, content_type, &error))
+        escapes::repaired(text)
+            .and_then(|text| parse(&text).ok())
+            .ok_or_else(|| unreadable(text, content_type, &error).into())
     })
 }
 
-/// The text in a field of an object; `None` if it has none.
-pub(super) fn word(object: &Value, field: &str) -> Option<String> {
+/// String in a field of an object; `None` if the field is missing or of another type.
+pub(super) fn string_field(object: &Value, field: &str) -> Option<String> {
     object.get(field)?.as_str().map(str::to_owned)
 }
 
-/// The description of a body that is not JSON.
-fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> UnreadableReply {
+/// Describes a body that is not JSON.
+fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> Unreadable {
     if text.trim().is_empty() {
-        return other("an empty body");
+        return Unreadable::new("an empty body");
     }
-    let what = page_title(text)
+    let description = page_title(text)
         .unwrap_or_else(|| format!("{content_type:?} that is not complete JSON ({error}): {text}"));
-    Unreadable::new(what).into()
+    Unreadable::new(description)
 }

@@ -1,136 +1,157 @@
-//! The likeliest tokens of a reply, in the shapes in which servers state them: [`positions`], [`thought`].
+//! Parsing of token probabilities in all known shapes, [`positions`], and detection of reasoning, [`thought`].
 
 use serde_json::Value;
 
 use super::usage;
 use crate::types::{Thought, TokenPosition};
 
-/// The number of positions that are kept; chosen: an answer stands at the beginning, behind the few tokens of a JSON field at most.
-const KEPT: usize = 16;
+/// Maximum number of positions to read; chosen: the answer is at the beginning, at most after the few tokens of a JSON field.
+const MAX_POSITIONS: usize = 16;
 
-/// Logarithms below this are no numbers: vLLM writes -9999 for what it does not know.
-const UNKNOWN: f64 = -9990.0;
+/// Log probabilities up to this value are unknown: vLLM writes -9999.
+const UNKNOWN_LOGPROB: f64 = -9990.0;
 
-/// Logarithms that differ by less are of the same token; chosen: servers round them.
-const SAME_TOKEN: f64 = 1e-4;
+/// Maximum difference of the log probabilities of one token; chosen: servers round them.
+const ROUNDING: f64 = 1e-4;
 
-/// The positions in the `logprobs` of a choice or of a part of a response: a list or an object with the list `content`, as OpenAI
-/// defines them, or the older lists `tokens`, `token_logprobs` and `top_logprobs`. `None` if there is none.
+/// Parses the `logprobs` of a choice or of a part of a response: OpenAI's list or object with the list `content`, or the legacy lists
+/// `tokens`, `token_logprobs` and `top_logprobs`. `None` without any position.
 pub(super) fn positions(logprobs: Option<&Value>) -> Option<Vec<TokenPosition>> {
     let logprobs = logprobs?;
-    let list = logprobs.as_array();
-    let list = list.or_else(|| logprobs.get("content")?.as_array());
+    let list = logprobs
+        .as_array()
+        .or_else(|| logprobs.get("content")?.as_array());
     let positions: Vec<TokenPosition> = match list {
-        Some(list) => list.iter().take(KEPT).filter_map(position).collect(),
-        None => older(logprobs)?,
+        Some(list) => list
+            .iter()
+            .take(MAX_POSITIONS)
+            .filter_map(position)
+            .collect(),
+        None => legacy_positions(logprobs)?,
     };
     (!positions.is_empty()).then_some(positions)
 }
 
-/// One entry of OpenAI's form: `{"token", "logprob", "bytes", "top_logprobs": [{"token", "logprob", "bytes"}]}`.
+/// Parses one entry in OpenAI's form: `{"token", "logprob", "bytes", "top_logprobs": [{"token", "logprob", "bytes"}]}`.
 fn position(entry: &Value) -> Option<TokenPosition> {
-    let (token, own) = chance(entry)?;
-    let listed = entry.get("top_logprobs").and_then(Value::as_array);
-    let listed = listed
+    let (token, logprob) = token_logprob(entry)?;
+    let top_tokens = entry
+        .get("top_logprobs")
+        .and_then(Value::as_array)
         .into_iter()
         .flatten()
-        .filter_map(chance)
+        .filter_map(token_logprob)
         .filter_map(|(token, logprob)| Some((token, logprob?)));
     Some(TokenPosition {
-        likeliest: with_chosen(listed, &token, own),
+        likeliest: with_chosen(top_tokens, &token, logprob),
         token,
     })
 }
 
-/// A token, by its bytes if they are given and are text, with the logarithm of its probability if it is known.
-fn chance(entry: &Value) -> Option<(String, Option<f64>)> {
-    let bytes = entry.get("bytes").and_then(Value::as_array);
-    let bytes = bytes.and_then(|bytes| {
-        let bytes = bytes.iter().map(|byte| u8::try_from(byte.as_u64()?).ok());
-        String::from_utf8(bytes.collect::<Option<_>>()?).ok()
-    });
-    let token = bytes.filter(|text| !text.is_empty());
-    let token = token.or_else(|| Some(entry.get("token")?.as_str()?.to_owned()))?;
-    Some((token, logarithm(entry.get("logprob"))))
+/// Parses a token and its log probability, `None` if unknown. The token comes from its `bytes` if they are valid UTF-8.
+fn token_logprob(entry: &Value) -> Option<(String, Option<f64>)> {
+    let token = entry
+        .get("bytes")
+        .and_then(text_from_bytes)
+        .filter(|text| !text.is_empty())
+        .or_else(|| Some(entry.get("token")?.as_str()?.to_owned()))?;
+    Some((token, known_logprob(entry.get("logprob"))))
 }
 
-/// The logarithm of a probability; `None` if it is none. One above 0 comes from rounding.
-fn logarithm(value: Option<&Value>) -> Option<f64> {
+/// Decodes a list of bytes as UTF-8.
+fn text_from_bytes(bytes: &Value) -> Option<String> {
+    let bytes = bytes
+        .as_array()?
+        .iter()
+        .map(|byte| u8::try_from(byte.as_u64()?).ok())
+        .collect::<Option<_>>()?;
+    String::from_utf8(bytes).ok()
+}
+
+/// A log probability; `None` if it is unknown. A value above 0 is a rounding error.
+fn known_logprob(value: Option<&Value>) -> Option<f64> {
     let logprob = value?.as_f64()?;
-    (logprob > UNKNOWN).then_some(logprob.min(0.0))
+    (logprob > UNKNOWN_LOGPROB).then_some(logprob.min(0.0))
 }
 
-/// Each token once, with the one that was chosen, which some servers leave out of their list.
+/// Top tokens without duplicates, including the chosen token, which some servers omit from their list.
 ///
-/// A tokenizer may have several tokens of one text, as a letter and its byte, each with a probability of its own. Entries of one
-/// text are therefore the same token only if their probabilities are equal, too.
+/// A tokenizer may have several tokens with the same text, such as a letter and its byte, with different probabilities. Entries with the
+/// same text are therefore duplicates only if their probabilities are equal too.
 fn with_chosen(
-    listed: impl Iterator<Item = (String, f64)>,
-    token: &str,
-    own: Option<f64>,
+    top_tokens: impl Iterator<Item = (String, f64)>,
+    chosen: &str,
+    chosen_logprob: Option<f64>,
 ) -> Vec<(String, f64)> {
-    let mut likeliest: Vec<(String, f64)> = Vec::new();
-    let own = own.map(|logprob| (token.to_owned(), logprob));
-    for (token, logprob) in listed.chain(own) {
-        let is_same = |(known, other): &(String, f64)| {
-            *known == token && (other - logprob).abs() < SAME_TOKEN
-        };
-        if !likeliest.iter().any(is_same) {
-            likeliest.push((token, logprob));
+    let mut tokens: Vec<(String, f64)> = Vec::new();
+    let chosen = chosen_logprob.map(|logprob| (chosen.to_owned(), logprob));
+    for (token, logprob) in top_tokens.chain(chosen) {
+        let is_duplicate = tokens
+            .iter()
+            .any(|(other, known)| *other == token && (known - logprob).abs() < ROUNDING);
+        if !is_duplicate {
+            tokens.push((token, logprob));
         }
     }
-    likeliest
+    tokens
 }
 
-/// The lists of the older completions: `{"tokens": […], "token_logprobs": […], "top_logprobs": [{token: logprob}]}`.
-fn older(logprobs: &Value) -> Option<Vec<TokenPosition>> {
+/// Parses the lists of legacy completions: `{"tokens": […], "token_logprobs": […], "top_logprobs": [{token: logprob}]}`.
+fn legacy_positions(logprobs: &Value) -> Option<Vec<TokenPosition>> {
     let list = |field| logprobs.get(field).and_then(Value::as_array);
     let tokens = list("tokens")?;
     tokens
         .iter()
-        .take(KEPT)
+        .take(MAX_POSITIONS)
         .enumerate()
-        .map(|(at, token)| {
+        .map(|(index, token)| {
             let token = token.as_str()?.to_owned();
-            let own = logarithm(list("token_logprobs").and_then(|list| list.get(at)));
-            let listed = list("top_logprobs").and_then(|list| list.get(at)?.as_object());
-            let listed = listed
+            let logprob = known_logprob(list("token_logprobs").and_then(|list| list.get(index)));
+            let top_tokens = list("top_logprobs")
+                .and_then(|list| list.get(index)?.as_object())
                 .into_iter()
                 .flatten()
-                .filter_map(|(token, logprob)| Some((token.clone(), logarithm(Some(logprob))?)));
+                .filter_map(|(token, logprob)| {
+                    Some((token.clone(), known_logprob(Some(logprob))?))
+                });
             Some(TokenPosition {
-                likeliest: with_chosen(listed, &token, own),
+                likeliest: with_chosen(top_tokens, &token, logprob),
                 token,
             })
         })
         .collect()
 }
 
-/// Whether a message has reasoning: tokens of it in the usage, a text of it beside the content, parts of it, or marks in the text.
+/// Detects reasoning in a message: reasoning tokens in the usage, reasoning fields or parts, or marks in the text.
 pub(super) fn thought(message: &Value, usage: Option<&Value>, text: &str) -> Thought {
-    let tokens = usage.and_then(usage::reasoning) > Some(0);
-    let parts = message.get("content").and_then(Value::as_array);
-    let in_parts = parts.into_iter().flatten().any(|part| {
-        let kind = part.get("type").and_then(Value::as_str);
-        matches!(kind, Some("thinking" | "reasoning"))
-    });
-    let marked = ["<think", "</think>", "<|channel", "<channel|>"];
-    let in_text = marked.iter().any(|mark| text.contains(mark));
-    if tokens || in_parts || in_text || has_reasoning(message) {
+    let in_usage = usage.and_then(usage::reasoning) > Some(0);
+    let in_parts = message
+        .get("content")
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+        .any(|part| {
+            let kind = part.get("type").and_then(Value::as_str);
+            matches!(kind, Some("thinking" | "reasoning"))
+        });
+    let in_text = ["<think", "</think>", "<|channel", "<channel|>"]
+        .iter()
+        .any(|mark| text.contains(mark));
+    if in_usage || in_parts || in_text || has_reasoning(message) {
         Thought::Before
     } else {
         Thought::None
     }
 }
 
-/// Whether a message has reasoning beside its content.
+/// True if a message has a non-empty reasoning field.
 pub(super) fn has_reasoning(message: &Value) -> bool {
     ["reasoning_content", "reasoning"]
         .iter()
         .any(|field| message.get(*field).is_some_and(is_filled))
 }
 
-/// Whether a field of reasoning says anything.
+/// True for a non-blank string or a non-empty list.
 fn is_filled(value: &Value) -> bool {
     match value {
         Value::String(text) => !text.trim().is_empty(),
@@ -171,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn what_says_nothing_is_none() {
+    fn empty_shapes_have_no_positions() {
         for shape in [
             json!(null),
             json!({}),
@@ -184,20 +205,20 @@ mod tests {
             assert_eq!(positions(Some(&shape)), None, "{shape}");
         }
         assert_eq!(positions(None), None);
-        // Two tokens of one text, as a letter and its byte, are not one.
+        // Two tokens with the same text, a letter and its byte, are different.
         let twins = json!([{"token": "A", "logprob": -1.0, "top_logprobs": [
             {"id": 68, "token": "A", "bytes": [65], "logprob": -1.0},
             {"id": 292, "token": "A", "bytes": [65], "logprob": -2.5},
         ]}]);
         let twins = &positions(Some(&twins)).unwrap()[0].likeliest;
         assert_eq!(twins.len(), 2);
-        // A list alone: the chosen token has no number.
+        // The chosen token has no log probability.
         let alone = json!([{"token": "B"}]);
         assert!(positions(Some(&alone)).unwrap()[0].likeliest.is_empty());
     }
 
     #[test]
-    fn reasoning_is_seen_wherever_it_stands() {
+    fn reasoning_is_detected_everywhere() {
         let none = json!({"content": "B", "reasoning_content": "", "reasoning": null});
         let zero = json!({"completion_tokens_details": {"reasoning_tokens": 0}});
         assert_eq!(thought(&none, Some(&zero), "B"), Thought::None);

@@ -1,7 +1,6 @@
-//! The bytes of requests and replies of each [`Wire`].
+//! Request bodies and reply parsing for each API ([`Wire`]).
 //!
-//! Waits, retries, rates and the removal of keys from messages ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not
-//! depend on it.
+//! Retries, rate limits and the removal of keys ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not depend on the API.
 
 mod chat_fields;
 mod chat_reply;
@@ -18,18 +17,18 @@ mod usage;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderName, HeaderValue};
 
-use super::failures::{Complaint, UnreadableReply};
+use super::failures::{ApiError, ReplyError};
 use super::replies::bounded_json::parse;
-use super::requests::{Message, Parameters, Parts, RequestField, RequestFields, SentFields};
+use super::requests::{Message, Parameters, RequestBody, RequestField, RequestFields, SentFields};
 use super::secrets::{KeyHeader, Secret};
 use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::{Reply, Usage};
 
-pub(super) use refusal::other_wire;
+pub(super) use refusal::requested_wire;
 
 impl Wire {
-    /// The headers of every request: the key, in the header that `form` names.
+    /// Headers of every request: the key in the header `form`.
     pub(super) fn headers(self, key: Option<&Secret>, form: KeyHeader) -> Result<HeaderMap> {
         match self {
             Self::Chat | Self::ChatStream | Self::Responses => {
@@ -38,14 +37,14 @@ impl Wire {
         }
     }
 
-    /// The body of one request with this number of choices; 0 if the question is open.
+    /// Writes the body of a request with this number of choices; 0 for an open question.
     pub(super) fn body(
         self,
         parameters: &Parameters,
         fields: RequestFields,
         message: Message<'_>,
         choices: usize,
-    ) -> Result<Parts, serde_json::Error> {
+    ) -> Result<RequestBody, serde_json::Error> {
         let fields = RequestFields {
             wire: self,
             ..fields
@@ -58,40 +57,40 @@ impl Wire {
         }
     }
 
-    /// The fields of a request that a server may refuse.
+    /// Fields of a request that a server may refuse.
     pub(super) fn fields(self, sent: SentFields<'_>) -> Vec<RequestField<'_>> {
         let extra = &sent.parameters.extra;
         let mut fields: Vec<RequestField<'_>> = match self {
             Self::Chat | Self::ChatStream => chat_fields::fields(sent),
             Self::Responses => responses_request::fields(sent),
         };
-        fields.extend(sent.fields.switched());
-        // A field that is left out is not the cause.
+        fields.extend(sent.fields.thinking_fields());
+        // An omitted field cannot be the cause of a refusal.
         fields.retain(|field| !extra.omit.iter().any(|name| name == field.name));
-        fields.extend(sent.own());
+        fields.extend(sent.user_fields());
         fields
     }
 
-    /// Reads the body of a reply with a status of success; `latency_ms` and `attempts` stay zero.
-    pub(super) fn reply(self, body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
+    /// Parses the body of a response with a success status; `latency_ms` and `attempts` remain zero.
+    pub(super) fn reply(self, body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
         match self {
             Self::Chat | Self::ChatStream => chat_reply::read(body, content_type),
             Self::Responses => responses_reply::read(body, content_type),
         }
     }
 
-    /// Reads the body of a refused request.
-    pub(super) fn complaint(self, body: &[u8]) -> Complaint {
+    /// Parses the error in the body of a refused request.
+    pub(super) fn parse_error(self, body: &[u8]) -> ApiError {
         match self {
             Self::Chat | Self::ChatStream | Self::Responses => {
-                Complaint::from_body(&String::from_utf8_lossy(body))
+                ApiError::from_body(&String::from_utf8_lossy(body))
             }
         }
     }
 }
 
-/// Reads the body of a reply in a batch's file, whichever wire asked for it: a response has an `output`, a chat completion has none.
-pub(super) fn batch_reply(body: &str) -> Result<Reply, UnreadableReply> {
+/// Parses the body of a reply in a batch file. Only replies of the Responses API have an `output`.
+pub(super) fn batch_reply(body: &str) -> Result<Reply, ReplyError> {
     let parsed = parse(body).ok();
     let is_response = parsed.is_some_and(|body| body.get("output").is_some());
     let wire = if is_response {
@@ -102,13 +101,13 @@ pub(super) fn batch_reply(body: &str) -> Result<Reply, UnreadableReply> {
     wire.reply(body.as_bytes(), "application/json")
 }
 
-/// The tokens that a body states, of a reply or of a failure; `None` if it states none.
+/// Token usage in the body of a reply or an error; `None` without one.
 pub(super) fn body_usage(body: &str) -> Option<Usage> {
     let body = parse(body).ok()?;
     usage::read(body.get("usage"))
 }
 
-/// The header with the key, as OpenAI and Azure expect it.
+/// Header with the key, in the form of OpenAI or Azure.
 fn key_header(key: &Secret, form: KeyHeader) -> Result<HeaderMap> {
     let (name, text) = match form {
         KeyHeader::ApiKey => (HeaderName::from_static("api-key"), key.expose().to_owned()),

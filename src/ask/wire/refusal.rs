@@ -1,38 +1,38 @@
-//! Refusals of a wire: [`other_wire`], the one that the server asks for instead.
+//! Refusals of an API: [`requested_wire`] finds the API that the server asks for instead.
 
-use crate::ask::failures::Complaint;
+use crate::ask::failures::ApiError;
 use crate::ask::wire_kind::Wire;
 
-/// The words by which servers state that they answer by event streams alone (Alibaba's model studio, ModelScope).
+/// Phrases for servers that reply only with event streams (Alibaba Model Studio, ModelScope).
 const STREAM_ONLY: [&str; 8] = [
     "only support stream",
     "only supports stream",
     "enable the stream parameter",
     "does not support http call",
     "for non-streaming call",
-    // "not streaming", in Chinese: the same servers answer in either language.
+    // "not streaming" in Chinese: the same servers use both languages.
     "非流式",
     "stream=false",
     "stream must be set to true",
 ];
 
-/// The words by which OpenAI states that it takes a model through the Responses API alone.
+/// Phrases of OpenAI for models that are available only through the Responses API.
 const RESPONSES_ONLY: [&str; 3] = [
     "only supported in v1/responses",
     "only supported in /v1/responses",
     "use /v1/responses",
 ];
 
-/// The wire that a server asks for in its refusal of a request; `None` if it does not speak of another one.
-pub(in crate::ask) fn other_wire(complaint: &Complaint, sent: Wire) -> Option<Wire> {
-    let wanted = if complaint.mentions_any(&RESPONSES_ONLY) {
+/// API that a server asks for when it refuses a request; `None` if it asks for no other API.
+pub(in crate::ask) fn requested_wire(api_error: &ApiError, sent: Wire) -> Option<Wire> {
+    let wanted = if api_error.mentions_any(&RESPONSES_ONLY) {
         Wire::Responses
-    } else if complaint.mentions_any(&STREAM_ONLY) {
+    } else if api_error.mentions_any(&STREAM_ONLY) {
         Wire::ChatStream
     } else {
         return None;
     };
-    // A stream is asked of chat completions alone.
+    // Streams are used only for chat completions.
     let is_other = match wanted {
         Wire::ChatStream => sent == Wire::Chat,
         wanted => sent != wanted,
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn servers_that_want_another_wire_are_understood() {
+    fn requests_for_another_api_are_recognized() {
         use Wire::{Chat, ChatStream, Responses};
         for (words, expected) in [
             (
@@ -76,11 +76,11 @@ mod tests {
             ("a streaming error occurred", None),
             ("", None),
         ] {
-            let complaint = Complaint::from_body(words);
-            assert_eq!(other_wire(&complaint, Chat), expected, "{words}");
-            // What was sent already is not the remedy.
+            let api_error = ApiError::from_body(words);
+            assert_eq!(requested_wire(&api_error, Chat), expected, "{words}");
+            // The API that was already used is not the remedy.
             if let Some(wire) = expected {
-                assert_eq!(other_wire(&complaint, wire), None, "{words}");
+                assert_eq!(requested_wire(&api_error, wire), None, "{words}");
             }
         }
     }

@@ -1,78 +1,77 @@
-//! Replies of OpenAI's Responses API, read leniently: [`read`].
+//! Lenient parsing of replies of OpenAI's Responses API: [`read`].
 
 use serde_json::Value;
 
 use super::finish_reason;
-use super::json_body::{self, other};
+use super::json_body;
 use super::logprobs;
 use super::stream;
 use super::usage;
-use crate::ask::failures::{Complaint, Unreadable, UnreadableReply};
+use crate::ask::failures::{ApiError, ReplyError, Unreadable};
 use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 
-/// Reads a body; `latency_ms` and `attempts` stay zero.
+/// Parses a response body; `latency_ms` and `attempts` remain zero.
 ///
-/// The text is that of all parts of type `output_text` in items of type `message`; items of reasoning are never read. A response
-/// that failed states an error; one that is incomplete gives the reason, which becomes the reason why the model stopped.
-pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, UnreadableReply> {
+/// The text is the text of all parts of type `output_text` in items of type `message`; reasoning items are ignored. A failed response has
+/// an error; an incomplete response has a reason, which becomes the finish reason.
+pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
     let text = json_body::text(body);
     let response = if stream::is_stream(&text, content_type) {
-        ended(&text).ok_or_else(|| other("an event stream without a complete response"))?
+        last_response(&text)
+            .ok_or_else(|| Unreadable::new("an event stream without a complete response"))?
     } else {
-        json_body::parsed(&text, content_type)?
+        json_body::parse_lenient(&text, content_type)?
     };
-    let complaint = match response.get("output") {
-        Some(_) => Complaint::in_error(&response),
-        None => Complaint::from_json(&response),
+    let api_error = match response.get("output") {
+        Some(_) => ApiError::in_error(&response),
+        None => ApiError::from_json(&response),
     };
-    if let Some(complaint) = complaint {
-        return Err(UnreadableReply::Complaint(Box::new(complaint)));
+    if let Some(api_error) = api_error {
+        return Err(ReplyError::Api(Box::new(api_error)));
     }
     let usage = usage::read(response.get("usage"));
     let finish = finish(&response, usage)?;
     let items = response
         .get("output")
         .and_then(Value::as_array)
-        .ok_or_else(|| Unreadable::new("JSON without output").charged(usage))?;
-    // Tokens without any item: the answer was dropped on its way.
+        .ok_or_else(|| Unreadable::new("JSON without output").with_usage(usage))?;
+    // Tokens without any item: the answer was lost in transit.
     let has_tokens = usage.is_some_and(|usage| usage.completion_tokens > Some(0));
     if items.is_empty() && finish == Finish::Stop && has_tokens {
         return Err(Unreadable::new("a response without an output")
-            .charged(usage)
+            .with_usage(usage)
             .into());
     }
-    let (text, refusal) = words(items);
+    let (text, refusal) = text_and_refusal(items);
     let chances = chances(items, &response, &text);
     Ok(Reply {
-        refusal: Some(refusal).filter(|words| !words.is_empty()),
+        refusal: Some(refusal).filter(|text| !text.is_empty()),
         finish,
         usage,
-        served_model: json_body::word(&response, "model"),
-        provider: json_body::word(&response, "provider"),
+        served_model: json_body::string_field(&response, "model"),
+        provider: json_body::string_field(&response, "provider"),
         attempts: 0,
         chances,
         ..Reply::local(text)
     })
 }
 
-/// The response in the last event of a stream that nobody asked for; `None` if the stream was cut before.
-fn ended(stream: &str) -> Option<Value> {
-    let mut events = stream::events(stream);
-    events.find_map(|event| {
-        let kind = event.get("type")?.as_str()?;
-        let ends = [
-            "response.completed",
-            "response.incomplete",
-            "response.failed",
-        ];
-        let response = ends.contains(&kind).then(|| event.get("response"));
-        let error = (kind == "error").then_some(&event);
-        response.flatten().or(error).cloned()
+/// Response in the last event of an unrequested stream; `None` if the stream was truncated.
+fn last_response(stream: &str) -> Option<Value> {
+    stream::events(stream).find_map(|event| match event.get("type")?.as_str()? {
+        "response.completed" | "response.incomplete" | "response.failed" => {
+            event.get("response").cloned()
+        }
+        "error" => Some(event),
+        _ => None,
     })
 }
 
-/// The reason why the model stopped. A response that is not at its end is no reply.
-fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, UnreadableReply> {
+/// Finish reason of a response.
+///
+/// # Errors
+/// If the response has not ended.
+fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, ReplyError> {
     let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
     let status = text(response.get("status")).unwrap_or_default();
     match &*status {
@@ -88,13 +87,13 @@ fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, UnreadableRe
         }
         status => Err(
             Unreadable::new(format!("a response whose status is {status:?}"))
-                .charged(usage)
+                .with_usage(usage)
                 .into(),
         ),
     }
 }
 
-/// The likeliest tokens of the first text; `None` if it states none. Items of reasoning stand before it if the model thought.
+/// Token probabilities of the first text that has them, and whether the model thought before it; `None` without any.
 fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances> {
     let positions = items
         .iter()
@@ -103,27 +102,29 @@ fn chances(items: &[Value], response: &Value, text: &str) -> Option<TokenChances
         .map(|part| part.get("logprobs"))
         .find_map(logprobs::positions)?;
     let thought = logprobs::thought(response, response.get("usage"), text);
-    let summarized = items
+    let has_summary = items
         .iter()
         .filter_map(|item| item.get("summary")?.as_array())
-        .flatten()
-        .next()
-        .is_some();
+        .any(|summary| !summary.is_empty());
     Some(TokenChances {
         positions,
-        thought: if summarized { Thought::Before } else { thought },
+        thought: if has_summary {
+            Thought::Before
+        } else {
+            thought
+        },
     })
 }
 
-/// The text of the messages among the items of a response, and that of refusals in them.
-fn words(items: &[Value]) -> (String, String) {
+/// Text of the messages in a response, and the text of the refusals in them.
+fn text_and_refusal(items: &[Value]) -> (String, String) {
     let (mut text, mut refusal) = (String::new(), String::new());
-    let is_message = |item: &&Value| item.get("type").is_none_or(|kind| kind == "message");
     let parts = items
         .iter()
-        .filter(is_message)
-        .filter_map(|item| item.get("content")?.as_array());
-    for part in parts.flatten() {
+        .filter(|item| item.get("type").is_none_or(|kind| kind == "message"))
+        .filter_map(|item| item.get("content")?.as_array())
+        .flatten();
+    for part in parts {
         let words = |field| part.get(field).and_then(Value::as_str).unwrap_or_default();
         match part.get("type").and_then(Value::as_str) {
             Some("output_text" | "text") => text += words("text"),
@@ -138,12 +139,12 @@ fn words(items: &[Value]) -> (String, String) {
 mod tests {
     use super::*;
 
-    fn json(body: &str) -> Result<Reply, UnreadableReply> {
+    fn json(body: &str) -> Result<Reply, ReplyError> {
         read(body.as_bytes(), "application/json")
     }
 
     #[test]
-    fn the_text_of_all_messages_is_read_and_reasoning_is_not() {
+    fn only_messages_become_the_text() {
         let reply = json(
             r#"{"status":"completed","model":"o-1","error":null,"output":[
                 {"type":"reasoning","summary":[{"type":"summary_text","text":"A?"}],"content":[{"type":"reasoning_text","text":"A"}]},
@@ -174,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_status_says_why_the_model_stopped() {
+    fn the_status_becomes_the_finish_reason() {
         for (status, finish) in [
             (r#""status":"completed","#, Finish::Stop),
             ("", Finish::Unknown),
@@ -193,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_whole_response_is_described() {
+    fn incomplete_responses_are_described() {
         for (body, expected) in [
             (r#"{"status":"in_progress","output":[]}"#, "in_progress"),
             (
@@ -211,25 +212,25 @@ mod tests {
                 "without a complete response",
             ),
         ] {
-            let Err(UnreadableReply::Other(found)) = json(body) else {
+            let Err(ReplyError::Unreadable(found)) = json(body) else {
                 panic!("{body}");
             };
-            assert!(found.what.contains(expected), "{found:?}");
+            assert!(found.description.contains(expected), "{found:?}");
         }
         for body in [
             r#"{"status":"failed","error":{"code":"server_error","message":"m"},"output":[]}"#,
             r#"{"error":{"message":"m"}}"#,
             r#"data: {"type":"error","message":"m"}"#,
         ] {
-            let Err(UnreadableReply::Complaint(complaint)) = json(body) else {
+            let Err(ReplyError::Api(api_error)) = json(body) else {
                 panic!("{body}");
             };
-            assert_eq!(complaint.message, "m");
+            assert_eq!(api_error.message, "m");
         }
     }
 
     #[test]
-    fn a_stream_that_nobody_asked_for_is_read_at_its_end() {
+    fn the_last_event_of_a_stream_is_used() {
         let stream = "event: response.output_text.delta\ndata: {\"type\":\"response.output_text.delta\",\"delta\":\"A\"}\n\n\
             event: response.completed\ndata: {\"type\":\"response.completed\",\"response\":{\"status\":\"completed\",\"output\":[{\"type\":\"message\",\"content\":[{\"type\":\"output_text\",\"text\":\"B\"}]}]}}\n\n";
         assert_eq!(json(stream).unwrap().text, "B");

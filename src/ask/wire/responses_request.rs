@@ -1,19 +1,20 @@
-//! Requests of OpenAI's Responses API: the JSON [`body`], and the [`fields`] that servers may refuse.
+//! Requests to OpenAI's Responses API: the JSON [`body`], and the [`fields`] that servers may refuse.
 //!
-//! The form is that of OpenAI's reference, `POST /responses`; `store` is false, so that the vendor keeps no image.
+//! The form follows OpenAI's reference, `POST /responses`; `store` is false, so that the vendor does not store images.
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::chat_fields::PROBABILITIES;
+use super::chat_fields::OMIT_PROBABILITIES;
 use super::image_places::with_images;
 use crate::ask::requests::{
-    AdaptableField, Constrain, FieldState, ImageDetail, Message, MessagePart, Parameters, Parts,
-    RequestField, RequestFields, SentFields, Temperature, TokenField, constraint, images,
+    AdaptableField, Constrain, FieldState, ImageDetail, Message, MessagePart, Parameters,
+    RequestBody, RequestField, RequestFields, SentFields, Temperature, TokenField, constraint,
+    images,
 };
 use crate::types::questions::letter;
 
-/// The body of a request without its input, which stands at its end.
+/// Body of a request without its input, which is appended.
 #[derive(Serialize)]
 struct ResponsesRequest<'a> {
     model: &'a str,
@@ -39,11 +40,11 @@ struct ResponsesRequest<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     instructions: Option<&'a str>,
     #[serde(flatten)]
-    switch: Option<&'a Map<String, Value>>,
+    thinking: Option<&'a Map<String, Value>>,
 }
 
 #[derive(Serialize)]
-struct Turn<'a> {
+struct InputMessage<'a> {
     role: &'static str,
     content: Vec<Part<'a>>,
 }
@@ -61,16 +62,16 @@ enum Part<'a> {
     },
 }
 
-/// The place of an image.
-const PLACE: &str = r#""image_url":"""#;
+/// Placeholder of an image URL in the JSON.
+const IMAGE_PLACE: &str = r#""image_url":"""#;
 
-/// The body of one request: text, images, and the text after them.
+/// Writes the body of one request.
 pub(super) fn body(
     parameters: &Parameters,
     fields: RequestFields,
     message: Message<'_>,
     choices: usize,
-) -> Result<Parts, serde_json::Error> {
+) -> Result<RequestBody, serde_json::Error> {
     let letters: Vec<char> = (0..choices).map(letter).collect();
     let constrain = parameters.constrain;
     let effort = fields.effort(parameters);
@@ -82,32 +83,38 @@ pub(super) fn body(
         seed: parameters.seed,
         max_output_tokens: limit(parameters, fields),
         reasoning: effort.map(|effort| json!({"effort": effort})),
-        text: (constrain == Constrain::Json).then(|| format(&letters)),
+        text: (constrain == Constrain::Json).then(|| text_format(&letters)),
         structured_outputs: (constrain == Constrain::Choice).then(|| json!({"choice": letters})),
         include: fields
             .top_logprobs
             .map(|_| ["message.output_text.logprobs"]),
         top_logprobs: fields.top_logprobs,
         instructions: parameters.extra.system.as_deref(),
-        switch: fields.switch(),
+        thinking: fields.thinking_body(),
     })?;
     let head = parameters.extra.apply(head)?;
     let parts = message.parts();
-    let input = serde_json::to_string(&[Turn {
+    let input = serde_json::to_string(&[InputMessage {
         role: "user",
         content: content(&parts, parameters.detail),
     }])?;
-    Ok(with_images(&head, "input", &input, PLACE, images(&parts)))
+    Ok(with_images(
+        &head,
+        "input",
+        &input,
+        IMAGE_PLACE,
+        images(&parts),
+    ))
 }
 
-/// The token limit, which has one name here.
+/// Token limit in a request; this API has only one name for it.
 fn limit(parameters: &Parameters, fields: RequestFields) -> Option<u32> {
     parameters
         .limit()
         .filter(|_| fields.token_field != TokenField::Omit)
 }
 
-/// The content of a message, with a place for each image.
+/// Content of a message, with a placeholder for each image.
 fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Vec<Part<'a>> {
     if parts.is_empty() {
         return vec![Part::InputText { text: "" }];
@@ -115,7 +122,7 @@ fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Vec<Pa
     parts
         .iter()
         .map(|part| match part {
-            MessagePart::Words(text) => Part::InputText { text },
+            MessagePart::Text(text) => Part::InputText { text },
             MessagePart::Image(_) => Part::InputImage {
                 detail,
                 image_url: "",
@@ -124,13 +131,13 @@ fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Vec<Pa
         .collect()
 }
 
-/// The format of an object with one of the letters, by a JSON schema.
-fn format(letters: &[char]) -> Value {
+/// JSON schema format for an object with one of the letters.
+fn text_format(letters: &[char]) -> Value {
     let schema = constraint::schema(letters);
     json!({"format": {"type": "json_schema", "name": constraint::ANSWER, "strict": true, "schema": schema}})
 }
 
-/// The fields that a server may refuse.
+/// Fields that a server may refuse.
 pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
     let parameters = sent.parameters;
     let probabilities = FieldState::until_refused(
@@ -155,13 +162,13 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
         ),
         field(
             "top_p",
-            FieldState::set(parameters.top_p.is_some()),
+            FieldState::sent_if(parameters.top_p.is_some()),
             None,
             "leave --top-p out: the model takes no other than its own",
         ),
         field(
             "seed",
-            FieldState::set(parameters.seed.is_some()),
+            FieldState::sent_if(parameters.seed.is_some()),
             None,
             "leave --sampling-seed out: the Responses API has no seed",
         ),
@@ -176,55 +183,55 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
         ),
         field(
             "effort",
-            FieldState::set(sent.fields.effort(parameters).is_some()),
+            FieldState::sent_if(sent.fields.effort(parameters).is_some()),
             None,
-            EFFORT,
+            OMIT_EFFORT,
         ),
         field(
             "reasoning",
-            FieldState::set(sent.fields.effort(parameters).is_some()),
+            FieldState::sent_if(sent.fields.effort(parameters).is_some()),
             None,
-            EFFORT,
+            OMIT_EFFORT,
         ),
         field(
             "detail",
-            FieldState::set(sent.has_image && parameters.detail.is_some()),
+            FieldState::sent_if(sent.has_image && parameters.detail.is_some()),
             None,
             "leave --image detail out, or give a value the server takes",
         ),
         field(
             "format",
-            FieldState::set(parameters.constrain == Constrain::Json),
+            FieldState::sent_if(parameters.constrain == Constrain::Json),
             None,
             "leave --request constrain out: the server does not take it",
         ),
         field(
             "top_logprobs",
-            FieldState::set(sent.fields.top_logprobs.is_some()),
+            FieldState::sent_if(sent.fields.top_logprobs.is_some()),
             Some(AdaptableField::TopLogprobs),
-            PROBABILITIES,
+            OMIT_PROBABILITIES,
         ),
         field(
             "logprobs",
             probabilities,
             Some(AdaptableField::Logprobs),
-            PROBABILITIES,
+            OMIT_PROBABILITIES,
         ),
         field(
             "include",
             probabilities,
             Some(AdaptableField::Logprobs),
-            PROBABILITIES,
+            OMIT_PROBABILITIES,
         ),
         field(
             "structured_outputs",
-            FieldState::set(parameters.constrain == Constrain::Choice),
+            FieldState::sent_if(parameters.constrain == Constrain::Choice),
             None,
             "leave --request constrain out, or try --request constrain=json",
         ),
     ])
 }
 
-/// The remedy for a reasoning effort that the model does not take.
-const EFFORT: &str =
+/// Remedy for a reasoning effort that the model does not accept.
+const OMIT_EFFORT: &str =
     "leave --reasoning-effort (or --thinking) out, or give a value the model takes";

@@ -1,10 +1,10 @@
-//! Event streams of replies: [`events`] reads one, [`assemble`] joins the pieces of a chat completion.
+//! Event streams of replies: [`events`] parses a stream, [`assemble`] joins the chunks of a chat completion.
 
 use serde_json::{Map, Value, json};
 
-use crate::ask::replies::bounded_json::{MOST_ITEMS, parse};
+use crate::ask::replies::bounded_json::{MAX_ITEMS, parse};
 
-/// Whether a body is an event stream, by its content type or its beginning.
+/// True if a body is an event stream, by its content type or its first characters.
 pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
     let text = text.trim_start();
     content_type.starts_with("text/event-stream")
@@ -12,30 +12,29 @@ pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
         || text.starts_with("event:")
 }
 
-/// The events of a stream up to `[DONE]`, each as JSON; one that is not JSON, because it was cut, is null.
+/// Events of a stream up to `[DONE]`, as JSON. A truncated event, which is not JSON, becomes null.
 ///
-/// Lines may end in CR, LF or both; comments, which keep a connection open, and names of events are skipped.
+/// Lines may end in CR, LF or both. Event names, and comments, which keep a connection open, are skipped.
 pub(super) fn events(stream: &str) -> impl Iterator<Item = Value> {
-    let data = stream
+    stream
         .split(['\n', '\r'])
-        .filter_map(|line| line.strip_prefix("data:").map(str::trim));
-    data.take_while(|data| *data != "[DONE]")
+        .filter_map(|line| line.strip_prefix("data:").map(str::trim))
+        .take_while(|data| *data != "[DONE]")
         .map(|data| parse(data).unwrap_or_default())
 }
 
-/// The completion that the pieces of the choice with index 0 make, in the form of `chat_reply`. An event with an error is
-/// returned unchanged.
+/// Joins the chunks of the choice with index 0 to a completion in the form of an unstreamed one. An error event is returned in its place.
 ///
 /// # Errors
-/// If the stream is not a chat completion, or ended without a finish reason: then it was cut. The error is the usage, if it came.
+/// If the stream is not a chat completion, or is truncated: it has no finish reason. The error is the usage, if the stream has one.
 pub(super) fn assemble(stream: &str) -> Result<Value, Option<Value>> {
     let mut completion = Map::new();
-    let mut pieces = Pieces::default();
+    let mut joined = JoinedChoice::default();
     for event in events(stream) {
         if event.is_null() {
             return Err(completion.remove("usage"));
         }
-        if let Some(error) = error(&event) {
+        if let Some(error) = error_event(&event) {
             return Ok(error);
         }
         for field in ["model", "provider", "usage"] {
@@ -43,17 +42,21 @@ pub(super) fn assemble(stream: &str) -> Result<Value, Option<Value>> {
                 completion.insert(field.to_owned(), value.clone());
             }
         }
-        let choices = event.get("choices").and_then(Value::as_array);
-        let first = |choice: &&Value| choice.get("index").is_none_or(|index| *index == 0);
-        if let Some(choice) = choices.and_then(|choices| choices.iter().find(first)) {
-            // Some gateways state an error in the choice.
+        let choice = event
+            .get("choices")
+            .and_then(Value::as_array)
+            .into_iter()
+            .flatten()
+            .find(|choice| choice.get("index").is_none_or(|index| *index == 0));
+        if let Some(choice) = choice {
+            // Some gateways put an error into the choice.
             if choice.get("error").is_some_and(|error| !error.is_null()) {
                 return Ok(event);
             }
-            pieces.add(choice);
+            joined.add(choice);
         }
     }
-    match pieces.joined() {
+    match joined.finish() {
         Some(choice) => {
             completion.insert("choices".to_owned(), json!([choice]));
             Ok(Value::Object(completion))
@@ -62,8 +65,8 @@ pub(super) fn assemble(stream: &str) -> Result<Value, Option<Value>> {
     }
 }
 
-/// An event that states an error, in the form of a body that does; `None` if it states none.
-fn error(event: &Value) -> Option<Value> {
+/// The error in an event, in the form of an error body; `None` without one.
+fn error_event(event: &Value) -> Option<Value> {
     if event.get("error").is_some_and(|error| !error.is_null()) {
         return Some(event.clone());
     }
@@ -71,49 +74,51 @@ fn error(event: &Value) -> Option<Value> {
     (is_error("type") || is_error("object")).then(|| json!({"error": event}))
 }
 
-/// The pieces of one choice so far.
+/// A choice joined from its chunks.
 #[derive(Default)]
-struct Pieces {
-    finish: Value,
+struct JoinedChoice {
+    finish_reason: Value,
     content: Vec<Value>,
+    /// The fields of [`TEXT_FIELDS`].
     texts: Map<String, Value>,
     logprobs: Map<String, Value>,
 }
 
-/// Adds the items of a piece to those before, up to the bound of one list.
-fn extend(joined: &mut Vec<Value>, more: &[Value]) {
-    let room = MOST_ITEMS.saturating_sub(joined.len());
+/// Appends items to a list, up to [`MAX_ITEMS`] items.
+fn extend_bounded(joined: &mut Vec<Value>, more: &[Value]) {
+    let room = MAX_ITEMS.saturating_sub(joined.len());
     joined.extend(more.iter().take(room).cloned());
 }
 
-/// The fields of a piece that are texts, besides its content.
-const TEXTS: [&str; 3] = ["refusal", "reasoning_content", "reasoning"];
+/// Text fields of a chunk besides its content.
+const TEXT_FIELDS: [&str; 3] = ["refusal", "reasoning_content", "reasoning"];
 
-impl Pieces {
+impl JoinedChoice {
+    /// Adds the next chunk of the choice.
     fn add(&mut self, choice: &Value) {
         if let Some(reason) = choice.get("finish_reason").filter(|r| !r.is_null()) {
-            self.finish = reason.clone();
+            self.finish_reason = reason.clone();
         }
-        // Some servers send the whole message as the only piece.
+        // Some servers send the whole message in a single chunk.
         let delta = choice.get("delta").or_else(|| choice.get("message"));
         match delta.and_then(|delta| delta.get("content")) {
             Some(Value::String(text)) => self.add_content(text),
-            Some(Value::Array(parts)) => extend(&mut self.content, parts),
+            Some(Value::Array(parts)) => extend_bounded(&mut self.content, parts),
             _ => {}
         }
-        for field in TEXTS {
+        for field in TEXT_FIELDS {
             if let Some(text) = delta.and_then(|delta| delta.get(field)?.as_str()) {
                 let joined = self.texts.entry(field).or_insert_with(|| json!(""));
                 append(joined, text);
             }
         }
-        // Each piece has the tokens of its own text: lists are joined.
+        // Each chunk has the tokens of its own text: join the lists.
         let logprobs = choice.get("logprobs").and_then(Value::as_object);
         for (field, value) in logprobs.into_iter().flatten() {
             if let Value::Array(more) = value {
                 let joined = self.logprobs.entry(field).or_insert_with(|| json!([]));
                 if let Value::Array(joined) = joined {
-                    extend(joined, more);
+                    extend_bounded(joined, more);
                 }
             }
         }
@@ -126,9 +131,9 @@ impl Pieces {
         }
     }
 
-    /// The choice of a whole completion; `None` if the last piece did not come.
-    fn joined(self) -> Option<Value> {
-        if self.finish.is_null() {
+    /// The complete choice; `None` if the last chunk, with the finish reason, is missing.
+    fn finish(self) -> Option<Value> {
+        if self.finish_reason.is_null() {
             return None;
         }
         let mut message = self.texts;
@@ -138,7 +143,8 @@ impl Pieces {
             Err(parts) if parts.is_empty() => None,
             Err(parts) => message.insert("content".to_owned(), json!(parts)),
         };
-        let mut choice = json!({"index": 0, "message": message, "finish_reason": self.finish});
+        let mut choice =
+            json!({"index": 0, "message": message, "finish_reason": self.finish_reason});
         if !self.logprobs.is_empty() {
             choice["logprobs"] = self.logprobs.into();
         }
@@ -146,7 +152,7 @@ impl Pieces {
     }
 }
 
-/// Adds to a text.
+/// Appends to a JSON string.
 fn append(joined: &mut Value, text: &str) {
     if let Value::String(joined) = joined {
         joined.push_str(text);
@@ -158,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pieces_become_a_completion() {
+    fn chunks_are_joined() {
         let stream = ": ping\r\n\r\ndata: {\"model\":\"m\",\"choices\":[{\"index\":0,\"delta\":{\"role\":\"assistant\",\"content\":\"\"}}]}\r\n\r\n\
             data:{\"choices\":[{\"index\":1,\"delta\":{\"content\":\"A\"}},{\"index\":0,\"delta\":{\"content\":\"B\",\"reasoning_content\":\"A\"}}]}\n\n\
             event: x\ndata: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\".\"},\"finish_reason\":\"stop\"}]}\n\n\
@@ -171,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn an_incomplete_stream_is_refused() {
+    fn incomplete_streams_are_errors() {
         let piece = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"B\"}}]}\n\n";
         assert_eq!(assemble(piece), Err(None));
         let usage = "data: {\"choices\":[],\"usage\":{\"prompt_tokens\":3}}\n\n";
@@ -194,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn probabilities_and_parts_of_pieces_are_joined() {
+    fn logprobs_and_content_parts_are_joined() {
         let piece = |content: &str, token: &str, finish: &str| {
             format!(
                 "data: {{\"choices\":[{{\"delta\":{{\"content\":{content}}},\"logprobs\":{{\"content\":[{{\"token\":\"{token}\"}}],\"refusal\":null}},\"finish_reason\":{finish}}}]}}\n\n"

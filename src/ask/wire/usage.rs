@@ -1,33 +1,41 @@
-//! The tokens that a server charged, in the shapes in which servers state them: [`read`].
+//! Parsing of the token usage that a server reports, in all known shapes: [`read`].
 
 use serde_json::Value;
 
 use crate::types::Usage;
 
-/// Reads a `usage` of chat completions (`prompt_tokens`, `completion_tokens`) or of responses (`input_tokens`, `output_tokens`).
+/// Parses the `usage` of chat completions (`prompt_tokens`, `completion_tokens`) or of responses (`input_tokens`, `output_tokens`).
 ///
-/// Some servers leave reasoning out of the tokens of the reply and charge it (xAI, Gemini's compatible route). So the tokens of the
-/// reply are the largest number that the usage supports: those stated, the total less the prompt, or their sum with a reasoning
-/// that cannot be among them because it is longer. `None` if no number is stated.
+/// Some servers charge reasoning tokens without counting them as reply tokens (xAI, Gemini's compatible route). The number of reply
+/// tokens is therefore the maximum of: the reported number; the total minus the prompt; and the reported number plus the reasoning
+/// tokens, if these are more than the reported number and so cannot be part of it. `None` without any number.
 pub(super) fn read(usage: Option<&Value>) -> Option<Usage> {
     let usage = usage?;
-    let stated = |names: [&str; 2]| names.iter().find_map(|name| number(usage.get(*name)?));
-    let prompt = stated(["prompt_tokens", "input_tokens"]);
-    let completion = stated(["completion_tokens", "output_tokens"]);
+    let first_of = |names: [&str; 2]| names.iter().find_map(|name| number(usage.get(*name)?));
+    let prompt = first_of(["prompt_tokens", "input_tokens"]);
+    let completion = first_of(["completion_tokens", "output_tokens"]);
     let total = number_in(usage, "total_tokens");
-    // OpenAI's place for it, and Anthropic's name.
+    // OpenAI reports cached tokens in the details, Anthropic in two top-level fields.
     let cached = detail(usage, PROMPT_DETAILS, "cached_tokens");
     let written = number_in(usage, "cache_creation_input_tokens").unwrap_or(0);
     let read = number_in(usage, "cache_read_input_tokens");
-    // Anthropic counts what was in its cache, or is put there, apart from the prompt.
-    let apart = read.unwrap_or(0).saturating_add(written);
-    let exceeds_prompt = total.is_none() && prompt.is_some_and(|prompt| apart > prompt);
-    let is_apart = apart > 0 && (exceeds_prompt || sum([prompt, completion, Some(apart)]) == total);
-    let prompt = prompt.map(|prompt| prompt.saturating_add(if is_apart { apart } else { 0 }));
-    let outside = reasoning(usage).filter(|reasoning| completion.is_some_and(|c| *reasoning > c));
+    // Anthropic does not count tokens that are read from or written to its cache as prompt tokens.
+    let uncounted = read.unwrap_or(0).saturating_add(written);
+    let exceeds_prompt = total.is_none() && prompt.is_some_and(|prompt| uncounted > prompt);
+    let is_uncounted =
+        uncounted > 0 && (exceeds_prompt || sum([prompt, completion, Some(uncounted)]) == total);
+    let prompt = prompt.map(|prompt| {
+        if is_uncounted {
+            prompt.saturating_add(uncounted)
+        } else {
+            prompt
+        }
+    });
+    let uncounted_reasoning =
+        reasoning(usage).filter(|reasoning| completion.is_some_and(|c| *reasoning > c));
     let completion = [
         completion,
-        outside.and_then(|reasoning| completion?.checked_add(reasoning)),
+        uncounted_reasoning.and_then(|reasoning| completion?.checked_add(reasoning)),
         total
             .zip(prompt)
             .and_then(|(all, prompt)| all.checked_sub(prompt)),
@@ -41,53 +49,53 @@ pub(super) fn read(usage: Option<&Value>) -> Option<Usage> {
     (usage != Usage::default()).then_some(usage)
 }
 
-/// The places of details about a prompt.
+/// Names of the object with details about the prompt.
 const PROMPT_DETAILS: [&str; 2] = ["prompt_tokens_details", "input_tokens_details"];
 
-/// The places of details about a reply.
+/// Names of the object with details about the reply.
 const REPLY_DETAILS: [&str; 2] = ["completion_tokens_details", "output_tokens_details"];
 
-/// The tokens of hidden reasoning; `None` if they are not stated.
+/// Number of reasoning tokens; `None` if the server does not report it.
 pub(super) fn reasoning(usage: &Value) -> Option<u64> {
     detail(usage, REPLY_DETAILS, "reasoning_tokens")
         .or_else(|| number_in(usage, "reasoning_tokens"))
 }
 
-fn detail(usage: &Value, places: [&str; 2], name: &str) -> Option<u64> {
-    places
+/// Number in the first of several objects that has it.
+fn detail(usage: &Value, objects: [&str; 2], name: &str) -> Option<u64> {
+    objects
         .iter()
-        .find_map(|place| number_in(usage.get(*place)?, name))
+        .find_map(|object| number_in(usage.get(*object)?, name))
 }
 
 fn number_in(object: &Value, name: &str) -> Option<u64> {
     number(object.get(name)?)
 }
 
-/// The sum of numbers; `None` if one is not known.
+/// Sum of numbers; `None` if one is unknown.
 fn sum(numbers: [Option<u64>; 3]) -> Option<u64> {
     numbers.into_iter().sum()
 }
 
-/// The largest number of tokens that is believed, so that no sum of them overflows; chosen.
-const MOST: u64 = 1_000_000_000_000_000;
+/// Maximum plausible number of tokens, so that no sum overflows; chosen.
+const MAX_TOKENS: u64 = 1_000_000_000_000_000;
 
-/// A number of tokens: an integer, a fraction, which is rounded up, or either as text. `None` for what is not one.
+/// Parses a number of tokens: an integer, a fraction, which is rounded up, or either as a string.
 fn number(value: &Value) -> Option<u64> {
     let number = match value {
-        Value::Number(number) => number.as_u64().or_else(|| whole(number.as_f64()?)),
+        Value::Number(number) => number.as_u64().or_else(|| round_up(number.as_f64()?)),
         Value::String(text) => {
             let text = text.trim();
-            let integer = text.parse().ok();
-            integer.or_else(|| whole(text.parse().ok()?))
+            text.parse().ok().or_else(|| round_up(text.parse().ok()?))
         }
         _ => None,
     };
-    number.filter(|number| *number <= MOST)
+    number.filter(|number| *number <= MAX_TOKENS)
 }
 
-/// A fraction rounded up; `None` if it is no number of tokens.
-fn whole(number: f64) -> Option<u64> {
-    (0.0..=MOST as f64)
+/// Rounds a fraction up; `None` if it is not a plausible number of tokens.
+fn round_up(number: f64) -> Option<u64> {
+    (0.0..=MAX_TOKENS as f64)
         .contains(&number)
         .then_some(number.ceil() as u64)
 }
@@ -99,7 +107,7 @@ mod tests {
     use super::*;
     use crate::ask::costs::Price;
 
-    /// Usages of seven vendors, with the prompt and the reply that their bill has.
+    /// Usages of several vendors, with the charged prompt and reply tokens.
     fn vendors() -> [(&'static str, Value, [u64; 2]); 8] {
         [
             (
@@ -146,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn the_bill_is_that_of_the_vendor() {
+    fn charged_tokens_match_the_vendors_bill() {
         let price = Price {
             input: 10.0,
             output: 100.0,
@@ -157,13 +165,13 @@ mod tests {
             let read = read(Some(&usage)).unwrap();
             let tokens = (read.prompt_tokens, read.completion_tokens);
             assert_eq!(tokens, (Some(prompt), Some(reply)), "{vendor}");
-            let by_hand = (prompt * 10 + reply * 100) as f64 / 1e6;
-            assert!((price.charged(read) - by_hand).abs() < 1e-12, "{vendor}");
+            let expected = (prompt * 10 + reply * 100) as f64 / 1e6;
+            assert!((price.charged(read) - expected).abs() < 1e-12, "{vendor}");
         }
     }
 
     #[test]
-    fn a_cache_larger_than_the_prompt_is_counted_apart() {
+    fn caches_outside_the_prompt_are_added() {
         let prompt = |usage: Value| read(Some(&usage)).unwrap().prompt_tokens;
         let large =
             json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 2000});
@@ -174,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_is_missing_follows_from_the_total() {
+    fn missing_numbers_follow_from_the_total() {
         let usage = read(Some(&json!({"prompt_tokens": 9, "total_tokens": 12}))).unwrap();
         assert_eq!(usage.completion_tokens, Some(3));
         assert_eq!(usage.total_tokens, Some(12));
@@ -185,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_are_no_tokens_are_ignored() {
+    fn implausible_numbers_are_ignored() {
         for tokens in [
             json!(u64::MAX),
             json!(-1),

@@ -64,7 +64,7 @@ fn camera(settings: Vec<SettingFit>) -> CameraFit {
 }
 
 #[test]
-fn a_camera_file_is_what_was_measured() {
+fn the_file_has_the_measured_values() {
     let camera = camera(
         ["a", "b", "c"]
             .iter()
@@ -97,7 +97,7 @@ fn a_camera_file_is_what_was_measured() {
     }
 }
 
-/// The comments of a table.
+/// Comments of a table.
 fn comments<'t>(text: &'t str, table: &str) -> Vec<&'t str> {
     let table = text.split_once(&format!("\n[{table}]\n")).unwrap().1;
     table
@@ -107,9 +107,9 @@ fn comments<'t>(text: &'t str, table: &str) -> Vec<&'t str> {
         .collect()
 }
 
-/// Settings without visible row noise are named, and what is said of a line is true of it.
+/// Comments state the number of settings without visible row noise.
 #[test]
-fn lines_say_what_they_are_made_from() {
+fn lines_state_their_source() {
     let silent = |name: &str, gain: f64| SettingFit {
         row_deviation: measured(0.0),
         ..setting(name, gain)
@@ -165,14 +165,14 @@ fn lines_say_what_they_are_made_from() {
     ] {
         let text = with(quiet, settings);
         assert_eq!(comments(&text, "row-deviation"), row);
-        // Read noise is seen everywhere.
+        // Read noise is visible in all settings.
         let read = comments(&text, "read-scale").concat();
         assert!(!read.contains("left out"), "{read}");
     }
 }
 
 #[test]
-fn what_a_camera_file_may_not_hold_is_not_written() {
+fn invalid_values_are_not_written() {
     let twice = camera(vec![setting("a", 0.5), setting("b", 0.5)]);
     let error = camera_file(&twice).unwrap_err().to_string();
     assert!(

@@ -5,28 +5,28 @@ use super::super::sums::{NeighbourSums, TileSums};
 use crate::error::{Error, Result};
 use crate::types::Digest;
 
-/// Largest share of samples of a plane at its greatest code (chosen).
-const AT_TOP: f64 = 1e-3;
-/// Share of white below which no exposure should be clipped (chosen).
-const CLIPS_AT: f64 = 0.9;
-/// Share of white that some code of the flats should reach (chosen: flats up to 60 % are asked for).
-const REACHES: f64 = 0.25;
-/// Differences of light between the frames of a pair, as shares: above the first a note, above the second they are no pair (chosen).
+/// Maximum share of the samples of a plane at its maximum code (chosen).
+const MAX_AT_TOP: f64 = 1e-3;
+/// Share of white below which clipping is suspicious (chosen).
+const MIN_CLIPPING: f64 = 0.9;
+/// Minimum share of white that the maximum code of the flats should reach (chosen: users are asked for flats up to 60 %).
+const MIN_REACH: f64 = 0.25;
+/// Relative differences of light between the frames of a pair: a note above the first, an error above the second (chosen).
 const LIGHT: [f64; 2] = [0.01, 0.05];
 
-/// Least share of the tiles of an exposure in the range of light; an exposure with fewer is left out (chosen).
-const LEAST_IN_RANGE: f64 = 0.25;
+/// Minimum share of the tiles of an exposure in the range of light; exposures with fewer are left out (chosen).
+const MIN_IN_RANGE: f64 = 0.25;
 
-/// The result of a pair of flats.
+/// Results of a pair of flats.
 #[derive(Debug)]
 pub(super) struct PairFacts {
     /// Names of the two files.
     pub(super) names: [String; 2],
     /// Digests of the two files.
     pub(super) digests: [Digest; 2],
-    /// Greatest code of both frames.
+    /// Maximum code of both frames.
     pub(super) greatest: u16,
-    /// Largest share of samples of a plane at its greatest code, and this code.
+    /// Largest share of the samples of a plane at its maximum code, and this code.
     pub(super) at_top: (f64, u16),
     /// Means of both frames, in ADU.
     pub(super) means: [f64; 2],
@@ -34,23 +34,23 @@ pub(super) struct PairFacts {
     pub(super) tiles: Vec<TileSums>,
 }
 
-/// The pairs of an exposure, to be checked.
+/// Checks of the pairs of an exposure.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ExposureCheck<'a> {
     pub(super) name: &'a str,
     pub(super) facts: &'a [PairFacts],
     /// Offsets of the planes in ADU.
     pub(super) offsets: &'a [f64],
-    /// The code of white.
+    /// Code of white.
     pub(super) white: u16,
 }
 
-/// An exposure that is overexposed.
+/// An overexposed exposure.
 #[derive(Debug)]
 pub(super) struct Clipped {
-    /// Why it is left out.
+    /// Reason for leaving it out.
     pub(super) reason: String,
-    /// A note on white, if the exposure is clipped far below it.
+    /// Warning about the code of white, if the exposure is clipped far below it.
     pub(super) doubt: Option<String>,
 }
 
@@ -60,22 +60,30 @@ impl PairFacts {
         [0, 1].map(|frame| (&*self.names[frame], self.digests[frame]))
     }
 
-    /// The light of the first frame over the light of the second, by plane. A plane without light has no ratio: it is kept within
-    /// twice of what a pair may differ by.
+    /// Ratio of the light of the first frame to that of the second, by plane. The ratio of a plane with little light is unreliable, so it
+    /// is limited to twice the allowed difference; without light it is 1.
     pub(super) fn light_ratios(&self, offsets: &[f64]) -> Vec<f64> {
-        let ratio = |(plane, offset): (usize, &f64)| {
-            let tiles = self.tiles.iter().filter(|tile| tile.plane == plane);
-            let [count, a, b] = tiles.fold([0.0; 3], |[count, a, b], tile| {
+        offsets
+            .iter()
+            .enumerate()
+            .map(|(plane, offset)| self.light_ratio(plane, *offset))
+            .collect()
+    }
+
+    fn light_ratio(&self, plane: usize, offset: f64) -> f64 {
+        let [count, a, b] = self
+            .tiles
+            .iter()
+            .filter(|tile| tile.plane == plane)
+            .fold([0.0; 3], |[count, a, b], tile| {
                 [count + tile.count, a + tile.sums[0], b + tile.sums[1]]
             });
-            let [a, b] = [a, b].map(|sum| sum - count * offset);
-            if a > 0.0 && b > 0.0 {
-                (a / b).clamp(1.0 - 2.0 * LIGHT[1], 1.0 + 2.0 * LIGHT[1])
-            } else {
-                1.0
-            }
-        };
-        offsets.iter().enumerate().map(ratio).collect()
+        let [a, b] = [a, b].map(|sum| sum - count * offset);
+        if a > 0.0 && b > 0.0 {
+            (a / b).clamp(1.0 - 2.0 * LIGHT[1], 1.0 + 2.0 * LIGHT[1])
+        } else {
+            1.0
+        }
     }
 }
 
@@ -83,8 +91,8 @@ impl ExposureCheck<'_> {
     /// Checks that no code is above white.
     ///
     /// # Errors
-    /// If one is.
-    pub(super) fn above_white(&self) -> Result<()> {
+    /// If a code is above white.
+    pub(super) fn check_white(&self) -> Result<()> {
         let white = self.white;
         match self.facts.iter().find(|pair| pair.greatest > white) {
             Some(pair) => Err(Error::data(
@@ -98,25 +106,25 @@ impl ExposureCheck<'_> {
         }
     }
 
-    /// Why the exposure is overexposed; `None` if it is not.
-    pub(super) fn clipped(&self) -> Option<Clipped> {
-        let tops = self.facts.iter().map(|pair| pair.at_top);
-        let (share, code) = tops.fold(
-            (0.0, 0),
-            |most, top| if top.0 > most.0 { top } else { most },
-        );
+    /// Checks for overexposure; `None` if the exposure is not overexposed.
+    pub(super) fn find_clipping(&self) -> Option<Clipped> {
+        let (share, code) = self
+            .facts
+            .iter()
+            .map(|pair| pair.at_top)
+            .fold((0.0, 0), |max, top| if top.0 > max.0 { top } else { max });
         let Self { name, white, .. } = self;
         let at = if code == *white {
             format!("white, {white}")
         } else {
             format!("code {code}, the greatest, where white is {white}")
         };
-        (share > AT_TOP).then(|| Clipped {
+        (share > MAX_AT_TOP).then(|| Clipped {
             reason: format!(
                 "exposure {name}: clipped, {:.1} % of a colour are at {at}",
                 100.0 * share
             ),
-            doubt: (f64::from(code) < CLIPS_AT * f64::from(*white)).then(|| {
+            doubt: (f64::from(code) < MIN_CLIPPING * f64::from(*white)).then(|| {
                 format!(
                     "exposure {name} is clipped at {code}, far below white, {white}: if {code} is the greatest code of the sensor, state it with --white; with a white that is too large, the range of codes is, too"
                 )
@@ -124,11 +132,11 @@ impl ExposureCheck<'_> {
         })
     }
 
-    /// Notes on pairs whose light differs a little.
+    /// Checks the pairs, and returns notes on small differences of light.
     ///
     /// # Errors
-    /// If the two of a pair differ much in light, or neighbours correlate.
-    pub(super) fn pairs(&self) -> Result<Vec<String>> {
+    /// If the light of the two frames differs too much, or neighbours correlate.
+    pub(super) fn check_pairs(&self) -> Result<Vec<String>> {
         let mut notes = Vec::new();
         let offset = self.offset();
         for pair in self.facts {
@@ -158,11 +166,11 @@ impl ExposureCheck<'_> {
         Ok(notes)
     }
 
-    /// Why too few tiles of the exposure are in the range of light, where so many are; `None` if enough are.
+    /// Reason for leaving out the exposure if too few tiles are in the range of light, of which `used` are; otherwise `None`.
     pub(super) fn out_of_range(&self, used: usize, range: [f64; 2]) -> Option<String> {
         let all: usize = self.facts.iter().map(|pair| pair.tiles.len()).sum();
         let share = used as f64 / all.max(1) as f64;
-        (share < LEAST_IN_RANGE).then(|| {
+        (share < MIN_IN_RANGE).then(|| {
             let mean = self.facts.iter().flat_map(|pair| pair.means).sum::<f64>()
                 / (2 * self.facts.len()) as f64
                 - self.offset();
@@ -180,11 +188,11 @@ impl ExposureCheck<'_> {
     }
 }
 
-/// A note on white, if no code of all exposures comes near it.
+/// Warning about the code of white, if all codes of all exposures are far below it.
 pub(super) fn far_below_white(exposures: &[Vec<PairFacts>], white: u16) -> Option<String> {
     let greatest = exposures.iter().flatten().map(|pair| pair.greatest).max()?;
     let share = f64::from(greatest) / f64::from(white);
-    (share < REACHES).then(|| {
+    (share < MIN_REACH).then(|| {
         format!(
             "the greatest code of the flats, {greatest}, is {:.0} % of white, {white}: is white right? Flats of up to 60 % of white would show it",
             100.0 * share

@@ -1,4 +1,4 @@
-//! The flats of a setting: pairs of evenly lit frames at several exposures, as points of photon transfer ([`Flats`]).
+//! Measurement of the flats of a setting, pairs of evenly lit frames at several exposures, as points of photon transfer: [`Flats`].
 
 mod checks;
 mod transfer;
@@ -9,17 +9,17 @@ use super::batches::in_batches;
 use super::frames::{Frame, FrameReader};
 use super::hot_pixels::HotPixels;
 use super::inputs::Inputs;
-use super::recording::{ExposureFiles, LEAST, SettingFiles};
+use super::recording::{ExposureFiles, MIN_EXPOSURES, SettingFiles};
 use super::sums::{PairNoise, PairSums, PlaneSums, TileSums, TopCode};
 use crate::error::{Error, Result};
 use checks::{ExposureCheck, PairFacts};
 pub(super) use transfer::{Point, Transfer, gain};
 
-/// Range of light that is used, as shares of white above the offset (EMVA 1288 release 4 Linear fits up to 70 % of saturation; the
-/// lower end is chosen: below it an error of the offset counts. 1.5 % are the corners of a frame with 2 % in its middle).
+/// Range of light to use, as shares of white above the offset. EMVA 1288 release 4 Linear fits up to 70 % of saturation. The lower end is
+/// chosen: below it, errors of the offset matter; the corners of a frame with 2 % in its centre have 1.5 %.
 const RANGE: [f64; 2] = [0.015, 0.7];
 
-/// Exposures of a setting that are used.
+/// Usable exposures of a setting.
 #[derive(Debug)]
 pub(super) struct Flats {
     exposures: Vec<Exposure>,
@@ -28,7 +28,7 @@ pub(super) struct Flats {
 /// Pairs of flats of one exposure.
 #[derive(Debug)]
 struct Exposure {
-    /// Tiles of each pair that are in the range of light.
+    /// Tiles of each pair in the range of light.
     pairs: Vec<Vec<Tile>>,
     dark: Option<Dark>,
 }
@@ -41,11 +41,11 @@ struct Tile {
     free: f64,
     /// Mean of both frames, in ADU.
     mean: f64,
-    /// Variance of one frame at equal light of both, without row noise, in ADU².
+    /// Variance of one frame, without row noise and after equalizing the light of both frames, in ADU².
     variance: f64,
 }
 
-/// Frames of the exposure without light.
+/// Results of the dark frames of an exposure.
 #[derive(Debug)]
 struct Dark {
     /// Means of the planes in ADU.
@@ -54,7 +54,7 @@ struct Dark {
     within: f64,
 }
 
-/// Properties of the flats that bias frames determine.
+/// Results of the bias frames that the flats need.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Base<'a> {
     /// Means of the planes in ADU.
@@ -63,20 +63,20 @@ pub(super) struct Base<'a> {
     pub(super) within: f64,
 }
 
-/// Where light ends, and the omissions.
+/// Code of white, and sites to leave out.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FlatSettings<'a> {
-    /// The code of white.
+    /// Code of white.
     pub(super) white: u16,
     pub(super) hot: &'a HotPixels,
 }
 
 impl Flats {
-    /// Reads the flats of a setting. What is left out, and doubts, are added to `notes`.
+    /// Measures the flats of a setting. Adds notes on omissions and warnings to `notes`.
     ///
     /// # Errors
-    /// If a frame cannot be read, is a copy or has codes above white, the two of a pair differ in light, neighbours correlate, or too
-    /// few exposures are left.
+    /// If a frame cannot be read, is a copy or has codes above white, the frames of a pair differ in light, neighbours correlate, or too
+    /// few exposures are usable.
     pub(super) fn measure(
         reader: &FrameReader,
         files: &SettingFiles,
@@ -98,16 +98,16 @@ impl Flats {
                 offsets,
                 white: settings.white,
             };
-            check.above_white()?;
-            if let Some(clipped) = check.clipped() {
+            check.check_white()?;
+            if let Some(clipped) = check.find_clipping() {
                 left_out.push(clipped.reason);
                 notes.extend(clipped.doubt);
                 continue;
             }
             for (name, digest) in facts.iter().flat_map(PairFacts::files) {
-                inputs.once(name, digest)?;
+                inputs.check_unique(name, digest)?;
             }
-            notes.extend(check.pairs()?);
+            notes.extend(check.check_pairs()?);
             let pairs: Vec<Vec<Tile>> = facts
                 .iter()
                 .map(|pair| in_range(pair, offsets, settings.white))
@@ -119,7 +119,7 @@ impl Flats {
             }
             exposures.push(Exposure { pairs, dark });
         }
-        if exposures.len() < LEAST[1] {
+        if exposures.len() < MIN_EXPOSURES {
             return Err(too_few(files, exposures.len(), &left_out));
         }
         notes.extend(
@@ -130,7 +130,7 @@ impl Flats {
         Ok(Self { exposures })
     }
 
-    /// Number of exposures that are used.
+    /// Number of usable exposures.
     pub(super) fn exposures(&self) -> usize {
         self.exposures.len()
     }
@@ -143,14 +143,14 @@ impl Flats {
             .sum()
     }
 
-    /// Whether all exposures have dark frames of their own.
-    pub(super) fn have_dark(&self) -> bool {
+    /// True if every exposure has dark frames.
+    pub(super) fn have_dark_frames(&self) -> bool {
         self.exposures
             .iter()
             .all(|exposure| exposure.dark.is_some())
     }
 
-    /// The points of photon transfer if each pair counts as often as its weight says.
+    /// Points of photon transfer, with one weight for each pair.
     pub(super) fn points(&self, base: Base<'_>, weights: &[f64]) -> Vec<Point> {
         let mut points = Vec::new();
         let mut weights = weights.iter();
@@ -176,32 +176,35 @@ impl Flats {
     }
 }
 
-/// The error for a setting with too few exposures, with the reasons.
-fn too_few(files: &SettingFiles, left: usize, reasons: &[String]) -> Error {
+/// Error for a setting with too few exposures, with the reasons.
+fn too_few(files: &SettingFiles, usable: usize, reasons: &[String]) -> Error {
     let problem = format!(
-        "{left} of {} exposures can be used, at least {} are needed: {}",
+        "{usable} of {} exposures can be used, at least {} are needed: {}",
         files.exposures.len(),
-        LEAST[1],
+        MIN_EXPOSURES,
         reasons.join("; ")
     );
     Error::data(format_args!("flats of {}", files.name), problem)
 }
 
-/// The tiles of a pair whose light is in the range.
+/// Tiles of a pair whose light is in the range.
 fn in_range(pair: &PairFacts, offsets: &[f64], white: u16) -> Vec<Tile> {
     let ratios = pair.light_ratios(offsets);
-    let used = pair.tiles.iter().filter(|tile| {
+    let is_in_range = |tile: &&TileSums| {
         let offset = offsets[tile.plane];
         let share = (tile.mean() - offset) / (f64::from(white) - offset);
         (RANGE[0]..=RANGE[1]).contains(&share)
-    });
-    let tile = |tile: &TileSums| Tile {
-        plane: tile.plane,
-        free: tile.free,
-        mean: tile.mean(),
-        variance: tile.variance(ratios[tile.plane]),
     };
-    used.map(tile).collect()
+    pair.tiles
+        .iter()
+        .filter(is_in_range)
+        .map(|tile| Tile {
+            plane: tile.plane,
+            free: tile.free,
+            mean: tile.mean(),
+            variance: tile.variance(ratios[tile.plane]),
+        })
+        .collect()
 }
 
 /// Reads all pairs of all exposures.
@@ -226,7 +229,7 @@ fn read(
         let facts = PairFacts {
             names: [&pair[0], &pair[1]].map(|path| path.display().to_string()),
             digests: [a.facts.digest, b.facts.digest],
-            greatest: top[0].greatest().max(top[1].greatest()),
+            greatest: top[0].max().max(top[1].max()),
             at_top: if second.0 > first.0 { second } else { first },
             means: sums.means(),
             neighbours: sums.neighbours(),
@@ -239,9 +242,9 @@ fn read(
         &pairs,
         2 * reader.bytes_of_frame(),
         work,
-        |item, (facts, of_files)| {
+        |item, (facts, file_facts)| {
             let (exposure, pair) = item;
-            for (path, facts) in pair.iter().zip(&of_files) {
+            for (path, facts) in pair.iter().zip(&file_facts) {
                 inputs.add(path, facts);
             }
             read[*exposure].push(facts);
@@ -274,16 +277,16 @@ fn dark(
             .iter()
             .map(|path| reader.read(path))
             .collect::<Result<_>>()?;
-        let sums = frames
+        let sums: Vec<Vec<[u64; 2]>> = frames
             .iter()
-            .map(|frame| PlaneSums::new(layout, &frame.samples, hot).planes());
+            .map(|frame| PlaneSums::new(layout, &frame.samples, hot).planes())
+            .collect();
         let noise = match &frames[..] {
             [a, b] => Some(PairSums::new(layout, [&a.samples, &b.samples], hot).noise()),
             _ => None,
         };
-        let sums: Vec<Vec<[u64; 2]>> = sums.collect();
-        let facts = frames.into_iter().map(|frame| frame.facts);
-        Ok((sums, noise, facts.collect::<Vec<_>>()))
+        let facts: Vec<_> = frames.into_iter().map(|frame| frame.facts).collect();
+        Ok((sums, noise, facts))
     };
     in_batches(
         &groups,
@@ -291,7 +294,7 @@ fn dark(
         work,
         |group, (sums, noise, facts)| {
             for (path, facts) in group.iter().zip(&facts) {
-                inputs.add_once(path, facts)?;
+                inputs.add_unique(path, facts)?;
             }
             for sums in &sums {
                 for (plane, more) in planes.iter_mut().zip(sums) {
@@ -306,11 +309,11 @@ fn dark(
     if noises.is_empty() {
         return Ok(None);
     }
-    let offsets = planes
-        .iter()
-        .map(|[count, sum]| *sum as f64 / (*count).max(1) as f64);
     Ok(Some(Dark {
-        offsets: offsets.collect(),
+        offsets: planes
+            .iter()
+            .map(|[count, sum]| *sum as f64 / (*count).max(1) as f64)
+            .collect(),
         within: noises.iter().map(|noise| noise.within).sum::<f64>() / noises.len() as f64,
     }))
 }

@@ -1,9 +1,9 @@
-//! The system gain K by photon transfer: [`Transfer`].
+//! System gain K by photon transfer: [`Transfer`].
 //!
-//! Light of S ADU has S / K electrons, whose number has the variance S / K; in ADU² it is K · S (Janesick, *Photon Transfer*, 2007;
+//! A signal of S ADU is S / K electrons. Their number has the variance S / K, which is K · S in ADU² (Janesick, *Photon Transfer*, 2007;
 //! EMVA 1288 release 4 Linear, section 6).
 
-/// A tile of a pair of flats.
+/// Point of photon transfer: a tile of a pair of flats.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct Point {
     pub(in super::super) exposure: usize,
@@ -18,33 +18,33 @@ pub(in super::super) struct Point {
     pub(in super::super) within: f64,
 }
 
-/// A straight line through points of photon transfer.
+/// Straight line through points of photon transfer.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Transfer {
     /// K of all planes together, in ADU per electron.
     pub(in super::super) gain: f64,
     /// K of each plane; `None` for a plane without points.
     pub(in super::super) by_plane: Vec<Option<f64>>,
-    /// Slope of variance / signal over the range of signals, as a share of K.
+    /// Change of variance / signal over the range of signals, relative to K.
     pub(in super::super) bend: f64,
-    /// Variance at no light of a line that need not pass through 0, in ADU².
+    /// Intercept of a line that need not pass through 0: its variance without light, in ADU².
     pub(in super::super) intercept: f64,
-    /// Standard error of `intercept` if the noise of the sites is all that moves it.
+    /// Standard error of `intercept` from the noise of the sites alone.
     pub(in super::super) intercept_error: f64,
 }
 
 impl Transfer {
-    /// The line through some points.
+    /// Fits a line through points of this number of planes.
     pub(in super::super) fn fit(points: &[Point], planes: usize) -> Self {
         let gain = gain(points);
         let by_plane = (0..planes)
             .map(|plane| {
-                let of_plane: Vec<Point> = points
+                let plane_points: Vec<Point> = points
                     .iter()
                     .filter(|point| point.plane == plane)
                     .copied()
                     .collect();
-                (!of_plane.is_empty()).then(|| self::gain(&of_plane))
+                (!plane_points.is_empty()).then(|| self::gain(&plane_points))
             })
             .collect();
         let [intercept, intercept_error] = intercept(points, gain);
@@ -58,10 +58,10 @@ impl Transfer {
     }
 }
 
-/// K = Σ w S V / Σ w S² with w = n / (K S + read variance)², because a variance V has the variance 2 (K S + …)² / n. K enters its own
-/// weights, which have settled after three rounds.
+/// Gain K = Σ w S V / Σ w S² with w = n / (K S + read variance)², because a variance V has the variance 2 (K S + …)² / n. The weights
+/// depend on K; three iterations are enough for them to converge.
 pub(in super::super) fn gain(points: &[Point]) -> f64 {
-    let sum = |of: &dyn Fn(&Point) -> f64| points.iter().map(of).sum::<f64>();
+    let sum = |term: &dyn Fn(&Point) -> f64| points.iter().map(term).sum::<f64>();
     let mut gain = sum(&|p| p.weight * p.variance) / sum(&|p| p.weight * p.signal);
     for _ in 0..3 {
         let weight = |p: &Point| weight(p, gain);
@@ -71,25 +71,28 @@ pub(in super::super) fn gain(points: &[Point]) -> f64 {
     gain
 }
 
+/// Weight of a point in the fit of the gain.
 fn weight(point: &Point, gain: f64) -> f64 {
     point.weight / (gain * point.signal + point.within).powi(2)
 }
 
-/// Slope of V / S on S, weighted by the number of sites, over the range of S and relative to K.
+/// Slope of V / S over S, weighted by the number of sites, times the range of S and relative to K.
 fn bend(points: &[Point], gain: f64) -> f64 {
     let [slope, _] = line(
         points
             .iter()
             .map(|p| (p.weight, p.signal, p.variance / p.signal)),
     );
-    let signals = points.iter().map(|p| p.signal);
-    let [low, high] = signals.fold([f64::INFINITY, 0.0], |[low, high], s| {
-        [f64::min(low, s), f64::max(high, s)]
-    });
+    let [low, high] = points
+        .iter()
+        .map(|p| p.signal)
+        .fold([f64::INFINITY, 0.0], |[low, high], s| {
+            [f64::min(low, s), f64::max(high, s)]
+        });
     slope * (high - low) / gain
 }
 
-/// Intercept of a weighted line, and its standard error from the variance 2 (K S + …)² / n of each point.
+/// Intercept of the weighted line, and its standard error from the variance 2 (K S + …)² / n of each point.
 fn intercept(points: &[Point], gain: f64) -> [f64; 2] {
     let [slope, mean] = line(
         points
@@ -109,7 +112,7 @@ fn intercept(points: &[Point], gain: f64) -> [f64; 2] {
     [mean - slope * centre, variance.sqrt()]
 }
 
-/// Slope of y on x with weights, and the mean of y.
+/// Slope of the weighted regression of y on x, and the weighted mean of y. A point is (weight, x, y).
 fn line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> [f64; 2] {
     let [sum, x, y] = points
         .clone()
@@ -185,7 +188,7 @@ mod tests {
 
     /// The standard error is that of the scatter: V with the deviation (K S + read variance) · √(2 / n).
     #[test]
-    fn the_error_of_the_intercept_is_that_of_the_scatter() {
+    fn the_intercept_error_matches_the_scatter() {
         let mut state = 1_u64;
         let mut normal = || {
             // The sum of twelve uniform numbers.

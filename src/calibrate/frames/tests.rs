@@ -23,16 +23,16 @@ fn options(crop: Option<&str>) -> ReadOptions {
 }
 
 #[test]
-fn frames_are_cut_and_compared_with_the_first() {
+fn frames_are_cropped_and_must_match_the_first() {
     let folder = tempfile::tempdir().unwrap();
     let first = pgm(folder.path(), "first.pgm", [301, 300], 4095);
     let reader = FrameReader::open(&first, options(None)).unwrap();
     let layout = reader.layout;
     assert_eq!((layout.width, layout.height), (300, 300));
-    assert!(reader.left_out().unwrap().contains("301 × 300"));
+    assert!(reader.omission_note().unwrap().contains("301 × 300"));
     let frame = reader.read(&first).unwrap();
     assert_eq!(frame.samples.len(), 300 * 300);
-    // The second row begins at site 301.
+    // The second row starts at site 301.
     assert_eq!(frame.samples[300], 301 % 256);
     for (size, maximum, part) in [
         ([300, 300], 4095, "300 × 300 sites, but"),
@@ -49,11 +49,11 @@ fn frames_are_cut_and_compared_with_the_first() {
 }
 
 #[test]
-fn a_crop_keeps_the_pattern_and_stays_inside() {
+fn crops_must_keep_the_pattern_and_fit() {
     let folder = tempfile::tempdir().unwrap();
     let first = pgm(folder.path(), "first.pgm", [300, 310], 4095);
     let reader = FrameReader::open(&first, options(Some("4,6,256,260"))).unwrap();
-    assert_eq!(reader.left_out(), None);
+    assert_eq!(reader.omission_note(), None);
     let frame = reader.read(&first).unwrap();
     assert_eq!(frame.samples.len(), 256 * 260);
     assert_eq!(frame.samples[0], (6 * 300 + 4) % 256);
@@ -100,7 +100,7 @@ fn frames_of_another_camera_are_refused() {
     let reader = FrameReader::open(&first, options(None)).unwrap();
     assert_eq!(reader.camera(), Some("A 1"));
     reader.read(&frame("same.tif", Some("A 1"))).unwrap();
-    // A file that names no camera says nothing against it.
+    // A file without a camera name matches any camera.
     reader.read(&frame("none.tif", None)).unwrap();
     let error = reader
         .read(&frame("other.tif", Some("B 2")))

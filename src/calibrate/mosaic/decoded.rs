@@ -1,18 +1,18 @@
-//! The result of a decoder, [`Decoded`], and the errors that decoders share.
+//! Result of a decoder, [`Decoded`], and the errors of all decoders.
 
 use std::fmt;
 
-/// How the mosaic of a RAW file is exported.
+/// Advice on exporting the mosaic of a RAW file.
 pub(super) const EXPORT: &str = "export the mosaic, for example as TIFF with `dcraw -D -4 -T -t 0 FILE` (`-t 0`: not turned), or rawpy's `raw_image` as 16-bit PNG";
 
-/// The form of a file and the range of its samples.
+/// Form of a file, and the range of its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in super::super) enum MosaicForm {
-    /// A grey PNG of 16 bits.
+    /// 16-bit greyscale PNG.
     Png,
-    /// A grey TIFF of 16 bits.
+    /// 16-bit greyscale TIFF.
     Tiff,
-    /// A binary PGM with this maximum.
+    /// Binary PGM with this maximum.
     Pgm(u16),
 }
 
@@ -26,7 +26,7 @@ impl fmt::Display for MosaicForm {
     }
 }
 
-/// The frame that a decoder reads from the bytes of a file. The error is a text without the name of the file.
+/// Frame decoded from the bytes of a file. Errors of decoders are texts without the name of the file.
 pub(super) struct Decoded {
     pub(super) height: usize,
     pub(super) width: usize,
@@ -36,12 +36,12 @@ pub(super) struct Decoded {
     pub(super) taken: Option<String>,
 }
 
-/// The error for an image that a camera or a program has developed.
+/// Error for a developed image.
 pub(super) fn developed(what: &str) -> String {
     format!("{what}: a developed image holds no sensor noise; {EXPORT}")
 }
 
-/// The error for a frame with too many samples; `None` if it may be read.
+/// Error for a frame with too many samples; `None` within the limit.
 pub(super) fn too_large(width: usize, height: usize, most_pixels: u64) -> Option<String> {
     let pixels = (width as u64).saturating_mul(height as u64);
     (pixels > most_pixels).then(|| {

@@ -1,4 +1,4 @@
-//! TIFF files of one channel of 16 bits: uncompressed, LZW, deflate or PackBits, in strips or tiles.
+//! Decoder of 16-bit greyscale TIFF files: uncompressed, LZW, deflate or PackBits, in strips or tiles.
 
 use std::io::Cursor;
 
@@ -9,10 +9,10 @@ use tiff::{ColorType, TiffError};
 use super::decoded::{Decoded, EXPORT, MosaicForm, developed, too_large};
 use super::makers;
 
-/// The tag that each DNG file has (Adobe, Digital Negative Specification 1.7, DNGVersion).
+/// Tag of every DNG file (Adobe, Digital Negative Specification 1.7, DNGVersion).
 const DNG_VERSION: Tag = Tag::Unknown(50706);
 
-/// Reads a file that begins with the mark of a TIFF.
+/// Decodes a file that starts with the signature of a TIFF.
 pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> {
     let mut limits = Limits::default();
     let most_bytes = usize::try_from(most_pixels.saturating_mul(2)).unwrap_or(usize::MAX);
@@ -38,7 +38,7 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
     }
     let color = decoder.colortype().map_err(|e| not_readable(&e))?;
     if color != ColorType::Gray(16) {
-        return Err(developed(&kind(color)));
+        return Err(developed(&describe(color)));
     }
     let (width, height) = decoder.dimensions().map_err(|e| not_readable(&e))?;
     let (width, height) = (width as usize, height as usize);
@@ -79,8 +79,8 @@ fn not_readable(error: &TiffError) -> String {
     }
 }
 
-/// The kind of a TIFF in words.
-fn kind(color: ColorType) -> String {
+/// Describes the color type of a TIFF.
+fn describe(color: ColorType) -> String {
     match color {
         ColorType::Gray(bits) => format!("a grey TIFF of {bits} bits, where 16 are expected"),
         ColorType::RGB(bits) => format!("an RGB TIFF of {bits} bits"),

@@ -1,5 +1,4 @@
-//! One frame of a sensor as stored: [`Mosaic`], read from a 16-bit PNG, a TIFF or a binary PGM. The values are ADU, as they
-//! are in the file.
+//! Undeveloped frame of a sensor: [`Mosaic`], read from a 16-bit PNG, a TIFF or a binary PGM. The values are ADU, unchanged from the file.
 
 mod decoded;
 mod grey_tiff;
@@ -14,37 +13,38 @@ use crate::picture::raw_png::{RawPng, RawPngError, SampleForm};
 use crate::types::Digest;
 use decoded::{Decoded, EXPORT, MosaicForm, developed};
 
-/// A frame of a sensor: one number for each site.
+/// Frame of a sensor: one number for each site.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Mosaic {
     pub(super) height: usize,
     pub(super) width: usize,
-    /// The samples in ADU, row by row.
+    /// Samples in ADU, row by row.
     pub(super) samples: Vec<u16>,
     pub(super) facts: FrameFacts,
 }
 
-/// Properties of a frame that its file states besides the samples.
+/// Metadata of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct FrameFacts {
     pub(super) form: MosaicForm,
     /// Maker and model of the camera, if the file names them.
     pub(super) camera: Option<String>,
-    /// The date on which the frame was taken, as the file states it.
+    /// Date of the frame, as in the file.
     pub(super) taken: Option<String>,
-    /// The digest of the file.
+    /// Digest of the file.
     pub(super) digest: Digest,
 }
 
 impl Mosaic {
-    /// Reads a file of at most `most_pixels` samples. The form is known by the content, not by the name.
+    /// Reads a file of at most `most_pixels` samples. The content decides the form, not the name.
     ///
     /// # Errors
-    /// If the file is not readable, not whole, or no mosaic: RAW files of makers, several channels, 8 bits, or a palette.
+    /// If the file cannot be read, is incomplete, or is not a mosaic: a RAW file of a maker, or an image with several channels, 8 bits, or
+    /// a palette.
     pub(super) fn read(path: &Path, most_pixels: u64) -> Result<Self> {
         let bytes = reading::bytes(path)?;
-        let decoded = decode(path, &bytes, most_pixels);
-        let decoded = decoded.map_err(|problem| Error::data(path.display(), problem))?;
+        let decoded = decode(path, &bytes, most_pixels)
+            .map_err(|problem| Error::data(path.display(), problem))?;
         Ok(Self {
             height: decoded.height,
             width: decoded.width,
@@ -80,15 +80,15 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<Decoded, String
 }
 
 fn png(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> {
-    let again = |problem: String| format!("{problem}; copy or export it again");
+    let with_advice = |problem: String| format!("{problem}; copy or export it again");
     let png =
         RawPng::open(bytes, &[SampleForm::Grey16], most_pixels).map_err(|error| match error {
-            RawPngError::Broken(problem) => again(problem),
+            RawPngError::Broken(problem) => with_advice(problem),
             RawPngError::TooLarge(problem) => format!("{problem}; raise --decode max-pixels"),
             RawPngError::OtherForm(problem) => developed(&problem),
         })?;
     let (height, width) = png.size;
-    let samples = png.samples(|sample| sample).map_err(again)?;
+    let samples = png.samples(|sample| sample).map_err(with_advice)?;
     Ok(Decoded {
         height,
         width,

@@ -1,16 +1,16 @@
-//! Binary PGM files of 16 bits (Netpbm, format P5): big-endian samples behind a header of text.
+//! Decoder of 16-bit binary PGM files (Netpbm, format P5): a text header, then big-endian samples.
 
 use super::decoded::{Decoded, MosaicForm, developed, too_large};
 
-/// Reads a file that begins with `P` and a digit.
+/// Decodes a file that starts with `P` and a digit.
 pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> {
-    let kind = match bytes[1] {
+    let problem = match bytes[1] {
         b'5' => None,
         b'2' => Some("a PGM of text (P2); a binary one (P5) is read".to_owned()),
         b'3' | b'6' => Some(developed("a PPM of three channels")),
         _ => Some("a Netpbm file that is not a binary PGM (P5)".to_owned()),
     };
-    if let Some(problem) = kind {
+    if let Some(problem) = problem {
         return Err(problem);
     }
     let mut header = Header { bytes, at: 2 };
@@ -33,7 +33,7 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
             "the maximum {maximum} is above 65535, the largest of the format"
         ));
     };
-    // One white space ends the header.
+    // A single white-space character ends the header.
     let rest = bytes.get(header.at + 1..).unwrap_or_default();
     let expected = width * height * 2;
     if rest.len() != expected {
@@ -69,15 +69,15 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
     })
 }
 
-/// The header of a file, read number by number.
+/// Parser of the header of a file.
 struct Header<'a> {
     bytes: &'a [u8],
-    /// The next byte to read.
+    /// Offset of the next byte.
     at: usize,
 }
 
 impl Header<'_> {
-    /// The next number; white space and comments before it are skipped.
+    /// Parses the next number, after white space and comments.
     fn number(&mut self, name: &str) -> Result<usize, String> {
         let missing = || format!("not a readable PGM: no {name} in its header");
         loop {
@@ -92,15 +92,16 @@ impl Header<'_> {
             }
         }
         let rest = &self.bytes[self.at..];
-        // Ten digits are enough for any image that may be read.
-        let digits = rest
+        // Ten digits are enough for any supported image.
+        let length = rest
             .iter()
             .take(10)
-            .take_while(|byte| byte.is_ascii_digit());
-        let digits = &rest[..digits.count()];
-        let number = std::str::from_utf8(digits).ok();
-        let number = number.and_then(|digits| digits.parse().ok());
-        self.at += digits.len();
+            .take_while(|byte| byte.is_ascii_digit())
+            .count();
+        let number = std::str::from_utf8(&rest[..length])
+            .ok()
+            .and_then(|digits| digits.parse().ok());
+        self.at += length;
         let ends = self.bytes.get(self.at).is_some_and(u8::is_ascii_whitespace);
         number.filter(|_| ends).ok_or_else(missing)
     }

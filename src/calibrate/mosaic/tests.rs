@@ -9,7 +9,7 @@ use super::*;
 const WIDTH: usize = 5;
 const HEIGHT: usize = 3;
 
-/// Samples over the whole range, of which some differ in both bytes.
+/// Samples over the whole range; in some both bytes differ.
 fn samples() -> Vec<u16> {
     (0..WIDTH * HEIGHT).map(|i| (i * 4321) as u16 + 7).collect()
 }
@@ -57,7 +57,7 @@ fn problem(name: &str, bytes: &[u8]) -> String {
 }
 
 #[test]
-fn every_form_gives_the_same_samples() {
+fn all_forms_give_the_same_samples() {
     let big = samples()
         .iter()
         .flat_map(|s| s.to_be_bytes())
@@ -79,7 +79,7 @@ fn every_form_gives_the_same_samples() {
             "a.pgm",
             pgm("P5 # by hand\n# again\n5\t3\r\n65535 ", &samples()),
         ),
-        // The name says nothing.
+        // The name of the file does not matter.
         ("a.txt", pgm("P5 5 3 65535 ", &samples())),
     ];
     for (name, bytes) in files {
@@ -90,7 +90,7 @@ fn every_form_gives_the_same_samples() {
 }
 
 #[test]
-fn a_tiff_names_its_camera_and_date() {
+fn tiff_metadata_is_read() {
     let tags = [
         (Tag::Make, "ACME"),
         (Tag::Model, "Night 3"),
@@ -140,7 +140,7 @@ fn developed_images_are_refused() {
 }
 
 #[test]
-fn raw_files_of_makers_say_how_to_export() {
+fn raw_files_are_refused_with_advice() {
     let dng_version = (Tag::Unknown(50706), "1.4");
     let dng = tiff(Compression::Uncompressed, &[dng_version]);
     for (name, bytes, kind) in [
@@ -227,9 +227,9 @@ fn broken_files_are_refused() {
     }
 }
 
-/// A damaged or a large PNG is not called developed, and the limit is the one that was set.
+/// They are not called developed, and the error names the limit.
 #[test]
-fn a_damaged_or_large_png_is_named_as_such() {
+fn damaged_and_large_pngs_have_their_own_errors() {
     let big: Vec<u8> = samples().iter().flat_map(|s| s.to_be_bytes()).collect();
     let small = png(png::ColorType::Grayscale, png::BitDepth::Sixteen, &big);
     let mut large = Vec::new();
@@ -251,7 +251,7 @@ fn a_damaged_or_large_png_is_named_as_such() {
             100_000_000,
             "10001 × 10000 pixels are more than the 100000000 that are read; raise",
         ),
-        // It may be read now, and has no samples.
+        // It is within the limit now, but has no samples.
         (&large, 200_000_000, "not a whole PNG"),
     ] {
         let problem = decode(Path::new("a.png"), bytes, most_pixels);
@@ -261,9 +261,9 @@ fn a_damaged_or_large_png_is_named_as_such() {
     }
 }
 
-/// Every part of a file that is cut is an error, and no byte of a header makes the reader panic.
+/// Every truncated file is an error, and no changed byte of a header causes a panic.
 #[test]
-fn no_cut_and_no_changed_byte_panics() {
+fn truncated_and_changed_files_do_not_panic() {
     let big = samples()
         .iter()
         .flat_map(|s| s.to_be_bytes())
@@ -281,7 +281,7 @@ fn no_cut_and_no_changed_byte_panics() {
         ),
     ] {
         for end in 0..bytes.len() {
-            // A TIFF may end with bytes that no tag needs.
+            // A TIFF may end with bytes that no tag refers to.
             if let Ok(found) = decoded(name, &bytes[..end]) {
                 assert_eq!(found.samples, samples(), "{name}, cut at {end}");
             }

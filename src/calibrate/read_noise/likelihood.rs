@@ -1,4 +1,4 @@
-//! The log-likelihood of residuals for a Tukey-λ distribution that is rounded to whole codes: [`Likelihood`].
+//! Log-likelihood of residuals under a Tukey-λ distribution rounded to integer codes: [`Likelihood`].
 
 use std::cell::RefCell;
 
@@ -6,17 +6,17 @@ use super::super::sums::{Residuals, STEPS};
 use super::simplex::{self, Start};
 use super::tukey::TukeyTable;
 
-/// Least probability of a residual (chosen). It is far below that of any residual that the distribution makes, and lets single
-/// samples of another origin, such as cosmic rays, count for little.
-const LEAST_PROBABILITY: f64 = 1e-12;
+/// Minimum probability of a residual (chosen). It is far below the probability of any residual of the distribution, and limits the effect
+/// of outliers such as cosmic rays.
+const MIN_PROBABILITY: f64 = 1e-12;
 
-/// Range of λ that is searched. Below −½ the variance is infinite; 1 is the uniform distribution.
+/// Search range of λ. Below −½ the variance is infinite; 1 is the uniform distribution.
 const SHAPES: [f64; 2] = [-0.49, 1.0];
 
-/// Step of the derivatives in λ and in ln σ_TL (chosen: the table of the distribution is linear between points that are nearer).
+/// Step of the numerical derivatives in λ and in ln σ_TL (chosen larger than the spacing of the table, which is interpolated linearly).
 const DERIVATIVE_STEP: f64 = 2e-3;
 
-/// Residuals by size, in ADU and ascending, with their counts: a distribution symmetric about 0 knows no sign.
+/// Absolute residuals in ADU, in ascending order, with their counts: the distribution is symmetric around 0.
 #[derive(Debug, Clone)]
 pub(super) struct Folded(Vec<(f64, f64)>);
 
@@ -35,12 +35,16 @@ impl Folded {
                 _ => folded.push((steps, count)),
             }
         }
-        let adu = |(steps, count): (i64, u64)| (steps as f64 / STEPS as f64, count as f64);
-        Self(folded.into_iter().map(adu).collect())
+        Self(
+            folded
+                .into_iter()
+                .map(|(steps, count)| (steps as f64 / STEPS as f64, count as f64))
+                .collect(),
+        )
     }
 }
 
-/// The likelihood of some residuals.
+/// Likelihood of residuals.
 pub(super) struct Likelihood {
     residuals: Folded,
     count: f64,
@@ -56,17 +60,22 @@ impl Likelihood {
         }
     }
 
-    /// λ and ln σ_TL of the greatest likelihood.
+    /// Finds λ and ln σ_TL of maximum likelihood.
     ///
     /// # Errors
-    /// If all residuals are equal, or the search ends at an end of the range of λ.
-    pub(super) fn greatest(&self) -> Result<[f64; 2], String> {
-        let squares = self.residuals.0.iter().map(|(size, n)| n * size * size);
-        let deviation = (squares.sum::<f64>() / self.count.max(1.0)).sqrt();
+    /// If all residuals are 0, or the search ends at a limit of the range of λ.
+    pub(super) fn maximize(&self) -> Result<[f64; 2], String> {
+        let squares: f64 = self
+            .residuals
+            .0
+            .iter()
+            .map(|(size, n)| n * size * size)
+            .sum();
+        let deviation = (squares / self.count.max(1.0)).sqrt();
         if deviation <= 0.0 || self.count <= 0.0 {
             return Err("bias frames without any noise".to_owned());
         }
-        // The deviation of a distribution of scale 1 is 1.8 at λ = 0.
+        // The standard deviation of the distribution with scale 1 is 1.8 at λ = 0.
         let log_scale = libm::log(deviation / 1.8);
         let loss = |[shape, log_scale]: [f64; 2]| {
             if !(SHAPES[0]..=SHAPES[1]).contains(&shape) {
@@ -74,14 +83,14 @@ impl Likelihood {
             }
             -self.log_likelihood(&self.residuals, [shape, log_scale]) / self.count
         };
-        let from = |shape: f64| {
+        let search_from = |shape: f64| {
             let start = Start {
                 at: [shape, log_scale],
                 step: [0.05, 0.1],
             };
             simplex::minimize(start, &loss)
         };
-        let (first, second) = (from(-0.1), from(0.1));
+        let (first, second) = (search_from(-0.1), search_from(0.1));
         let best = if first.1 <= second.1 {
             first.0
         } else {
@@ -97,7 +106,7 @@ impl Likelihood {
         Ok(best)
     }
 
-    /// The derivatives of the log-likelihood of some of the residuals by λ and ln σ_TL.
+    /// Derivatives of the log-likelihood of some of the residuals with respect to λ and ln σ_TL.
     pub(super) fn score(&self, residuals: &Folded, [shape, log_scale]: [f64; 2]) -> [f64; 2] {
         let h = DERIVATIVE_STEP;
         let slope = |[x, y]: [f64; 2]| {
@@ -108,7 +117,7 @@ impl Likelihood {
         [slope([h, 0.0]), slope([0.0, h])]
     }
 
-    /// The second derivatives of the log-likelihood of all residuals.
+    /// Second derivatives of the log-likelihood of all residuals.
     pub(super) fn curvature(&self, at: [f64; 2]) -> [[f64; 2]; 2] {
         let h = DERIVATIVE_STEP;
         let slope = |x: f64, y: f64| self.score(&self.residuals, [at[0] + x, at[1] + y]);
@@ -122,18 +131,18 @@ impl Likelihood {
         ]
     }
 
-    /// The log-likelihood of residuals. A code stands for all values within ½ of it.
+    /// Log-likelihood of residuals. A code represents all values within ½ of it.
     fn log_likelihood(&self, residuals: &Folded, [shape, log_scale]: [f64; 2]) -> f64 {
         let mut table = self.table.borrow_mut();
         table.set_shape(shape);
         let scale = libm::exp(log_scale);
         let (mut inner, mut outer) = (table.falling(), table.falling());
-        // Places from 0 to ½ rise to 0 from below when mirrored, before all others fall.
+        // Residuals below ½ need the distribution above 0: mirror it, in the descending order that the reader requires.
         let mut mirrored: Vec<f64> = Vec::new();
-        let small = residuals.0.iter().take_while(|(size, _)| *size < 0.5);
-        let mut rising = table.falling();
-        for (size, _) in small.collect::<Vec<_>>().into_iter().rev() {
-            mirrored.push(1.0 - rising.at((size - 0.5) / scale));
+        let small = residuals.0.partition_point(|(size, _)| *size < 0.5);
+        let mut mirrored_reader = table.falling();
+        for (size, _) in residuals.0[..small].iter().rev() {
+            mirrored.push(1.0 - mirrored_reader.at((size - 0.5) / scale));
         }
         let mut mirrored = mirrored.into_iter().rev();
         residuals
@@ -146,7 +155,7 @@ impl Likelihood {
                     inner.at((0.5 - size) / scale)
                 };
                 let probability = above - outer.at((-0.5 - size) / scale);
-                count * libm::log(probability.max(LEAST_PROBABILITY))
+                count * libm::log(probability.max(MIN_PROBABILITY))
             })
             .sum()
     }

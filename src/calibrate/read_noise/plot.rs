@@ -1,13 +1,13 @@
-//! The fit of read noise by its probability plot: [`plot_fit`].
+//! Fit of read noise by the probability plot: [`plot_fit`].
 
 use serde::Serialize;
 
 use super::super::sums::{Residuals, STEPS};
 
-/// Range of λ that is searched.
+/// Search range of λ.
 const SHAPES: [f64; 2] = [-0.4, 0.5];
 
-/// Read noise by the probability plot.
+/// Read noise fitted by the probability plot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(crate) struct PlotFit {
     /// Shape λ.
@@ -16,10 +16,10 @@ pub(crate) struct PlotFit {
     pub scale: f64,
 }
 
-/// The shape whose quantiles correlate best with the sorted residuals, and the slope of the plot as the scale (Wei et al. 2021,
-/// section 3.2; Filliben 1975). It takes the rounding of codes for noise.
+/// Fits the shape whose quantiles correlate best with the sorted residuals; the slope of the plot is the scale (Wei et al. 2021, section
+/// 3.2; Filliben 1975). The rounding of codes counts as noise.
 ///
-/// Equal residuals fill an interval of probability; they stand at the mean quantile of that interval.
+/// Equal residuals fill an interval of probability; each is plotted at the mean quantile of that interval.
 pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
     let counts = residuals.counts();
     let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();
@@ -31,7 +31,7 @@ pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
             / total.max(1.0)
     };
     let centre = mean(1);
-    // The mean of quantile times residual.
+    // Mean of the product of quantile and residual.
     let product = |shape: f64| {
         let (mut below, mut sum) = (0.0, 0.0);
         let mut integral_below = integral(0.0, shape);
@@ -44,14 +44,14 @@ pub(in super::super) fn plot_fit(residuals: &Residuals) -> PlotFit {
         sum
     };
     let correlation = |shape: f64| product(shape) / variance(shape).sqrt();
-    let shape = golden(SHAPES, &correlation);
+    let shape = golden_section(SHAPES, &correlation);
     PlotFit {
         shape,
         scale: product(shape) / variance(shape),
     }
 }
 
-/// The integral of the quantile function Q from 0 to u: Σ ±(u^(λ+1)) / (λ(λ + 1)) up to a constant.
+/// Integral of the quantile function Q from 0 to u: Σ ±(u^(λ+1)) / (λ(λ + 1)) up to a constant.
 fn integral(u: f64, shape: f64) -> f64 {
     let part = |u: f64| {
         if u <= 0.0 {
@@ -67,13 +67,13 @@ fn integral(u: f64, shape: f64) -> f64 {
     (part(u) + part(1.0 - u)) / (shape + 1.0)
 }
 
-/// The variance of a distribution of scale 1: 2/λ² · (1/(2λ + 1) − Γ(λ + 1)²/Γ(2λ + 2)), and π²/3 at λ = 0.
+/// Variance of the distribution with scale 1: 2/λ² · (1/(2λ + 1) − Γ(λ + 1)²/Γ(2λ + 2)), and π²/3 at λ = 0.
 fn variance(shape: f64) -> f64 {
     let exact = |shape: f64| {
         let gamma = 2.0 * libm::lgamma(shape + 1.0) - libm::lgamma(2.0 * shape + 2.0);
         2.0 / (shape * shape) * (1.0 / (2.0 * shape + 1.0) - libm::exp(gamma))
     };
-    // Near 0 the difference cancels, and the variance is linear to 10⁻⁶ of itself.
+    // Near 0 the difference suffers from cancellation; the variance is linear there, with a relative error of 10⁻⁶.
     let near = 1e-3;
     if shape.abs() >= near {
         return exact(shape);
@@ -82,8 +82,8 @@ fn variance(shape: f64) -> f64 {
     below + (above - below) * (shape + near) / (2.0 * near)
 }
 
-/// The place of the greatest value of a function with one peak in a range, by the golden section.
-fn golden([mut low, mut high]: [f64; 2], function: &impl Fn(f64) -> f64) -> f64 {
+/// Finds the maximum of a unimodal function in a range by golden-section search; returns its argument.
+fn golden_section([mut low, mut high]: [f64; 2], function: &impl Fn(f64) -> f64) -> f64 {
     let ratio = (5.0_f64.sqrt() - 1.0) / 2.0;
     let inner = |low: f64, high: f64| [high - ratio * (high - low), low + ratio * (high - low)];
     let [mut a, mut b] = inner(low, high);

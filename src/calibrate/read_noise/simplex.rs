@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn finds_the_minimum_and_stays_out_of_excluded_points() {
+    fn finds_the_minimum_outside_excluded_points() {
         // Rosenbrock's valley has its minimum, 0, at (1, 1).
         let valley = |[x, y]: [f64; 2]| (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2);
         let start = Start {

@@ -4,7 +4,7 @@ use crate::calibrate::layout::{Cfa, Layout};
 use crate::calibrate::sums::{Centres, PlaneSums, STEPS};
 use darkqa_light::draws::tukey_lambda;
 
-/// Residuals of a frame of 512 × 512 sites whose noise has these quantiles, in an order that looks random.
+/// Residuals of a frame of 512 × 512 sites whose noise has these quantiles, in pseudorandom order.
 fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {
     let layout = Layout {
         cfa: Cfa::Mono,
@@ -14,10 +14,10 @@ fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {
     let sites = layout.height * layout.width;
     let samples: Vec<u16> = (0..sites)
         .map(|site| {
-            // Multiples of the golden ratio fill the interval evenly; rows begin elsewhere.
+            // Multiples of the golden ratio fill the interval evenly; each row starts at another one.
             let place = (site as f64 + seed as f64 * 0.37) * 0.618_033_988_749_894_9;
             let u = (place.fract() * (1.0 - 1e-9) + 5e-10).clamp(1e-9, 1.0 - 1e-9);
-            // Row noise: the fractions of the centres of rows differ.
+            // Row noise: the fractional parts of the row centres differ.
             let row = 3.0 * (site as f64 / 512.0).floor() * 0.754_877_666_246_692_8;
             (511.3 + row % 2.0 + scale * tukey_lambda(u, shape) + 0.5).floor() as u16
         })
@@ -28,7 +28,7 @@ fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {
 }
 
 #[test]
-fn shape_and_scale_come_back_whatever_the_rounding() {
+fn shape_and_scale_are_recovered_despite_rounding() {
     for (shape, scale) in [
         (0.1143, 0.59),
         (0.0, 1.2),
@@ -43,9 +43,9 @@ fn shape_and_scale_come_back_whatever_the_rounding() {
     }
 }
 
-/// The probability plot takes rounding for noise, which is what likelihood is for: at a scale of 0.6 ADU it is some 5 % off.
+/// The probability plot counts rounding as noise, unlike the likelihood: at a scale of 0.6 ADU it is about 5 % off.
 #[test]
-fn the_probability_plot_takes_rounding_for_noise() {
+fn the_probability_plot_counts_rounding_as_noise() {
     let coarse = plot_fit(&residuals(0.1143, 0.59, 1));
     let error = coarse.scale / 0.59 - 1.0;
     assert!((0.04..0.07).contains(&error), "{error}");
@@ -54,9 +54,9 @@ fn the_probability_plot_takes_rounding_for_noise() {
     assert!((fine.scale / 8.0 - 1.0).abs() < 0.004, "{}", fine.scale);
 }
 
-/// One step of Newton's method from the fit of all groups goes where a fit of the group alone goes.
+/// One step of Newton's method from the fit of all groups approximates a fit of one group.
 #[test]
-fn a_resample_is_the_fit_of_its_groups() {
+fn a_resample_matches_a_fit_of_its_groups() {
     let groups = [residuals(0.0, 2.0, 1), residuals(0.02, 2.1, 2)];
     let both = ReadNoise::fit(&groups).unwrap();
     let first = ReadNoise::fit(&groups[..1]).unwrap();
@@ -67,16 +67,16 @@ fn a_resample_is_the_fit_of_its_groups() {
         first.shape
     );
     assert!((log_scale - first.log_scale).abs() < 4e-3, "{log_scale}");
-    // All groups once are the fit itself.
+    // Equal weights give the fit itself.
     let [shape, log_scale] = both.resampled(&[1.0, 1.0]);
     assert!((shape - both.shape).abs() < 1e-4 && (log_scale - both.log_scale).abs() < 1e-4);
-    // The control: the groups differ by more than that.
+    // Control: the groups differ by more than the tolerance.
     assert!((first.shape - both.shape).abs() > 5e-3);
 }
 
-/// Single samples of another origin, such as cosmic rays, move little.
+/// For example samples hit by cosmic rays.
 #[test]
-fn single_wild_samples_count_for_little() {
+fn outliers_have_little_effect() {
     let clean = residuals(0.1143, 0.59, 1);
     let fit = ReadNoise::fit(std::slice::from_ref(&clean)).unwrap();
     let mut spoiled = clean;

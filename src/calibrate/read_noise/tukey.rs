@@ -1,25 +1,24 @@
-//! The distribution function of Tukey's λ distribution, which has a closed form for its inverse alone: [`TukeyTable`].
+//! Cumulative distribution function of Tukey's λ distribution, by a table: [`TukeyTable`]. Only its inverse has a closed form.
 
-/// Points of the table from the smallest probability to ½ (chosen, with the range: the error of a probability is below 10⁻⁵ of
-/// itself).
+/// Number of points of the table from the smallest probability to ½ (chosen with the range for relative errors below 10⁻⁵).
 const POINTS: usize = 3001;
 
-/// The logit of the smallest probability of the table, which is 2.8 · 10⁻¹⁰.
-const SMALLEST: f64 = -22.0;
+/// Logit of the smallest probability of the table, 2.8 · 10⁻¹⁰.
+const MIN_LOGIT: f64 = -22.0;
 
-/// The lower half of the distribution: probabilities at even steps of their logit.
+/// Lower half of the distribution: probabilities with equally spaced logits, and their quantiles.
 #[derive(Debug, Clone)]
 pub(super) struct TukeyTable {
     probabilities: Vec<f64>,
     /// ln u and ln(1 − u) of each probability u.
     logarithms: Vec<[f64; 2]>,
-    /// Quantiles of the last λ.
+    /// Quantiles for the current λ.
     quantiles: Vec<f64>,
 }
 
 impl TukeyTable {
     pub(super) fn new() -> Self {
-        let logits = (0..POINTS).map(|i| SMALLEST * (1.0 - i as f64 / (POINTS - 1) as f64));
+        let logits = (0..POINTS).map(|i| MIN_LOGIT * (1.0 - i as f64 / (POINTS - 1) as f64));
         let logarithms: Vec<[f64; 2]> = logits
             // u = 1 / (1 + e^−t)
             .map(|t| [t - libm::log1p(libm::exp(t)), -libm::log1p(libm::exp(t))])
@@ -31,7 +30,7 @@ impl TukeyTable {
         }
     }
 
-    /// Sets the shape λ for what follows.
+    /// Sets the shape λ.
     pub(super) fn set_shape(&mut self, shape: f64) {
         for (quantile, [below, above]) in self.quantiles.iter_mut().zip(&self.logarithms) {
             *quantile = if shape == 0.0 {
@@ -42,7 +41,7 @@ impl TukeyTable {
         }
     }
 
-    /// A reader of the distribution function of scale 1 at falling places.
+    /// Reader of the distribution function with scale 1 at descending arguments.
     pub(super) fn falling(&self) -> Falling<'_> {
         Falling {
             table: self,
@@ -51,22 +50,22 @@ impl TukeyTable {
     }
 }
 
-/// Reader of the distribution function at places of which each is at most the one before.
+/// Reader of the distribution function at descending arguments.
 pub(super) struct Falling<'a> {
     table: &'a TukeyTable,
-    /// A point of the table whose quantile is above, or at, all places that follow.
+    /// Index of a point whose quantile is not below any further argument.
     above: usize,
 }
 
 impl Falling<'_> {
-    /// The probability below `place`, which is at most 0. Beyond the table it is 0.
-    pub(super) fn at(&mut self, place: f64) -> f64 {
+    /// Probability of values below `x`, which must be at most 0 and at most the previous argument. It is 0 below the table.
+    pub(super) fn at(&mut self, x: f64) -> f64 {
         let TukeyTable {
             quantiles,
             probabilities,
             ..
         } = self.table;
-        while self.above > 0 && quantiles[self.above - 1] > place {
+        while self.above > 0 && quantiles[self.above - 1] > x {
             self.above -= 1;
         }
         if self.above == 0 {
@@ -75,7 +74,7 @@ impl Falling<'_> {
         let [low, high] = [self.above - 1, self.above];
         let width = quantiles[high] - quantiles[low];
         let share = if width > 0.0 {
-            ((place - quantiles[low]) / width).min(1.0)
+            ((x - quantiles[low]) / width).min(1.0)
         } else {
             0.0
         };

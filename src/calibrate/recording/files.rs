@@ -1,25 +1,28 @@
-//! The frames of a recording by setting and exposure: [`Recording`], [`SettingFiles`], [`ExposureFiles`].
+//! Frames of a recording by setting and exposure: [`Recording`], [`SettingFiles`], [`ExposureFiles`].
 
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Least number of bias frames of a setting, and least number of exposures of flats, each with a pair.
-pub(in super::super) const LEAST: [usize; 2] = [2, 3];
+/// Minimum number of bias frames of a setting.
+pub(super) const MIN_BIAS_FRAMES: usize = 2;
 
-/// The name of the list of frames.
+/// Minimum number of exposures of a setting, each with a pair of flats.
+pub(in super::super) const MIN_EXPOSURES: usize = 3;
+
+/// Name of the list of frames.
 pub(super) const TABLE: &str = "frames.csv";
 
 /// All frames of a camera.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Recording {
-    /// The settings, in the order of the last numbers in their names, then of the names.
+    /// Settings, sorted by the last number in their names, then by name.
     pub(in super::super) settings: Vec<SettingFiles>,
-    /// Lines about files and folders that are left out.
+    /// Notes on files and folders that are left out.
     pub(in super::super) notes: Vec<String>,
 }
 
-/// The frames of one setting of the camera's gain, such as ISO 800.
+/// Frames of one setting of the camera's gain, such as ISO 800.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(in super::super) struct SettingFiles {
     pub(in super::super) name: String,
@@ -31,22 +34,22 @@ pub(in super::super) struct SettingFiles {
     pub(in super::super) white: Vec<PathBuf>,
 }
 
-/// The frames of one exposure.
+/// Frames of one exposure.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(in super::super) struct ExposureFiles {
     pub(in super::super) name: String,
-    /// Evenly lit frames; the first and the second are a pair, and so on.
+    /// Evenly lit frames, in consecutive pairs.
     pub(in super::super) flats: Vec<PathBuf>,
     /// Frames of the same exposure without light.
     pub(in super::super) dark: Vec<PathBuf>,
 }
 
 impl SettingFiles {
-    /// The last number in the name, as 800 in `a7s2-iso800`; `None` if there is none.
+    /// Last number in the name, such as 800 in `a7s2-iso800`; `None` without a number.
     pub(in super::super) fn number(&self) -> Option<f64> {
         let end = self.name.rfind(|c: char| c.is_ascii_digit())? + 1;
         let start = self.name[..end].rfind(|c: char| !c.is_ascii_digit() && c != '.');
-        // A character before the number may have several bytes.
+        // The character before the number may have several bytes.
         let before =
             start.and_then(|start| Some(start + self.name[start..].chars().next()?.len_utf8()));
         self.name[before.unwrap_or(0)..end]
@@ -55,8 +58,8 @@ impl SettingFiles {
             .ok()
     }
 
-    /// The exposure of this name, which is added if it is new.
-    pub(super) fn exposure(&mut self, name: &str) -> &mut ExposureFiles {
+    /// Exposure of this name; adds it if it is new.
+    pub(super) fn exposure_mut(&mut self, name: &str) -> &mut ExposureFiles {
         let known = self.exposures.iter().position(|known| known.name == name);
         let index = known.unwrap_or(self.exposures.len());
         if known.is_none() {
@@ -67,10 +70,11 @@ impl SettingFiles {
         }
         &mut self.exposures[index]
     }
-}
 
-impl SettingFiles {
-    /// Takes out flats without a partner, and checks that enough frames are left.
+    /// Removes flats without a partner, single dark frames, and exposures without flats, with notes.
+    ///
+    /// # Errors
+    /// If too few frames are left.
     pub(super) fn pair_up(&mut self, folder: &Path, notes: &mut Vec<String>) -> Result<()> {
         let place = folder.join(&self.name);
         for exposure in &mut self.exposures {
@@ -98,14 +102,12 @@ impl SettingFiles {
             }
         }
         self.exposures.retain(|exposure| !exposure.flats.is_empty());
-        let [bias, exposures] = LEAST;
-        let found = [self.bias.len(), self.exposures.len()];
-        if found[0] < bias || found[1] < exposures {
+        let (bias, exposures) = (self.bias.len(), self.exposures.len());
+        if bias < MIN_BIAS_FRAMES || exposures < MIN_EXPOSURES {
             return Err(Error::data(
                 place.display(),
                 format_args!(
-                    "{} bias frames and {} exposures with a pair of flats; at least {bias} and {exposures} are needed, 10 bias frames and 5 exposures of 2 pairs are better",
-                    found[0], found[1]
+                    "{bias} bias frames and {exposures} exposures with a pair of flats; at least {MIN_BIAS_FRAMES} and {MIN_EXPOSURES} are needed, 10 bias frames and 5 exposures of 2 pairs are better"
                 ),
             ));
         }

@@ -1,5 +1,5 @@
-//! A recording in folders: a folder a setting, in it `bias`, `flat-NAME` for each exposure, and, where they exist, `dark-NAME`
-//! of the same exposures and `white`.
+//! Recording in folders: one folder for each setting, with the subfolders `bias`, `flat-NAME` for each exposure, and optionally `dark-NAME`
+//! for the same exposures and `white`.
 
 use std::path::{Path, PathBuf};
 
@@ -8,11 +8,11 @@ use super::order::by_numbers;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 
-/// How the folders are named.
+/// Names of the subfolders of a setting, for messages.
 const NAMES: &str =
     "bias/, flat-NAME/ for each exposure, and if you have them dark-NAME/ and white/";
 
-/// Finds the frames of a folder. Files and folders with other names are left out, and named.
+/// Finds the frames in a folder. Files and folders with other names are left out, with a note.
 pub(super) fn read(folder: &Path) -> Result<Recording> {
     let mut recording = Recording {
         settings: Vec::new(),
@@ -38,7 +38,7 @@ pub(super) fn read(folder: &Path) -> Result<Recording> {
     Ok(recording)
 }
 
-/// The frames of a setting.
+/// Finds the frames of a setting.
 fn setting(folder: &Path, notes: &mut Vec<String>) -> Result<SettingFiles> {
     let mut setting = SettingFiles {
         name: name(folder),
@@ -46,7 +46,7 @@ fn setting(folder: &Path, notes: &mut Vec<String>) -> Result<SettingFiles> {
     };
     let mut found = 0;
     for path in visible(folder)? {
-        let Some(frames) = place_of(&mut setting, &path) else {
+        let Some(frames) = frames_mut(&mut setting, &path) else {
             let problem = format!("none of {NAMES}; left out");
             notes.push(format!("{}: {problem}", path.display()));
             continue;
@@ -61,22 +61,22 @@ fn setting(folder: &Path, notes: &mut Vec<String>) -> Result<SettingFiles> {
     Ok(setting)
 }
 
-/// Where the frames of a folder belong; `None` for a file or a folder with another name.
-fn place_of<'a>(setting: &'a mut SettingFiles, path: &Path) -> Option<&'a mut Vec<PathBuf>> {
+/// List for the frames of a subfolder, by its name; `None` for a file or another name.
+fn frames_mut<'a>(setting: &'a mut SettingFiles, path: &Path) -> Option<&'a mut Vec<PathBuf>> {
     let kind = name(path);
     if !path.is_dir() {
         return None;
     }
     match (kind.strip_prefix("flat-"), kind.strip_prefix("dark-")) {
-        (Some(exposure), _) => Some(&mut setting.exposure(exposure).flats),
-        (_, Some(exposure)) => Some(&mut setting.exposure(exposure).dark),
+        (Some(exposure), _) => Some(&mut setting.exposure_mut(exposure).flats),
+        (_, Some(exposure)) => Some(&mut setting.exposure_mut(exposure).dark),
         _ if kind == "bias" => Some(&mut setting.bias),
         _ if kind == "white" => Some(&mut setting.white),
         _ => None,
     }
 }
 
-/// The files and folders in a folder in the order of their names, without hidden ones.
+/// Files and folders in a folder, sorted by name, without hidden ones.
 fn visible(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut paths = entries(folder)?;
     paths.retain(|path| !name(path).starts_with('.'));
@@ -85,6 +85,8 @@ fn visible(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 fn name(path: &Path) -> String {
-    let name = path.file_name().unwrap_or_default();
-    name.to_string_lossy().into_owned()
+    path.file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
 }

@@ -1,4 +1,4 @@
-//! The files of a recording, by setting and exposure: [`Recording`], found in folders or listed in `frames.csv`.
+//! Files of a recording, by setting and exposure: [`Recording`], from folders or from the list `frames.csv`.
 
 mod files;
 mod folders;
@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 use crate::error::Result;
 pub(crate) use files::Recording;
 use files::TABLE;
-pub(super) use files::{ExposureFiles, LEAST, SettingFiles};
+pub(super) use files::{ExposureFiles, MIN_EXPOSURES, SettingFiles};
 use order::by_numbers;
 
 impl Recording {
-    /// Finds the frames of a folder: by its `frames.csv` if it has one, else by the names of the folders in it.
+    /// Finds the frames of a recording: from the list `frames.csv` if it exists, otherwise by the names of subfolders.
     ///
     /// # Errors
     /// If the folder cannot be read, or a setting has too few frames.
@@ -27,8 +27,9 @@ impl Recording {
         };
         recording.settings.sort_by(|a, b| {
             let number = |setting: &SettingFiles| setting.number().unwrap_or(f64::INFINITY);
-            let by_number = number(a).total_cmp(&number(b));
-            by_number.then_with(|| by_numbers(&a.name, &b.name))
+            number(a)
+                .total_cmp(&number(b))
+                .then_with(|| by_numbers(&a.name, &b.name))
         });
         for setting in &mut recording.settings {
             setting.pair_up(folder, &mut recording.notes)?;
@@ -36,13 +37,12 @@ impl Recording {
         Ok(recording)
     }
 
-    /// The first frame: the first bias frame of the first setting.
+    /// First bias frame of the first setting.
     pub(super) fn first(&self) -> &Path {
-        let first = self
-            .settings
+        self.settings
             .iter()
-            .find_map(|setting| setting.bias.first());
-        first.map_or(Path::new(""), PathBuf::as_path)
+            .find_map(|setting| setting.bias.first())
+            .map_or(Path::new(""), PathBuf::as_path)
     }
 
     /// Number of settings.

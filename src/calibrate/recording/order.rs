@@ -1,9 +1,9 @@
-//! The order of names with numbers in them: [`by_numbers`].
+//! Natural sort order of names with numbers: [`by_numbers`].
 
 use std::cmp::Ordering;
 
-/// Compares names as people number them: `2.tif` comes before `10.tif`. Runs of digits are compared by value, all else by text.
-/// Names that differ in leading zeros alone are in the order of their texts.
+/// Compares names in natural order: `2.tif` comes before `10.tif`. Runs of digits are compared by value, other characters as text. Names
+/// that differ only in leading zeros are compared as text.
 pub(super) fn by_numbers(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);
     while !left.is_empty() && !right.is_empty() {
@@ -21,14 +21,14 @@ pub(super) fn by_numbers(a: &str, b: &str) -> Ordering {
     (left.len(), a).cmp(&(right.len(), b))
 }
 
-/// The run of digits, or of other characters, that a name begins with, and the rest.
+/// Splits a name after its first run of digits or of other characters.
 fn split(name: &str) -> (&str, &str) {
     let begins_with_digit = name.starts_with(|c: char| c.is_ascii_digit());
     let end = name.find(|c: char| c.is_ascii_digit() != begins_with_digit);
     name.split_at(end.unwrap_or(name.len()))
 }
 
-/// The digits of a run without leading zeros, by whose number and text values are compared; `None` for other characters.
+/// Digits of a run without leading zeros; `None` for other characters. Their number and then their text give the order of values.
 fn value(run: &str) -> Option<&str> {
     let is_number = run.starts_with(|c: char| c.is_ascii_digit());
     is_number.then(|| run.trim_start_matches('0'))

@@ -1,4 +1,4 @@
-//! A recording listed in `frames.csv`, with the columns `file`, `setting`, `kind` and `exposure`.
+//! Recording listed in `frames.csv`, with the columns `file`, `setting`, `kind` and `exposure`.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use super::files::{Recording, SettingFiles};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// A line of the list.
+/// Row of the list.
 #[derive(Deserialize)]
-struct Line {
-    /// Path of the frame from the folder of the list.
+struct FrameRow {
+    /// Path of the frame, relative to the folder of the list.
     file: String,
     setting: String,
     kind: FrameKind,
@@ -29,18 +29,18 @@ enum FrameKind {
     White,
 }
 
-/// Reads the list of a folder.
+/// Reads a list of frames in `folder`.
 pub(super) fn read(folder: &Path, list: &Path) -> Result<Recording> {
     let bytes = reading::bytes(list)?;
     let mut reader = csv::ReaderBuilder::new();
     let mut reader = reader.trim(csv::Trim::All).from_reader(&*bytes);
     let mut settings: Vec<SettingFiles> = Vec::new();
-    // The heads are line 1.
-    for (number, line) in (2..).zip(reader.deserialize::<Line>()) {
+    // The header is line 1.
+    for (number, line) in (2..).zip(reader.deserialize::<FrameRow>()) {
         let line = line.map_err(|e| {
             let problem = format!(
                 "{}; columns file, setting, kind (bias, flat, dark or white) and exposure expected",
-                plain(&e)
+                message_without_position(&e)
             );
             Error::line(list, number, problem)
         })?;
@@ -66,8 +66,8 @@ pub(super) fn read(folder: &Path, list: &Path) -> Result<Recording> {
         match line.kind {
             FrameKind::Bias => setting.bias.push(path),
             FrameKind::White => setting.white.push(path),
-            FrameKind::Flat => setting.exposure(&line.exposure).flats.push(path),
-            FrameKind::Dark => setting.exposure(&line.exposure).dark.push(path),
+            FrameKind::Flat => setting.exposure_mut(&line.exposure).flats.push(path),
+            FrameKind::Dark => setting.exposure_mut(&line.exposure).dark.push(path),
         }
     }
     if settings.is_empty() {
@@ -79,8 +79,8 @@ pub(super) fn read(folder: &Path, list: &Path) -> Result<Recording> {
     })
 }
 
-/// The error of a line without the position that the parser adds.
-fn plain(error: &csv::Error) -> String {
+/// Message of a parse error, without the position that the parser adds.
+fn message_without_position(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::Deserialize { err, .. } => err.kind().to_string(),
         _ => error.to_string(),

@@ -2,7 +2,7 @@ use std::fs;
 
 use super::*;
 
-/// A folder with empty files of these names.
+/// Creates a folder with empty files of these names.
 fn folder(files: &[&str]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for file in files {
@@ -13,7 +13,7 @@ fn folder(files: &[&str]) -> tempfile::TempDir {
     folder
 }
 
-/// The files of a setting with 2 bias frames and 3 exposures of a pair.
+/// Files of a setting with 2 bias frames and 3 exposures of one pair.
 fn least(setting: &str) -> Vec<String> {
     let bias = (0..2).map(|i| format!("{setting}/bias/{i}.png"));
     let flats = (1..4).flat_map(|e| (0..2).map(move |i| format!("{setting}/flat-{e}/{i}.png")));
@@ -47,9 +47,9 @@ fn settings_are_ordered_by_number() {
     assert!(recording.first().ends_with("iso100/bias/0.png"));
 }
 
-/// The last number of a name counts, so that the number of a model does not.
+/// The number of a camera model before it is ignored.
 #[test]
-fn the_last_number_of_a_name_is_that_of_the_setting() {
+fn the_last_number_of_a_name_counts() {
     for (name, number) in [
         ("a7s2-iso800", Some(800.0)),
         ("ISO1600", Some(1600.0)),
@@ -75,7 +75,7 @@ fn the_last_number_of_a_name_is_that_of_the_setting() {
     );
 }
 
-/// Frames are in pairs as they were taken, with leading zeros or without.
+/// Frames are paired in the order of recording, with or without leading zeros.
 #[test]
 fn frames_are_ordered_by_number() {
     let mut files = least("iso100");
@@ -96,7 +96,7 @@ fn frames_are_ordered_by_number() {
 }
 
 #[test]
-fn odd_flats_and_strange_names_are_left_out_and_named() {
+fn odd_flats_and_unknown_names_are_noted() {
     let mut files = least("iso100");
     files.extend(
         [
@@ -169,7 +169,7 @@ w0,100,white,
 ";
 
 #[test]
-fn a_list_names_the_frames() {
+fn frames_can_be_listed() {
     let folder = folder(&[
         "b0", "b1", "f0", "f1", "f2", "f3", "f4", "f5", "d0", "d1", "w0",
     ]);

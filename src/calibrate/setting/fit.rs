@@ -1,4 +1,4 @@
-//! The measurement of one setting: [`SettingFit`].
+//! Results of one setting: [`SettingFit`].
 
 use serde::Serialize;
 
@@ -23,28 +23,28 @@ pub(crate) struct SettingFit {
     pub read_scale: Measured,
     /// Shape λ of the read noise.
     pub read_shape: Measured,
-    /// The same two by the probability plot, which takes rounding for noise.
+    /// Read noise by the probability plot, which counts rounding as noise.
     pub plot: PlotFit,
     /// Standard deviation σ_r of the row noise, in ADU.
     pub row_deviation: Measured,
-    /// Mean codes of the planes of bias frames, the black level included, in the order R, G1, G2, B.
+    /// Mean codes of the planes of bias frames, including the black level, in the order R, G1, G2, B.
     pub offsets: Vec<Measured>,
     /// Standard deviation of the noise within rows, in ADU.
     pub read_deviation: f64,
     pub hot_pixels: usize,
-    /// K of each plane alone; `None` where all its light is out of range.
+    /// K of each plane alone; `None` if all its light is out of range.
     pub gain_by_plane: Vec<Option<f64>>,
-    /// How much variance / signal changes over the range of light, as a share of K.
+    /// Change of variance / signal over the range of light, relative to K.
     pub bend: f64,
-    /// Variance at no light of a line that need not pass through 0, in ADU². Its error is that of the noise of the sites: a few pairs
-    /// of flats tell too little of it.
+    /// Intercept of the photon transfer line: its variance without light, in ADU². Its error comes from the noise of the sites, because a
+    /// few pairs of flats are too few for a bootstrap.
     pub intercept: Measured,
-    /// Points of the figures.
+    /// Points for the figures.
     #[serde(skip)]
     pub figure: FigurePoints,
 }
 
-/// Frames of a setting that were used.
+/// Numbers of used frames of a setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(crate) struct FrameCounts {
     pub bias: usize,
@@ -52,11 +52,11 @@ pub(crate) struct FrameCounts {
     pub flat_pairs: usize,
 }
 
-/// Points of a setting in figures.
+/// Points of a setting for the figures.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct FigurePoints {
     /// Signal in ADU and variance in ADU² of each exposure and plane.
     pub transfer: Vec<[f64; 2]>,
-    /// Quantile of the fitted distribution of scale 1, and the residual there over the fitted scale.
+    /// Quantiles of the fitted distribution with scale 1, and the residuals there relative to the fitted scale.
     pub plot: Vec<[f64; 2]>,
 }

@@ -1,4 +1,4 @@
-//! One setting of the camera's gain, measured: [`SettingFit`].
+//! Measurement of one setting of the camera's gain: [`SettingFit`].
 
 mod doubts;
 mod errors;
@@ -16,34 +16,37 @@ use errors::Errors;
 pub(super) use fit::{FigurePoints, FrameCounts};
 pub(crate) use fit::{Measured, SettingFit};
 
-/// Points of the probability plot of a setting (chosen).
+/// Number of points in the probability plot of a setting (chosen).
 const PLOT_POINTS: usize = 61;
 
-/// The inputs of every setting's measurement.
-pub(super) struct Measuring<'a> {
+/// Inputs of the measurement that all settings share.
+pub(super) struct MeasureContext<'a> {
     pub(super) reader: &'a FrameReader,
-    /// The code of white.
+    /// Code of white.
     pub(super) white: u16,
     pub(super) inputs: &'a mut Inputs,
-    /// Doubts about the recording.
+    /// Warnings so far.
     pub(super) warnings: &'a mut Vec<String>,
 }
 
 /// Measures a setting.
 ///
 /// # Errors
-/// If a frame cannot be read, or a check refuses the recording.
-pub(super) fn measure(files: &SettingFiles, with: &mut Measuring<'_>) -> Result<SettingFit> {
+/// If a frame cannot be read, or a check fails.
+pub(super) fn measure(
+    files: &SettingFiles,
+    context: &mut MeasureContext<'_>,
+) -> Result<SettingFit> {
     let refused = |problem: String| Error::data(&files.name, problem);
     let mut notes = Vec::new();
-    let bias = BiasFit::measure(with.reader, files, with.inputs, &mut notes)?;
+    let bias = BiasFit::measure(context.reader, files, context.inputs, &mut notes)?;
     let ones = vec![1.0; bias.groups()];
     let (offsets, noise) = (bias.offsets(&ones), bias.noise(&ones));
     let highest = offsets.iter().copied().fold(0.0, f64::max);
-    if highest >= f64::from(with.white) {
+    if highest >= f64::from(context.white) {
         return Err(refused(format!(
             "bias frames of {highest:.0} ADU are not below white, {}; see --white and the folders white/",
-            with.white
+            context.white
         )));
     }
     let base = Base {
@@ -51,29 +54,36 @@ pub(super) fn measure(files: &SettingFiles, with: &mut Measuring<'_>) -> Result<
         within: noise.within,
     };
     let settings = FlatSettings {
-        white: with.white,
+        white: context.white,
         hot: &bias.hot,
     };
-    let flats = Flats::measure(with.reader, files, settings, base, with.inputs, &mut notes)?;
+    let flats = Flats::measure(
+        context.reader,
+        files,
+        settings,
+        base,
+        context.inputs,
+        &mut notes,
+    )?;
     let fit = fit(&files.name, &bias, &flats, base);
-    let width = with.reader.layout.width;
-    notes.extend(doubts::setting_doubts(&fit, flats.have_dark(), width).map_err(refused)?);
-    let named = notes
-        .into_iter()
-        .map(|note| format!("{}: {note}", files.name));
-    with.warnings.extend(named);
+    let width = context.reader.layout.width;
+    notes.extend(doubts::setting_doubts(&fit, flats.have_dark_frames(), width).map_err(refused)?);
+    context.warnings.extend(
+        notes
+            .into_iter()
+            .map(|note| format!("{}: {note}", files.name)),
+    );
     Ok(fit)
 }
 
-/// The numbers of a setting with their errors.
+/// Fits a setting, and estimates the standard errors.
 fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit {
     let noise = bias.noise(&vec![1.0; bias.groups()]);
     let points = flats.points(base, &vec![1.0; flats.pairs()]);
     let transfer = Transfer::fit(&points, base.offsets.len());
-    let errors = Errors::draw(bias, flats);
+    let errors = Errors::estimate(bias, flats);
     let measured = |value: f64, error: Option<f64>| Measured { value, error };
     let scale = bias.widened * libm::exp(bias.read.log_scale);
-    let offsets = base.offsets.iter().zip(&errors.offsets);
     SettingFit {
         name: name.to_owned(),
         frames: FrameCounts {
@@ -86,7 +96,10 @@ fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit 
         read_shape: measured(bias.read.shape, errors.shape),
         plot: bias.plot,
         row_deviation: measured(noise.row_deviation(), errors.row),
-        offsets: offsets
+        offsets: base
+            .offsets
+            .iter()
+            .zip(&errors.offsets)
             .map(|(offset, error)| measured(*offset, *error))
             .collect(),
         read_deviation: noise.within.sqrt(),
@@ -103,21 +116,23 @@ fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit 
 
 /// Mean signal and variance of each exposure and plane.
 fn means_by_plane(points: &[Point]) -> Vec<[f64; 2]> {
-    let groups = points.chunk_by(|a, b| (a.exposure, a.plane) == (b.exposure, b.plane));
-    let mean = |group: &[Point]| {
-        let [sum, signal, variance] = group.iter().fold([0.0; 3], |[sum, signal, variance], p| {
-            [
-                sum + p.weight,
-                signal + p.weight * p.signal,
-                variance + p.weight * p.variance,
-            ]
-        });
-        [signal / sum, variance / sum]
-    };
-    groups.map(mean).collect()
+    points
+        .chunk_by(|a, b| (a.exposure, a.plane) == (b.exposure, b.plane))
+        .map(|group| {
+            let [sum, signal, variance] =
+                group.iter().fold([0.0; 3], |[sum, signal, variance], p| {
+                    [
+                        sum + p.weight,
+                        signal + p.weight * p.signal,
+                        variance + p.weight * p.variance,
+                    ]
+                });
+            [signal / sum, variance / sum]
+        })
+        .collect()
 }
 
-/// Points of the probability plot at even steps of the logit of probability, from a sample in a million to as many less.
+/// Points of the probability plot at equally spaced logits of the probability, up to one sample in a million at either end.
 fn plot_points(bias: &BiasFit) -> Vec<[f64; 2]> {
     let counts = bias.residuals.counts();
     let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();

@@ -6,7 +6,7 @@ use super::super::hot_pixels::HotPixels;
 use super::super::layout::Layout;
 use super::gather;
 
-/// Sums of the samples of a frame by part of a row, without hot pixels.
+/// Sums of the samples of a frame for each part of a row, without hot pixels.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in super::super) struct PlaneSums {
     layout: Layout,
@@ -16,20 +16,20 @@ pub(in super::super) struct PlaneSums {
 
 impl PlaneSums {
     pub(in super::super) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
-        let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
-        let rows = parts.map_init(Vec::new, |part, plane_row| {
-            gather(layout, samples, plane_row, part);
-            let sum: u64 = part.iter().map(|sample| u64::from(*sample)).sum();
-            hot.columns(plane_row)
-                .map(|column| part[column])
-                .fold([part.len() as u64, sum], |[count, sum], sample| {
-                    [count - 1, sum - u64::from(sample)]
-                })
-        });
-        Self {
-            layout,
-            rows: rows.collect(),
-        }
+        let rows = (0..layout.plane_rows())
+            .into_par_iter()
+            .with_min_len(64)
+            .map_init(Vec::new, |part, plane_row| {
+                gather(layout, samples, plane_row, part);
+                let sum: u64 = part.iter().map(|sample| u64::from(*sample)).sum();
+                hot.columns(plane_row)
+                    .map(|column| part[column])
+                    .fold([part.len() as u64, sum], |[count, sum], sample| {
+                        [count - 1, sum - u64::from(sample)]
+                    })
+            })
+            .collect();
+        Self { layout, rows }
     }
 
     /// Number and sum of the samples of each part of a row.
@@ -50,27 +50,29 @@ impl PlaneSums {
     }
 }
 
-/// The greatest code of each plane of a frame, and how many samples have it.
+/// Maximum code of each plane of a frame, with its number of samples.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in super::super) struct TopCode {
-    /// For each plane: number of samples, greatest code, and number of samples with this code.
+    /// For each plane: number of samples, maximum code, and number of samples with this code.
     pub(in super::super) planes: Vec<(u64, u16, u64)>,
 }
 
 impl TopCode {
     pub(in super::super) fn new(layout: Layout, samples: &[u16], hot: &HotPixels) -> Self {
-        let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
-        let rows = parts.map_init(Vec::new, |part, plane_row| {
-            gather(layout, samples, plane_row, part);
-            for (removed, column) in hot.columns(plane_row).enumerate() {
-                // Each removal moves the columns behind it by one.
-                part.remove(column - removed);
-            }
-            let top = part.iter().copied().max().unwrap_or(0);
-            let with_it = part.iter().filter(|sample| **sample == top).count();
-            (part.len() as u64, top, with_it as u64)
-        });
-        let rows: Vec<(u64, u16, u64)> = rows.collect();
+        let rows: Vec<(u64, u16, u64)> = (0..layout.plane_rows())
+            .into_par_iter()
+            .with_min_len(64)
+            .map_init(Vec::new, |part, plane_row| {
+                gather(layout, samples, plane_row, part);
+                for (removed, column) in hot.columns(plane_row).enumerate() {
+                    // Each removal shifts the following columns by one.
+                    part.remove(column - removed);
+                }
+                let top = part.iter().copied().max().unwrap_or(0);
+                let with_it = part.iter().filter(|sample| **sample == top).count();
+                (part.len() as u64, top, with_it as u64)
+            })
+            .collect();
         let mut planes = vec![(0, 0, 0); layout.cfa.planes()];
         for (plane_row, (count, top, with_it)) in rows.into_iter().enumerate() {
             let [row, parity] = layout.place(plane_row);
@@ -86,8 +88,8 @@ impl TopCode {
         Self { planes }
     }
 
-    /// The greatest code of the frame.
-    pub(in super::super) fn greatest(&self) -> u16 {
+    /// Maximum code of the frame.
+    pub(in super::super) fn max(&self) -> u16 {
         self.planes
             .iter()
             .map(|(_, code, _)| *code)
@@ -95,7 +97,7 @@ impl TopCode {
             .unwrap_or(0)
     }
 
-    /// The plane with the largest share of samples at its greatest code: this share, and the code.
+    /// Largest share of the samples of a plane at its maximum code, and this code.
     pub(in super::super) fn largest_share(&self) -> (f64, u16) {
         self.planes
             .iter()
@@ -105,8 +107,8 @@ impl TopCode {
             })
             .fold(
                 (0.0, 0),
-                |most, plane| {
-                    if plane.0 > most.0 { plane } else { most }
+                |max, plane| {
+                    if plane.0 > max.0 { plane } else { max }
                 },
             )
     }
@@ -125,7 +127,7 @@ mod tests {
     const SAMPLES: [u16; 12] = [1, 10, 2, 10, 3, 10, 5, 7, 5, 7, 9, 8];
 
     #[test]
-    fn planes_are_summed_apart() {
+    fn planes_are_summed_separately() {
         let sums = PlaneSums::new(LAYOUT, &SAMPLES, &HotPixels::none(4));
         assert_eq!(sums.planes(), [[3, 6], [3, 30], [3, 19], [3, 22]]);
         let hot = HotPixels::new(vec![vec![0, 2], vec![], vec![1], vec![]]);
@@ -134,10 +136,10 @@ mod tests {
     }
 
     #[test]
-    fn samples_at_the_greatest_code_are_counted() {
+    fn samples_at_the_maximum_are_counted() {
         let top = TopCode::new(LAYOUT, &SAMPLES, &HotPixels::none(4));
         assert_eq!(top.planes, [(3, 3, 1), (3, 10, 3), (3, 9, 1), (3, 8, 1)]);
-        assert_eq!((top.greatest(), top.largest_share()), (10, (1.0, 10)));
+        assert_eq!((top.max(), top.largest_share()), (10, (1.0, 10)));
         let hot = HotPixels::new(vec![vec![], vec![0, 1], vec![2], vec![]]);
         let top = TopCode::new(LAYOUT, &SAMPLES, &hot);
         assert_eq!(top.planes, [(3, 3, 1), (1, 10, 1), (2, 5, 2), (3, 8, 1)]);

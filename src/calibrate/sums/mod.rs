@@ -1,4 +1,4 @@
-//! Sums over frames, all of whole numbers: they are exact, and the same in any order and on any number of threads.
+//! Sums over frames as integers, which are exact, so that the result does not depend on the order or the number of threads.
 
 mod frame;
 mod pair;
@@ -10,7 +10,7 @@ pub(super) use residuals::{Centres, Residuals, STEPS};
 
 use super::layout::Layout;
 
-/// Samples of the part of a row that belongs to one plane.
+/// Copies the samples of a part of a row to `part`.
 fn gather(layout: Layout, samples: &[u16], plane_row: usize, part: &mut Vec<u16>) {
     let [row, parity] = layout.place(plane_row);
     let row = &samples[row * layout.width..][..layout.width];

@@ -1,7 +1,7 @@
-//! Sums of the difference of two frames of one exposure: [`PairSums`].
+//! Sums over the difference of two frames of one exposure: [`PairSums`].
 //!
-//! A difference removes everything that stands still: fixed pattern, response of the sites, fall-off of light. The light of two
-//! flats is never quite equal. So the products of A and B are kept, from which the difference at equal light follows.
+//! A difference removes everything that is constant: fixed pattern, response of the sites, fall-off of light. The light of two flats is
+//! never exactly equal, so the sums of products of A and B are stored, which give the difference for any ratio of light.
 
 mod neighbours;
 mod scatter;
@@ -15,14 +15,14 @@ pub(in super::super) use neighbours::NeighbourSums;
 use neighbours::RowNeighbours;
 use scatter::{Products, Scatter};
 
-/// Sums of two frames A and B by part of a row and tile, without hot pixels.
+/// Sums over two frames A and B for each part of a row and tile, without hot pixels.
 #[derive(Debug)]
 pub(in super::super) struct PairSums {
     layout: Layout,
     rows: Vec<PairRow>,
 }
 
-/// Sums of the part of a row that belongs to one plane.
+/// Sums of a part of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct PairRow {
     tiles: [Cell; TILES],
@@ -48,9 +48,9 @@ pub(in super::super) struct TileSums {
     pub(in super::super) count: f64,
     /// Sums of A and of B, in ADU.
     pub(in super::super) sums: [f64; 2],
-    /// Products about the means of the parts of rows in the tile: fall-off, and row noise, are not in them.
+    /// Products around the means of the parts of rows in the tile, without fall-off and row noise.
     pub(in super::super) scatter: Scatter,
-    /// Degrees of freedom of `scatter`: the number of sites less that of the parts of rows.
+    /// Degrees of freedom of `scatter`: the number of sites minus the number of parts of rows.
     pub(in super::super) free: f64,
 }
 
@@ -60,26 +60,26 @@ impl TileSums {
         (self.sums[0] + self.sums[1]) / self.count / 2.0
     }
 
-    /// Variance of one frame without row noise, in ADU², where the light of A is `ratio` times that of B.
+    /// Variance of one frame without row noise, in ADU², if the light of A is `ratio` times the light of B.
     ///
-    /// A and B · ratio have equal light, so that their difference D has neither fall-off nor the response of the sites. With light S
-    /// of B its variance is K · ratio · S + ratio² · K · S = 2 ratio · K · S̄, where S̄ is the mean light of both.
+    /// A and B · ratio have equal light, so that their difference D has neither fall-off nor the response of the sites. If S is the light
+    /// of B, the variance of D is K · ratio · S + ratio² · K · S = 2 ratio · K · S̄, where S̄ is the mean light of both.
     pub(in super::super) fn variance(&self, ratio: f64) -> f64 {
         self.scatter.squared_difference(ratio) / self.free / (2.0 * ratio)
     }
 }
 
-/// Noise of a pair without the noise of light.
+/// Noise of a pair of frames without light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct PairNoise {
     /// Variance of one frame within its rows, in ADU².
     pub(in super::super) within: f64,
-    /// Variance of the row noise, in ADU²; may be below 0 by chance.
+    /// Variance of the row noise, in ADU²; may be negative by chance.
     pub(in super::super) row: f64,
 }
 
 impl PairNoise {
-    /// Standard deviation of the row noise in ADU; 0 if chance has made the variance negative.
+    /// Standard deviation of the row noise in ADU; 0 if the variance is negative by chance.
     pub(in super::super) fn row_deviation(self) -> f64 {
         self.row.max(0.0).sqrt()
     }
@@ -87,27 +87,30 @@ impl PairNoise {
 
 impl PairSums {
     pub(in super::super) fn new(layout: Layout, [a, b]: [&[u16]; 2], hot: &HotPixels) -> Self {
-        let parts = (0..layout.plane_rows()).into_par_iter().with_min_len(64);
-        let rows = parts.map_init(
-            || [Vec::new(), Vec::new()],
-            |[part_a, part_b], plane_row| {
-                gather(layout, a, plane_row, part_a);
-                gather(layout, b, plane_row, part_b);
-                PairRow::new(part_a, part_b, hot.columns(plane_row))
-            },
-        );
-        Self {
-            layout,
-            rows: rows.collect(),
-        }
+        let rows = (0..layout.plane_rows())
+            .into_par_iter()
+            .with_min_len(64)
+            .map_init(
+                || [Vec::new(), Vec::new()],
+                |[part_a, part_b], plane_row| {
+                    gather(layout, a, plane_row, part_a);
+                    gather(layout, b, plane_row, part_b);
+                    PairRow::new(part_a, part_b, hot.columns(plane_row))
+                },
+            )
+            .collect();
+        Self { layout, rows }
     }
 
-    /// Means of A and of B, over all planes alike.
+    /// Means of A and of B over all sites.
     pub(in super::super) fn means(&self) -> [f64; 2] {
-        let cells = self.rows.iter().flat_map(|row| row.tiles);
-        let [n, a, b] = cells.fold([0; 3], |[n, a, b], cell| {
-            [n + cell.count, a + cell.a, b + cell.b]
-        });
+        let [n, a, b] = self
+            .rows
+            .iter()
+            .flat_map(|row| row.tiles)
+            .fold([0; 3], |[n, a, b], cell| {
+                [n + cell.count, a + cell.a, b + cell.b]
+            });
         [a, b].map(|sum| sum as f64 / n as f64)
     }
 
@@ -115,28 +118,29 @@ impl PairSums {
     fn plane_means(&self) -> Vec<f64> {
         let planes = self.layout.cfa.planes();
         let mut sums = vec![(0_u64, 0_i64); planes];
-        for (plane, row) in self.by_plane() {
+        for (plane, row) in self.rows_with_planes() {
             for cell in &row.tiles {
                 sums[plane].0 += cell.count;
                 sums[plane].1 += cell.difference();
             }
         }
-        let mean = |(count, sum): (u64, i64)| sum as f64 / count.max(1) as f64;
-        sums.into_iter().map(mean).collect()
+        sums.into_iter()
+            .map(|(count, sum)| sum as f64 / count.max(1) as f64)
+            .collect()
     }
 
     /// Parts of rows with their planes.
-    fn by_plane(&self) -> impl Iterator<Item = (usize, &PairRow)> {
+    fn rows_with_planes(&self) -> impl Iterator<Item = (usize, &PairRow)> {
         self.rows.iter().enumerate().map(|(plane_row, row)| {
             let [at, parity] = self.layout.place(plane_row);
             (self.layout.cfa.plane(at, parity), row)
         })
     }
 
-    /// Read noise and row noise of one frame, where the pair has no light.
+    /// Read noise and row noise of one frame, for a pair without light.
     ///
-    /// D is A − B without the means of its planes, m the mean of a whole sensor row of D. The variance within rows is
-    /// Σ(D − m)² / (2 · degrees of freedom). The row noise is var(m) / 2 less the share of the sites, within / width.
+    /// D is A − B minus the means of its planes, and m is the mean of D over a sensor row. The variance within rows is
+    /// Σ(D − m)² / (2 · degrees of freedom). The row noise is var(m) / 2 minus the contribution of the sites, within / width.
     pub(in super::super) fn noise(&self) -> PairNoise {
         let step = self.layout.cfa.step();
         let plane_means = self.plane_means();
@@ -158,7 +162,7 @@ impl PairSums {
                 of_means += mean * mean;
             }
         }
-        // The means of the planes that share a row are one number less than their row means leave free.
+        // Degrees of freedom that the plane means take in addition to the row means.
         let planes = (self.layout.cfa.planes() - step) as f64;
         let within = within / (count - rows - planes) / 2.0;
         let of_means = of_means / (rows - step as f64) / 2.0;
@@ -168,10 +172,10 @@ impl PairSums {
         }
     }
 
-    /// Products of neighbours in the rows of each plane.
+    /// Sums over neighbours in the rows of each plane.
     pub(in super::super) fn neighbours(&self) -> NeighbourSums {
         let mut sums = NeighbourSums::none(self.layout.cfa.planes());
-        for (plane, row) in self.by_plane() {
+        for (plane, row) in self.rows_with_planes() {
             let whole = row.whole();
             if whole.count < 2 || row.neighbours.count == 0 {
                 continue;
@@ -183,7 +187,7 @@ impl PairSums {
         sums
     }
 
-    /// Light and noise of all tiles of all planes; tiles without two sites in a row are left out.
+    /// Light and noise of all tiles of all planes, except tiles with fewer than two sites in every row.
     pub(in super::super) fn tiles(&self) -> Vec<TileSums> {
         let mut tiles = vec![TileSums::default(); self.layout.cfa.planes() * TILES * TILES];
         for (plane_row, row) in self.rows.iter().enumerate() {
@@ -208,6 +212,20 @@ impl PairSums {
 }
 
 impl Cell {
+    /// Computes the sums of the sites of both frames in a tile and row.
+    fn new(a: &[u16], b: &[u16]) -> Self {
+        let mut cell = Self {
+            count: a.len() as u64,
+            ..Self::default()
+        };
+        for (a, b) in a.iter().zip(b) {
+            cell.a += u64::from(*a);
+            cell.b += u64::from(*b);
+            cell.products.add(*a, *b);
+        }
+        cell
+    }
+
     /// Sum of A − B.
     fn difference(&self) -> i64 {
         self.a as i64 - self.b as i64
@@ -221,19 +239,19 @@ impl Cell {
         [n, sum - n * mean, squares]
     }
 
-    /// Products about the means of A and of B.
+    /// Products around the means of A and of B.
     fn scatter(&self) -> Scatter {
         self.products.about_means(self.count, [self.a, self.b])
     }
 }
 
 impl PairRow {
-    /// Sums of the samples of both frames in a part of a row, without its hot columns.
+    /// Computes the sums of a part of a row, without its hot columns.
     fn new(a: &[u16], b: &[u16], hot: impl Iterator<Item = usize>) -> Self {
         let mut row = Self::default();
         for (tile, cell) in row.tiles.iter_mut().enumerate() {
             let columns = Layout::tile(a.len(), tile);
-            *cell = cell_of(&a[columns.clone()], &b[columns]);
+            *cell = Cell::new(&a[columns.clone()], &b[columns]);
         }
         row.neighbours = RowNeighbours::new(a, b);
         let site = |column: usize| [a[column], b[column]];
@@ -245,7 +263,7 @@ impl PairRow {
             cell.a -= u64::from(a[column]);
             cell.b -= u64::from(b[column]);
             cell.products.remove(a[column], b[column]);
-            // The two pairs of neighbours that the column is in, each once.
+            // Remove the two pairs of neighbours with this column, each only once.
             for left in column.saturating_sub(1)..=column {
                 let is_new = last.is_none_or(|last| left > last);
                 if is_new && left + 1 < a.len() {
@@ -257,7 +275,7 @@ impl PairRow {
         row
     }
 
-    /// Sums of the whole part of the row.
+    /// Sums over all tiles.
     fn whole(&self) -> Cell {
         self.tiles.iter().fold(Cell::default(), |mut whole, cell| {
             whole.count += cell.count;
@@ -277,19 +295,6 @@ impl PairRow {
                 std::array::from_fn(|i| sums[i] + cell[i])
             })
     }
-}
-
-fn cell_of(a: &[u16], b: &[u16]) -> Cell {
-    let mut cell = Cell {
-        count: a.len() as u64,
-        ..Cell::default()
-    };
-    for (a, b) in a.iter().zip(b) {
-        cell.a += u64::from(*a);
-        cell.b += u64::from(*b);
-        cell.products.add(*a, *b);
-    }
-    cell
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Histograms of bias frames without offsets and row noise: [`Residuals`].
+//! Histogram of bias frames after removing offsets and row noise: [`Residuals`].
 
 use std::collections::BTreeMap;
 
@@ -8,29 +8,29 @@ use super::super::hot_pixels::HotPixels;
 use super::super::layout::Layout;
 use super::{PlaneSums, gather};
 
-/// Steps of a residual in an ADU (chosen). Codes are whole and centres are not: their difference is rounded to this step.
+/// Number of histogram steps in an ADU (chosen). Codes are integers but centres are not: residuals are rounded to steps.
 pub(in super::super) const STEPS: i64 = 32;
 
-/// Residuals up to this many ADU are counted in a list, larger ones in a map (chosen: far beyond read noise).
+/// Maximum residual in ADU that is counted in a list; larger ones are counted in a map (chosen far beyond read noise).
 const WINDOW: i64 = 512;
 
-/// Samples that a thread counts before it adds up its list (chosen).
-const SAMPLES_AT_ONCE: usize = 1 << 20;
+/// Number of samples that a thread counts into one histogram (chosen).
+const SAMPLES_PER_PART: usize = 1 << 20;
 
-/// The centres from which the codes of a frame deviate.
+/// Centres to subtract from the codes of a frame.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) enum Centres<'a> {
-    /// The mean of the plane and of the row, both of the frame itself.
+    /// Means of the planes and rows of the frame itself.
     RowsAndPlanes,
-    /// The mean of all frames at each site, and of the row of the rest: this takes off a fixed pattern.
+    /// Mean of all frames at each site, then the row means of the differences. This removes a fixed pattern.
     MeanFrame {
-        /// The sum of all frames at each site.
+        /// Sum of all frames at each site.
         sums: &'a [u32],
         frames: f64,
     },
 }
 
-/// How many samples have each residual, in steps of an ADU.
+/// Histogram of residuals, in steps of 1 / [`STEPS`] ADU.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in super::super) struct Residuals {
     /// Counts from −`WINDOW` to `WINDOW`.
@@ -48,7 +48,7 @@ impl Default for Residuals {
 }
 
 impl Residuals {
-    /// The residuals of a frame. `sums` are those of the same frame without the same hot pixels.
+    /// Computes the residuals of a frame. `sums` must be the sums of the same frame without the same hot pixels.
     pub(in super::super) fn new(
         layout: Layout,
         samples: &[u16],
@@ -56,7 +56,7 @@ impl Residuals {
         hot: &HotPixels,
         centres: Centres<'_>,
     ) -> Self {
-        let rows_at_once = (SAMPLES_AT_ONCE / layout.width).max(1);
+        let rows_at_once = (SAMPLES_PER_PART / layout.width).max(1);
         let plane_means: Vec<f64> = sums
             .planes()
             .into_iter()
@@ -89,7 +89,7 @@ impl Residuals {
         sum
     }
 
-    /// Counts a residual, in steps.
+    /// Counts one residual, in steps.
     pub(in super::super) fn count(&mut self, steps: i64) {
         let index = usize::try_from(steps + WINDOW * STEPS).ok();
         match index.and_then(|index| self.near.get_mut(index)) {
@@ -98,7 +98,7 @@ impl Residuals {
         }
     }
 
-    /// Adds the counts of others.
+    /// Adds another histogram.
     pub(in super::super) fn add(&mut self, other: &Self) {
         for (count, more) in self.near.iter_mut().zip(&other.near) {
             *count += more;
@@ -108,7 +108,7 @@ impl Residuals {
         }
     }
 
-    /// The residuals that occur, in steps and in ascending order, with their counts.
+    /// All residuals in steps, in ascending order, with their counts.
     pub(in super::super) fn counts(&self) -> Vec<(i64, u64)> {
         let mut all: Vec<(i64, u64)> = (-WINDOW * STEPS..)
             .zip(self.near.iter().copied())
@@ -120,7 +120,7 @@ impl Residuals {
     }
 }
 
-/// Everything that the rows of a frame share.
+/// Inputs for the residuals of all rows of a frame.
 struct Counter<'a> {
     layout: Layout,
     samples: &'a [u16],
@@ -134,14 +134,19 @@ impl Counter<'_> {
     /// Counts the residuals of a sensor row.
     fn count(&self, row: usize, part: &mut Vec<u16>, residuals: &mut Residuals) {
         match self.centres {
-            Centres::RowsAndPlanes => self.about_planes(row, part, residuals),
+            Centres::RowsAndPlanes => self.count_around_planes(row, part, residuals),
             Centres::MeanFrame { sums, frames } => {
-                self.about_mean_frame(row, &sums[row * self.layout.width..], frames, residuals);
+                self.count_around_mean_frame(
+                    row,
+                    &sums[row * self.layout.width..],
+                    frames,
+                    residuals,
+                );
             }
         }
     }
 
-    fn about_planes(&self, row: usize, part: &mut Vec<u16>, residuals: &mut Residuals) {
+    fn count_around_planes(&self, row: usize, part: &mut Vec<u16>, residuals: &mut Residuals) {
         let step = self.layout.cfa.step();
         let parts = row * step..(row + 1) * step;
         let mean = |plane_row: usize| {
@@ -167,7 +172,13 @@ impl Counter<'_> {
         }
     }
 
-    fn about_mean_frame(&self, row: usize, sums: &[u32], frames: f64, residuals: &mut Residuals) {
+    fn count_around_mean_frame(
+        &self,
+        row: usize,
+        sums: &[u32],
+        frames: f64,
+        residuals: &mut Residuals,
+    ) {
         let Layout { width, cfa, .. } = self.layout;
         let codes = &self.samples[row * width..][..width];
         let mut is_used = vec![true; width];
@@ -194,7 +205,7 @@ impl Counter<'_> {
     }
 }
 
-/// An ADU value in whole steps.
+/// Rounds an ADU value to steps.
 fn steps(adu: f64) -> i64 {
     (adu * STEPS as f64).round() as i64
 }
@@ -217,7 +228,7 @@ mod tests {
 
     /// Offsets of planes and of rows leave nothing behind.
     #[test]
-    fn offsets_are_taken_off() {
+    fn offsets_are_subtracted() {
         let none = HotPixels::none(4);
         let flat = [10, 20, 10, 20, 30, 40, 30, 40];
         assert_eq!(residuals(&flat, &none, Centres::RowsAndPlanes), [(0, 8)]);
@@ -231,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_frame_takes_off_its_pattern() {
+    fn a_mean_frame_removes_the_pattern() {
         let none = HotPixels::none(4);
         let pattern = [10, 25, 17, 20, 30, 40, 33, 48];
         let sums: Vec<u32> = pattern.iter().map(|code| 16 * u32::from(*code)).collect();
@@ -254,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn far_residuals_are_counted_too() {
+    fn distant_residuals_are_counted() {
         let mut frame = [100; 8];
         frame[7] = 60_100;
         let found = residuals(&frame, &HotPixels::none(4), Centres::RowsAndPlanes);

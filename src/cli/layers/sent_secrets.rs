@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::layered_value::LayeredValue;
-use crate::ask::{BaseUrl, OPENAI_KEY, own_variables};
+use crate::ask::{BaseUrl, OPENAI_KEY, vendor_variables};
 use crate::error::{Error, Result};
 use crate::types::flags::spelled;
 
@@ -117,7 +117,7 @@ fn hosts(values: &BTreeMap<String, &LayeredValue>) -> impl Iterator<Item = Vec<&
         .filter_map(|flag| values.get(flag))
         .flat_map(|value| &value.values)
         .filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok())
-        .map(|url| own_variables(url.host()))
+        .map(|url| vendor_variables(url.host()))
 }
 
 /// Whether one of these addresses is of another machine, and of no known vendor.
@@ -126,7 +126,7 @@ fn goes_elsewhere(addresses: &LayeredValue) -> bool {
         .values
         .iter()
         .filter_map(|text| text.to_str()?.parse::<BaseUrl>().ok())
-        .any(|url| !url.is_loopback() && own_variables(url.host()).is_empty())
+        .any(|url| !url.is_loopback() && vendor_variables(url.host()).is_empty())
 }
 
 /// Whether a file lies in the folder of the file of flags or below it, links followed. One that is not there is refused later.

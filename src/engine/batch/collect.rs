@@ -173,7 +173,7 @@ impl<D: Detail> Driver<'_, D> {
         }
         let (lines, replies) = (lines.len() as u64, replies.len() as u64);
         let (counts, requests) = (batch.counts, keys.len() as u64);
-        let is_counted = counts.is_stated();
+        let is_counted = counts.is_known();
         let problem = match batch.state {
             BatchState::Completed if is_counted && counts.done < requests => format!(
                 "the server counts {} of {requests} requests of a batch that is completed",
@@ -211,7 +211,7 @@ impl<D: Detail> Driver<'_, D> {
         let has_ended = *looks >= most;
         let name = self.part(part).name.clone();
         let text = format!("{name}: batch {}: {problem}", batch.id);
-        let states_nothing = !batch.counts.is_stated();
+        let states_nothing = !batch.counts.is_known();
         // A file that is named and could not be fetched may hold paid replies.
         let has_output = batch.output_file.is_none() || self.fetched(part)[0].exists();
         let is_without_work = states_nothing && has_output && batch.state != BatchState::Completed;

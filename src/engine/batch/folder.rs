@@ -207,6 +207,6 @@ fn address(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
     if let Some(same) = same {
         return Ok(Some(same));
     }
-    access.check_address_of_run(&base.parse()?)?;
+    access.check_run_address(&base.parse()?)?;
     Ok(Some(base.to_owned()))
 }

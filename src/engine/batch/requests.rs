@@ -98,7 +98,8 @@ impl<'a, I: Item> Requests<'a, I> {
             let model = &under_test.model;
             let (id, query) = (trial.key.to_string(), trial.item.query());
             let message = trial.prompt.message(&stimulus.images);
-            let line = model.batch_line(&id, &self.urls[trial.model], message, query.choices());
+            let line =
+                model.batch_line(&id, &self.urls[trial.model], message, query.choice_count());
             let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
                 continue;
             };

@@ -272,7 +272,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                 dollars: dollars.map(|dollars| money.prices.batch * dollars),
                 most_dollars: request
                     .as_ref()
-                    .map(|request| money.prices.batch * request.most()),
+                    .map(|request| money.prices.batch * request.max_cost()),
                 bound: request.map(|request| request.current_bound()),
             }
         };

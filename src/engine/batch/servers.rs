@@ -104,7 +104,7 @@ impl Servers {
 /// If a header value has characters that HTTP does not allow.
 pub(super) fn account(model: &ModelUnderTest, models: &[&ModelUnderTest]) -> Result<String> {
     for other in models {
-        if other.model.has_account_of(&model.model)? {
+        if other.model.shares_account_with(&model.model)? {
             return Ok(other.name.to_string());
         }
     }

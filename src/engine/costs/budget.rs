@@ -147,7 +147,7 @@ impl Budget {
     /// those of killed processes.
     pub(crate) fn with_unrecorded(self, dollars: f64) -> Self {
         let max_cost = self.spending.limit();
-        let spending = Spending::new(max_cost, self.spending.spent()).with_elsewhere(dollars);
+        let spending = Spending::new(max_cost, self.spending.spent()).with_pending_batches(dollars);
         Self {
             spending: Arc::new(spending),
             ..self

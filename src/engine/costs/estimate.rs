@@ -324,7 +324,7 @@ fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
         (times.iter().sum::<f64>() / times.len() as f64, "as so far")
     };
     let sending = &server.sending;
-    let concurrency = server.most_in_flight();
+    let concurrency = server.max_in_flight();
     let mut slowest = (
         requests * each / concurrency as f64,
         format!("{each:.1} s a reply {origin}, {concurrency} at once"),

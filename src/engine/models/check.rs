@@ -50,12 +50,12 @@ pub(crate) fn check(
         };
         progress.say(&format!("asking {} ({})", model.name, model.view));
         let (condition, message, sent) = match model.view {
-            View::Blind => (None, Message::words(WORDS), "without an image"),
+            View::Blind => (None, Message::text_only(WORDS), "without an image"),
             View::Image => {
                 let message = Message {
                     before: ABOUT_IMAGE,
                     images: &images,
-                    behind: "",
+                    after: "",
                     places: ImagePlaces::Together,
                 };
                 let sent = "about a red image, of which B is true";

@@ -50,7 +50,7 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
         if !headers.is_empty() {
             line("headers", &headers.join(", "));
         }
-        if let Some(body) = opened.body(Message::words("QUESTION"), 0) {
+        if let Some(body) = opened.body(Message::text_only("QUESTION"), 0) {
             let body = body.map_err(|e| Error::data(&*model.name, e))?;
             line("request", &String::from_utf8_lossy(&body));
         }

@@ -186,13 +186,13 @@ impl AskSettings {
                 ..model.parameters.clone()
             };
             let mut others = stored.values();
-            if others.any(|column| own.are_of_column(column)) {
+            if others.any(|column| own.match_column(column)) {
                 continue;
             }
             let Some(column) = stored.get(&model.name) else {
                 continue;
             };
-            if let Some(grown) = own.grown_from_column(column) {
+            if let Some(grown) = own.raised_from_column(column) {
                 model.parameters = grown;
             }
         }

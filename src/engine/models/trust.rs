@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::asking::AskingArgs;
 use super::entry::Entry;
 use super::file::{Keys, Located, ModelsFile};
-use crate::ask::{AccessArgs, BaseUrl, OPENAI_KEY, own_variables};
+use crate::ask::{AccessArgs, BaseUrl, OPENAI_KEY, vendor_variables};
 use crate::error::{Error, Result};
 
 /// The value of `key-env` for an endpoint without keys.
@@ -155,7 +155,7 @@ impl Suspect<'_> {
         let access = &self.entry.asking.access;
         let of_flags = self.flags.access.addresses()?;
         for base in access.addresses()? {
-            let own = own_variables(base.host());
+            let own = vendor_variables(base.host());
             let is_of_flags = of_flags.contains(&base);
             let mut sent = named(access, &self.flags.access);
             sent.extend(self.default_key(&base, &own));

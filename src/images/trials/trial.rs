@@ -85,7 +85,7 @@ impl Prompt {
         Message {
             before,
             images,
-            behind,
+            after: behind,
             places: self.places,
         }
     }

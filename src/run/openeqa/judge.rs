@@ -63,7 +63,7 @@ impl Judge {
             ..self.parameters.clone()
         };
         let column = columns.get(JUDGES).and_then(|judges| judges.get(id));
-        if let Some(grown) = column.and_then(|column| own.grown_from_column(column)) {
+        if let Some(grown) = column.and_then(|column| own.raised_from_column(column)) {
             self.parameters = grown;
         }
     }
@@ -86,7 +86,7 @@ impl JudgeArgs {
             || self.judge_api_key_file.is_some();
         if own_access {
             let access_args = match self.judge_base_url {
-                Some(url) => access.elsewhere(url),
+                Some(url) => access.for_base_url(url),
                 None => access,
             };
             access = AccessArgs {

@@ -223,7 +223,7 @@ impl ServerState {
             message: Message {
                 // An image that shows no frame of the data is not passed on.
                 images: images.filter(|_| frame.is_some()).unwrap_or_default(),
-                ..Message::words(&request.text)
+                ..Message::text_only(&request.text)
             },
             turn: 0,
         };

@@ -65,7 +65,7 @@ async fn a_request_is_the_smallest_every_server_takes() {
     let images = [Arc::new(image())];
     let message = Message {
         images: &images,
-        ..Message::words(hostile)
+        ..Message::text_only(hostile)
     };
     let reply = model_at(&mock, quick()).ask(message, 2).await.unwrap();
     assert_eq!((reply.text.as_str(), reply.attempts), ("B", 1));
@@ -128,8 +128,8 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     let images = [image(), image()].map(Arc::new);
     let message = Message {
         images: &images,
-        behind: "\"url\":\"\" Red?",
-        ..Message::words("Look \\\"url\":\"\"")
+        after: "\"url\":\"\" Red?",
+        ..Message::text_only("Look \\\"url\":\"\"")
     };
     model.ask(message, 2).await.unwrap();
     let bare = Parameters {
@@ -138,7 +138,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
         ..Parameters::new("m".into())
     };
     let model = Remote::open(endpoint, bare).unwrap();
-    model.ask(Message::words("Red?"), 2).await.unwrap();
+    model.ask(Message::text_only("Red?"), 2).await.unwrap();
 
     let requests = mock.requests();
     assert_eq!(requests[0].header("authorization"), None);
@@ -157,7 +157,7 @@ async fn what_is_set_is_sent_and_what_is_not_is_left_out() {
     assert_eq!(parts[0]["text"], message.before);
     assert_eq!(parts[1], parts[2]);
     assert!(parts[1]["image_url"]["url"].as_str().unwrap().len() > 100);
-    assert_eq!(parts[3]["text"], message.behind);
+    assert_eq!(parts[3]["text"], message.after);
     let blind = json!({"model": "m", "messages": [{"role": "user", "content": "Red?"}]});
     assert_eq!(requests[1].json(), blind);
 }
@@ -175,7 +175,7 @@ async fn base_urls_keep_their_path_and_query() {
     ] {
         let endpoint = endpoint_at(&format!("{root}{base}"), None, quick());
         let model = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
-        model.ask(Message::words("Red?"), 2).await.unwrap();
+        model.ask(Message::text_only("Red?"), 2).await.unwrap();
         assert_eq!(mock.requests().pop().unwrap().line, line);
     }
 }
@@ -192,7 +192,7 @@ async fn a_closed_port_is_a_connection_failure() {
     };
     let endpoint = endpoint_at(&format!("http://127.0.0.1:{port}/v1"), None, sending);
     let model = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
-    let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
+    let error = model.ask(Message::text_only("Red?"), 2).await.unwrap_err();
     assert_eq!(error.failure.kind, FailureKind::Connection);
     assert!(
         error.failure.message.to_lowercase().contains("refused"),
@@ -213,7 +213,11 @@ async fn a_wait_asked_for_is_kept_by_all() {
         let model = model_at(&mock, quick());
         let start = Instant::now();
         assert_eq!(
-            model.ask(Message::words("Red?"), 2).await.unwrap().attempts,
+            model
+                .ask(Message::text_only("Red?"), 2)
+                .await
+                .unwrap()
+                .attempts,
             2
         );
         assert!(start.elapsed() >= Duration::from_millis(50));
@@ -233,9 +237,9 @@ async fn a_wait_asked_for_is_kept_by_all() {
     let start = Instant::now();
     let later = async {
         tokio::time::sleep(Duration::from_millis(40)).await;
-        second.ask(Message::words("Red?"), 2).await.unwrap()
+        second.ask(Message::text_only("Red?"), 2).await.unwrap()
     };
-    let (one, other) = tokio::join!(first.ask(Message::words("Red?"), 2), later);
+    let (one, other) = tokio::join!(first.ask(Message::text_only("Red?"), 2), later);
     assert_eq!([one.unwrap().attempts, other.attempts], [2, 1]);
     assert!(start.elapsed() >= Duration::from_millis(80));
 }
@@ -246,11 +250,11 @@ async fn a_request_dropped_leaves_the_model_usable() {
     let model = model_at(&mock, quick());
     let asked = tokio::time::timeout(
         Duration::from_millis(50),
-        model.ask(Message::words("Red?"), 2),
+        model.ask(Message::text_only("Red?"), 2),
     );
     assert!(asked.await.is_err());
     assert_eq!(
-        model.ask(Message::words("Red?"), 2).await.unwrap().text,
+        model.ask(Message::text_only("Red?"), 2).await.unwrap().text,
         "B"
     );
 }
@@ -276,7 +280,7 @@ async fn keys_are_in_no_error_and_no_debug_output() {
                 ..quick()
             },
         );
-        let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
+        let error = model.ask(Message::text_only("Red?"), 2).await.unwrap_err();
         let text = format!("{error:?} {error} {model:?}");
         assert!(!text.contains("sk-very"), "{text}");
         assert!(error.failure.message.contains("[secret]"), "{error}");
@@ -294,7 +298,7 @@ async fn keys_are_in_no_error_and_no_debug_output() {
         Parameters::new("m".into()),
     )
     .unwrap();
-    let error = model.ask(Message::words("Red?"), 2).await.unwrap_err();
+    let error = model.ask(Message::text_only("Red?"), 2).await.unwrap_err();
     let text = format!("{error:?} {model:?}");
     check_rows(["us3r", "passw0rd", "t0ken"], |secret| {
         assert!(!error.failure.message.contains(secret), "{text}");
@@ -342,7 +346,7 @@ async fn scripts_and_guesses_answer_without_an_endpoint() {
     let call = |question, condition| Call {
         query: Query::Choice(question),
         condition,
-        message: Message::words(&prompt),
+        message: Message::text_only(&prompt),
         turn: 0,
     };
     std::fs::write(

@@ -4,9 +4,9 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use super::*;
-use simulated::{Dice, Limit, Told, ask};
+use simulated::{Dice, Limit, StatedWait, simulate};
 
-fn free() -> Gate {
+fn unlimited() -> Gate {
     Gate::new(Quota::default())
 }
 
@@ -19,12 +19,12 @@ fn per_minute(requests: Option<u32>, tokens: Option<u32>) -> Quota {
 }
 
 fn succeed(gate: &Gate, sent: Instant) {
-    gate.succeeded(sent, None, RateLimits::default(), Duration::MAX);
+    gate.record_success(sent, None, RateLimits::default(), Duration::MAX);
 }
 
 #[tokio::test(start_paused = true)]
-async fn an_open_gate_delays_nobody() {
-    let gate = free();
+async fn an_unlimited_gate_causes_no_delay() {
+    let gate = unlimited();
     let start = Instant::now();
     for _ in 0..1000 {
         let sent = gate.pass().await;
@@ -34,10 +34,10 @@ async fn an_open_gate_delays_nobody() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn waiting_requests_wait_for_a_second_pause_too() {
-    let gate = Arc::new(free());
+async fn waiting_requests_respect_a_second_pause() {
+    let gate = Arc::new(unlimited());
     let start = Instant::now();
-    let refused = |seconds| gate.rate_limited(start, Some(Duration::from_secs(seconds)));
+    let refused = |seconds| gate.record_rate_limited(start, Some(Duration::from_secs(seconds)));
     refused(1);
     let waiting = tokio::spawn({
         let gate = gate.clone();
@@ -78,7 +78,7 @@ async fn a_quota_applies_from_the_first_request_on() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn absurd_numbers_from_a_server_do_not_stop_the_run() {
+async fn implausible_numbers_do_not_stop_the_run() {
     let gate = Gate::new(per_minute(None, Some(u32::MAX)));
     let mut headers = reqwest::header::HeaderMap::new();
     for (name, value) in [
@@ -87,95 +87,116 @@ async fn absurd_numbers_from_a_server_do_not_stop_the_run() {
     ] {
         headers.insert(name, value.parse().unwrap());
     }
-    let allowance = RateLimits::read(&headers, std::time::SystemTime::now());
+    let limits = RateLimits::read(&headers, std::time::SystemTime::now());
     for _ in 0..10 {
         let sent = Instant::now();
-        gate.succeeded(sent, Some(u64::MAX), allowance, Duration::from_mins(2));
-        gate.rate_limited(sent, Some(Duration::MAX));
+        gate.record_success(sent, Some(u64::MAX), limits, Duration::from_mins(2));
+        gate.record_rate_limited(sent, Some(Duration::MAX));
     }
     let passed = tokio::time::timeout(Duration::from_mins(1), gate.pass()).await;
     assert!(passed.is_ok(), "a wait beyond the clock's range is ignored");
 }
 
 #[tokio::test(start_paused = true)]
-async fn an_unknown_limit_is_found() {
+async fn unknown_limits_are_learned() {
     let bucket = |rate, store| Limit::Bucket { rate, store };
-    // The ideal in seconds, the longest, and the most that are turned away.
-    for (limit, told, items, ideal, longest, refused) in [
-        (bucket(20.0, 20.0), Told::Seconds(1.0), 300, 14.0, 1.15, 30),
-        (bucket(20.0, 20.0), Told::Exact, 300, 14.0, 1.2, 30),
-        (bucket(20.0, 20.0), Told::Nothing, 300, 14.0, 1.15, 40),
-        (bucket(20.0, 1.0), Told::Nothing, 300, 15.0, 1.4, 60),
-        (bucket(20.0, 1.0), Told::Seconds(1.0), 300, 15.0, 1.6, 40),
-        (bucket(2.0, 2.0), Told::Seconds(1.0), 100, 49.0, 1.3, 60),
+    // Ideal time in seconds, maximum ratio to it, and maximum number of refusals.
+    for (limit, wait, items, ideal, max_ratio, max_refused) in [
+        (
+            bucket(20.0, 20.0),
+            StatedWait::Seconds(1.0),
+            300,
+            14.0,
+            1.15,
+            30,
+        ),
+        (bucket(20.0, 20.0), StatedWait::Exact, 300, 14.0, 1.2, 30),
+        (bucket(20.0, 20.0), StatedWait::None, 300, 14.0, 1.15, 40),
+        (bucket(20.0, 1.0), StatedWait::None, 300, 15.0, 1.4, 60),
+        (
+            bucket(20.0, 1.0),
+            StatedWait::Seconds(1.0),
+            300,
+            15.0,
+            1.6,
+            40,
+        ),
+        (
+            bucket(2.0, 2.0),
+            StatedWait::Seconds(1.0),
+            100,
+            49.0,
+            1.3,
+            60,
+        ),
         (
             bucket(100.0, 100.0),
-            Told::Seconds(1.0),
+            StatedWait::Seconds(1.0),
             3000,
             29.0,
             1.25,
             150,
         ),
-        (Limit::Sliding(15), Told::Exact, 40, 120.0, 1.4, 40),
-        (Limit::Fixed(15), Told::Nothing, 40, 120.0, 1.5, 60),
-        (Limit::Fixed(500), Told::Exact, 1500, 120.0, 1.3, 60),
+        (Limit::Sliding(15), StatedWait::Exact, 40, 120.0, 1.4, 40),
+        (Limit::Fixed(15), StatedWait::None, 40, 120.0, 1.5, 60),
+        (Limit::Fixed(500), StatedWait::Exact, 1500, 120.0, 1.3, 60),
     ] {
         for seed in 0..5 {
-            let asked = ask(limit, told, items, Quota::default(), seed).await;
+            let result = simulate(limit, wait, items, Quota::default(), seed).await;
             let line = format!(
-                "{limit:?}, {told:?}: {:.1} s where {ideal} are needed, {} turned away",
-                asked.seconds, asked.refused
+                "{limit:?}, {wait:?}: {:.1} s where {ideal} are needed, {} refused",
+                result.seconds, result.refused
             );
-            assert!(asked.seconds <= longest * ideal, "{line}");
-            assert!(asked.refused <= refused, "{line}");
+            assert!(result.seconds <= max_ratio * ideal, "{line}");
+            assert!(result.refused <= max_refused, "{line}");
         }
     }
 }
 
 #[tokio::test(start_paused = true)]
-async fn random_refusals_do_not_slow_a_run_down() {
+async fn random_refusals_cause_no_slowdown() {
     for seed in 0..5 {
-        let of = |share| {
+        let simulate_share = |share| {
             let limit = Limit::Random(share);
-            ask(limit, Told::Nothing, 300, Quota::default(), seed)
+            simulate(limit, StatedWait::None, 300, Quota::default(), seed)
         };
-        let (with, without) = (of(0.05).await, of(0.0).await);
+        let (with, without) = (simulate_share(0.05).await, simulate_share(0.0).await);
         assert_eq!(without.refused, 0);
         assert!(with.refused > 5, "{}", with.refused);
-        let slower = with.seconds / without.seconds;
-        assert!(slower < 1.6, "{slower}");
+        let slowdown = with.seconds / without.seconds;
+        assert!(slowdown < 1.6, "{slowdown}");
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn no_minute_has_more_requests_than_the_quota() {
-    for (limit, told) in [
-        (Limit::Random(0.0), Told::Nothing),
-        (Limit::Random(0.05), Told::Nothing),
-        (Limit::Random(0.5), Told::Nothing),
-        (Limit::Broken(0.05), Told::Nothing),
-        (Limit::Broken(0.5), Told::Nothing),
-        (Limit::Sliding(15), Told::Exact),
-        (Limit::Sliding(15), Told::Nothing),
-        (Limit::Sliding(20), Told::Seconds(2.0)),
+    for (limit, wait) in [
+        (Limit::Random(0.0), StatedWait::None),
+        (Limit::Random(0.05), StatedWait::None),
+        (Limit::Random(0.5), StatedWait::None),
+        (Limit::Broken(0.05), StatedWait::None),
+        (Limit::Broken(0.5), StatedWait::None),
+        (Limit::Sliding(15), StatedWait::Exact),
+        (Limit::Sliding(15), StatedWait::None),
+        (Limit::Sliding(20), StatedWait::Seconds(2.0)),
     ] {
-        for most in [15, 30, 600] {
+        for max in [15, 30, 600] {
             for seed in 0..7 {
-                let quota = per_minute(Some(most), None);
-                let items = 4 * most as usize;
-                let asked = ask(limit, told, items.min(900), quota, seed).await;
-                let found = asked.most_in_a_minute();
+                let quota = per_minute(Some(max), None);
+                let items = 4 * max as usize;
+                let result = simulate(limit, wait, items.min(900), quota, seed).await;
+                let found = result.max_per_minute();
                 assert!(
-                    found <= most as usize,
-                    "{limit:?} {told:?}: {found} of {most}"
+                    found <= max as usize,
+                    "{limit:?} {wait:?}: {found} of {max}"
                 );
-                let is_free = match limit {
+                let is_unlimited = match limit {
                     Limit::Random(share) => share < 0.1,
                     Limit::Broken(_) => true,
                     _ => false,
                 };
-                if is_free {
-                    assert!(found as u32 >= most * 9 / 10, "{found} of {most}");
+                if is_unlimited {
+                    assert!(found as u32 >= max * 9 / 10, "{found} of {max}");
                 }
             }
         }
@@ -193,10 +214,10 @@ async fn no_minute_has_more_tokens_than_the_quota() {
         asking.spawn(async move {
             for _ in 0..25 {
                 let sent = gate.pass().await;
-                // The first replies are among the largest; later ones are no larger.
+                // The first replies are among the largest; later ones are not larger.
                 let tokens = 500 + (1000.0 * dice.throw()) as u64;
                 tokio::time::sleep(Duration::from_millis(200)).await;
-                gate.succeeded(sent, Some(tokens), RateLimits::default(), Duration::MAX);
+                gate.record_success(sent, Some(tokens), RateLimits::default(), Duration::MAX);
                 used.lock().unwrap().push((sent, tokens));
             }
         });
@@ -211,9 +232,9 @@ async fn no_minute_has_more_tokens_than_the_quota() {
             .map(|(_, tokens)| tokens)
             .sum()
     };
-    let most = used.iter().map(|(sent, _)| within(*sent)).max().unwrap();
-    assert!((50_000..=60_000).contains(&most), "{most}");
-    // 200 requests of 1000 tokens are 3.3 minutes; the first minute's worth may pass at once.
+    let max = used.iter().map(|(sent, _)| within(*sent)).max().unwrap();
+    assert!((50_000..=60_000).contains(&max), "{max}");
+    // 200 requests of 1000 tokens take 3.3 minutes; the quota of the first minute may be used at once.
     let minutes = start.elapsed().as_secs_f64() / 60.0;
     assert!((3.0..4.3).contains(&minutes), "{minutes}");
 }
@@ -224,7 +245,7 @@ async fn a_request_larger_than_the_quota_of_tokens_is_sent_alone() {
     let start = Instant::now();
     for _ in 0..2 {
         let sent = gate.pass().await;
-        gate.succeeded(sent, Some(5000), RateLimits::default(), Duration::MAX);
+        gate.record_success(sent, Some(5000), RateLimits::default(), Duration::MAX);
     }
     assert!(start.elapsed() >= Duration::from_mins(1));
 }

@@ -1,4 +1,4 @@
-//! Products of neighbours of one colour: [`NeighbourSums`].
+//! Correlation of neighbouring sites of one colour: [`NeighbourSums`].
 
 use super::scatter::Scatter;
 
@@ -16,17 +16,18 @@ pub(super) struct RowNeighbours {
     bb: u64,
 }
 
-/// Products of neighbours of a pair of frames, by plane.
+/// Sums over neighbours in a pair of frames, by plane.
 #[derive(Debug)]
 pub(in crate::calibrate) struct NeighbourSums {
     planes: Vec<PlaneSums>,
 }
 
-/// Sums of a plane about the means of its rows.
+/// Sums of a plane around the means of its rows.
 #[derive(Debug, Clone, Copy, Default)]
 struct PlaneSums {
     /// Products of neighbours.
     products: Scatter,
+    /// Products of each site with itself.
     squares: Scatter,
     /// Number of sites.
     sites: f64,
@@ -34,11 +35,11 @@ struct PlaneSums {
     rows: f64,
 }
 
-/// A site of both frames.
+/// Samples of both frames at a site.
 type Site = [u16; 2];
 
 impl RowNeighbours {
-    /// The neighbours in a part of a row.
+    /// Computes the sums of a part of a row.
     pub(super) fn new(a: &[u16], b: &[u16]) -> Self {
         let mut sums = Self::default();
         let sites = a.iter().zip(b).map(|(a, b)| [*a, *b]);
@@ -64,7 +65,7 @@ impl RowNeighbours {
         }
     }
 
-    /// Takes out two neighbours that were added.
+    /// Removes two neighbours that were added.
     pub(super) fn remove(&mut self, site: Site, next: Site) {
         let less = Self::from_sites(site, next);
         self.count -= 1;
@@ -74,7 +75,7 @@ impl RowNeighbours {
         self.bb -= less.bb;
     }
 
-    /// Products about these means of A and of B.
+    /// Products around these means of A and of B.
     fn about(self, [a, b]: [f64; 2]) -> Scatter {
         let n = self.count as f64;
         let [both_a, both_b] = self.both.map(|sum| sum as f64);
@@ -88,14 +89,14 @@ impl RowNeighbours {
 }
 
 impl NeighbourSums {
-    /// No neighbours in so many planes.
+    /// Empty sums for this number of planes.
     pub(super) fn none(planes: usize) -> Self {
         Self {
             planes: vec![PlaneSums::default(); planes],
         }
     }
 
-    /// Adds a part of a row with `count` sites, these means of A and of B and these squares about them.
+    /// Adds a part of a row with `count` sites, the means of A and of B, and the squares around them.
     pub(super) fn add(
         &mut self,
         plane: usize,
@@ -105,7 +106,7 @@ impl NeighbourSums {
         squares: Scatter,
     ) {
         let plane = &mut self.planes[plane];
-        // As many products as there are squares.
+        // Scale the products to the number of squares.
         let products = row.about(means).times(count / row.count as f64);
         plane.products.join(products);
         plane.squares.join(squares);
@@ -113,8 +114,8 @@ impl NeighbourSums {
         plane.rows += 1.0;
     }
 
-    /// Correlation of neighbours of a plane in a row of A − ratio · B, which is 0 for noise of single sites. `ratios` are those of
-    /// the planes: the light of A over the light of B.
+    /// Correlation of neighbours of a plane within rows of A − ratio · B, which is 0 for independent noise. `ratios` are the light of A
+    /// over the light of B, by plane.
     pub(in crate::calibrate) fn correlation(&self, ratios: &[f64]) -> f64 {
         let [mut products, mut squares, mut sites, mut rows] = [0.0; 4];
         for (plane, ratio) in self.planes.iter().zip(ratios) {
@@ -126,7 +127,7 @@ impl NeighbourSums {
         if squares <= 0.0 {
             return 0.0;
         }
-        // Taking off the mean of n sites makes independent neighbours correlate by −1/(n − 1).
+        // Subtracting the mean of n sites gives independent neighbours a correlation of −1/(n − 1).
         products / squares + 1.0 / (sites / rows - 1.0)
     }
 }

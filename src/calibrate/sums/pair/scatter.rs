@@ -1,4 +1,4 @@
-//! Sums of products of two frames: [`Products`], and about their means [`Scatter`].
+//! Sums of products of two frames, [`Products`], and the same around their means, [`Scatter`].
 
 /// Sums of A², A · B and B² over the sites of one part of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -8,7 +8,7 @@ pub(super) struct Products {
     pub(super) bb: u64,
 }
 
-/// Sums of products of A and B about their means. From them follows the sum for any difference of the two, A − ratio · B.
+/// Sums of products of A and B around their means. They give the sum of squares of A − ratio · B for any ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(in crate::calibrate) struct Scatter {
     pub(super) aa: f64,
@@ -25,7 +25,7 @@ impl Products {
         self.bb += b * b;
     }
 
-    /// Takes out a site that was added.
+    /// Removes a site that was added.
     pub(super) fn remove(&mut self, a: u16, b: u16) {
         let [a, b] = [a, b].map(u64::from);
         self.aa -= a * a;
@@ -40,12 +40,12 @@ impl Products {
         self.bb += other.bb;
     }
 
-    /// Sum of (A − B)², which is exact.
+    /// Exact sum of (A − B)².
     pub(super) fn squared_difference(self) -> u64 {
         self.aa + self.bb - 2 * self.ab
     }
 
-    /// The sums about the means of `count` sites with these sums of A and of B.
+    /// The sums around the means of `count` sites, from the sums of A and of B.
     pub(super) fn about_means(self, count: u64, [a, b]: [u64; 2]) -> Scatter {
         let [n, a, b] = [count, a, b].map(|sum| sum as f64);
         Scatter {
@@ -64,7 +64,7 @@ impl Scatter {
         self.bb += other.bb;
     }
 
-    /// The same with every product times a factor.
+    /// Multiplies all sums by a factor.
     pub(super) fn times(self, factor: f64) -> Self {
         Self {
             aa: factor * self.aa,
@@ -73,7 +73,7 @@ impl Scatter {
         }
     }
 
-    /// The sum of D² about its mean, where D = A − ratio · B; of products of neighbours the sum of D · D′.
+    /// Sum of D² around its mean, with D = A − ratio · B; for products of neighbours, the sum of D · D′.
     pub(in crate::calibrate) fn squared_difference(self, ratio: f64) -> f64 {
         self.aa - 2.0 * ratio * self.ab + ratio * ratio * self.bb
     }

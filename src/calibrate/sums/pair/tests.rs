@@ -7,7 +7,7 @@ const BAYER: Layout = Layout {
     width: 48,
 };
 
-/// Numbers from 0 to 2³² − 1 that look random.
+/// Pseudorandom numbers from 0 to 2³² − 1.
 struct Numbers(u64);
 
 impl Iterator for Numbers {
@@ -22,7 +22,7 @@ impl Iterator for Numbers {
     }
 }
 
-/// A frame of codes about `level`, spread evenly over 2 · `spread` + 1 codes.
+/// Frame of codes around `level`, uniformly distributed over 2 · `spread` + 1 codes.
 fn frame(layout: Layout, seed: u64, level: u16, spread: u32) -> Vec<u16> {
     Numbers(seed)
         .take(layout.height * layout.width)
@@ -30,7 +30,7 @@ fn frame(layout: Layout, seed: u64, level: u16, spread: u32) -> Vec<u16> {
         .collect()
 }
 
-/// The same by loops over sites, for a pair of planes without hot pixels.
+/// Noise by its definition, with loops over sites, for a pair of frames without hot pixels.
 fn noise_by_sites(layout: Layout, a: &[u16], b: &[u16]) -> [f64; 2] {
     let planes = layout.cfa.planes();
     let plane = |site: usize| {
@@ -63,7 +63,7 @@ fn noise_by_sites(layout: Layout, a: &[u16], b: &[u16]) -> [f64; 2] {
 }
 
 #[test]
-fn noise_is_that_of_the_definition() {
+fn noise_matches_its_definition() {
     for cfa in [Cfa::Rggb, Cfa::Mono] {
         let layout = Layout { cfa, ..BAYER };
         let (a, b) = (frame(layout, 1, 500, 9), frame(layout, 2, 510, 9));
@@ -77,7 +77,7 @@ fn noise_is_that_of_the_definition() {
     }
 }
 
-/// A fixed pattern changes nothing, and offsets of whole rows are row noise alone.
+/// A fixed pattern has no effect, and offsets of whole rows only affect the row noise.
 #[test]
 fn fixed_pattern_cancels_and_rows_are_row_noise() {
     let hot = HotPixels::none(BAYER.plane_rows());
@@ -95,12 +95,12 @@ fn fixed_pattern_cancels_and_rows_are_row_noise() {
         .collect();
     let shifted = PairSums::new(BAYER, [&a, &rows], &hot).noise();
     assert!((shifted.within - plain.within).abs() < 1e-9);
-    // Uniform over 20 codes: variance 33.25, in one frame of two.
+    // Uniform over 20 codes in one of the two frames: variance 33.25.
     assert!((shifted.row - plain.row - 33.25 / 2.0).abs() < 5.0);
 }
 
 #[test]
-fn hot_pixels_are_in_no_sum() {
+fn hot_pixels_are_left_out() {
     let (mut a, b) = (frame(BAYER, 7, 500, 9), frame(BAYER, 8, 500, 9));
     let columns: Vec<Vec<u32>> = (0..BAYER.plane_rows())
         .map(|plane_row| match plane_row {
@@ -123,14 +123,14 @@ fn hot_pixels_are_in_no_sum() {
     assert_eq!(spoiled.tiles(), tiles);
     assert_eq!(spoiled.noise(), noise);
     assert!((correlation(&spoiled) - correlation(&clean)).abs() < 1e-15);
-    // The control: without the mask they are.
+    // Control: without the mask, hot pixels do affect the sums.
     let unmasked = PairSums::new(BAYER, [&a, &b], &HotPixels::none(BAYER.plane_rows()));
     assert!(unmasked.noise().within > 1000.0 * noise.within);
     assert_eq!(hot.count(), 6);
 }
 
 #[test]
-fn smoothing_shows_as_correlation() {
+fn smoothing_causes_correlation() {
     let layout = Layout {
         height: 256,
         width: 256,
@@ -155,10 +155,10 @@ fn smoothing_shows_as_correlation() {
 }
 
 #[test]
-fn tiles_have_the_light_and_the_noise_of_their_place() {
+fn tiles_have_local_light_and_noise() {
     let hot = HotPixels::none(BAYER.plane_rows());
     let mut lit = [frame(BAYER, 11, 500, 9), frame(BAYER, 12, 500, 9)];
-    // The lower right tile of green in the rows of red is brighter.
+    // The lower right tile of green in red rows is brighter.
     for frame in &mut lit {
         for row in (56..64).step_by(2) {
             for column in (43..48).step_by(2) {
@@ -169,7 +169,7 @@ fn tiles_have_the_light_and_the_noise_of_their_place() {
     let tiles = PairSums::new(BAYER, [&lit[0], &lit[1]], &hot).tiles();
     assert_eq!(tiles.len(), 4 * TILES * TILES);
     for (index, tile) in tiles.iter().enumerate() {
-        // Four rows of three sites, of which each row has a mean of its own.
+        // Four rows of three sites; each row has its own mean.
         assert_eq!((tile.plane, tile.count, tile.free), (index / 64, 12.0, 8.0));
         let level = if index == 127 { 800.0 } else { 500.0 };
         assert!(
@@ -180,7 +180,7 @@ fn tiles_have_the_light_and_the_noise_of_their_place() {
     }
     let variance = mean_variance(&tiles, 1.0);
     assert!((variance - 30.0).abs() < 2.0, "{variance}");
-    // Offsets of rows change no variance.
+    // Row offsets do not change the variance.
     let rows = |frame: &[u16], seed: u64| -> Vec<u16> {
         frame
             .chunks(BAYER.width)
@@ -199,10 +199,10 @@ fn mean_variance(tiles: &[TileSums], ratio: f64) -> f64 {
     tiles.iter().map(|tile| tile.variance(ratio)).sum::<f64>() / tiles.len() as f64
 }
 
-/// Two frames of the same pattern of light, of which the second has 5 % more: with the ratio of their light nothing of the pattern is
-/// left in the variance and in the correlation of neighbours; without it, most is.
+/// Two frames with the same pattern of light, the second with 5 % more light. With the ratio of their light the pattern does not affect
+/// the variance and the correlation of neighbours; without the ratio it does.
 #[test]
-fn a_pattern_of_light_cancels_at_equal_light() {
+fn light_patterns_cancel_with_the_ratio_of_light() {
     let layout = Layout {
         height: 256,
         width: 256,
@@ -222,7 +222,7 @@ fn a_pattern_of_light_cancels_at_equal_light() {
     let (tiles, neighbours) = (sums.tiles(), sums.neighbours());
     let ratio = 1.0 / 1.05;
     let [equal, unequal] = [ratio, 1.0].map(|ratio| mean_variance(&tiles, ratio));
-    // The noise of both frames is the same here, that of light is not: 30 · (1 + ratio²) / (2 ratio) = 30.04.
+    // Unlike shot noise, the noise of both frames is equal here: 30 · (1 + ratio²) / (2 ratio) = 30.04.
     assert!((equal - 30.0).abs() < 0.6, "{equal}");
     assert!(unequal > 1.5 * equal, "{unequal}");
     let [equal, unequal] = [ratio, 1.0].map(|ratio| neighbours.correlation(&[ratio; 4]));

@@ -59,7 +59,7 @@ fn ask_with(answers: Vec<Answer>, sending: Sending, parameters: Parameters) -> O
         let images = [Arc::new(image())];
         let message = Message {
             images: &images,
-            ..Message::words("Red?")
+            ..Message::text_only("Red?")
         };
         let result = model.ask(message, 2).await;
         Outcome {

@@ -1,4 +1,4 @@
-//! Servers with limits, and clients that ask them through a gate, on a clock that does not wait.
+//! Simulation of rate-limited servers and of clients behind a gate, on a paused clock.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
@@ -7,7 +7,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use super::succeed;
 use crate::ask::pace::gate::*;
 
-/// Random numbers of a seed, in [0, 1): Knuth's generator (MMIX).
+/// Random numbers in [0, 1): Knuth's generator (MMIX).
 pub(super) struct Dice(pub(super) u64);
 
 impl Dice {
@@ -20,41 +20,44 @@ impl Dice {
     }
 }
 
-/// A server that limits requests.
+/// Limit of a server.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Limit {
-    /// A token bucket of `store` requests that refills `rate` of them a second.
+    /// Token bucket of `store` requests, refilled with `rate` requests per second.
     Bucket { rate: f64, store: f64 },
-    /// So many in any 60 seconds.
+    /// This number of requests in any 60 seconds.
     Sliding(usize),
-    /// So many in each minute of the clock.
+    /// This number of requests in each minute of the clock.
     Fixed(usize),
-    /// This share is refused at random.
+    /// Random refusal of this share of the requests.
     Random(f64),
-    /// This share fails at random, which reveals nothing about a rate: status 500, or a reply that is cut.
+    /// Random failure of this share of the requests that reveals nothing about a rate: status 500, or a truncated reply.
     Broken(f64),
 }
 
-/// The wait that a server tells.
+/// Wait that a server states in a refusal.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Told {
-    Nothing,
+pub(super) enum StatedWait {
+    None,
     Exact,
     Seconds(f64),
 }
 
 struct MockServer {
     limit: Limit,
-    told: Told,
+    wait: StatedWait,
     start: Instant,
+    /// Number of requests in the bucket.
     level: f64,
+    /// Time of the last refill of the bucket.
     last: Instant,
-    taken: Vec<Instant>,
+    /// Times of the accepted requests of the last minute.
+    accepted: Vec<Instant>,
     dice: Dice,
 }
 
 impl MockServer {
-    fn new(limit: Limit, told: Told, seed: u64) -> Self {
+    fn new(limit: Limit, wait: StatedWait, seed: u64) -> Self {
         let now = Instant::now();
         let level = match limit {
             Limit::Bucket { store, .. } => store,
@@ -62,16 +65,16 @@ impl MockServer {
         };
         Self {
             limit,
-            told,
+            wait,
             start: now,
             level,
             last: now,
-            taken: Vec::new(),
+            accepted: Vec::new(),
             dice: Dice(seed),
         }
     }
 
-    /// `Ok` if the request is taken, else the wait that is told.
+    /// Accepts a request, or returns the stated wait as the error.
     fn answer(&mut self, now: Instant) -> Result<(), Option<Duration>> {
         let minute = Duration::from_mins(1);
         let exact = match self.limit {
@@ -91,56 +94,64 @@ impl MockServer {
                 }
                 Duration::from_secs_f64((1.0 - self.level) / rate)
             }
-            Limit::Sliding(most) => {
-                self.taken.retain(|taken| now - *taken < minute);
-                if self.taken.len() < most {
-                    self.taken.push(now);
+            Limit::Sliding(max) => {
+                self.accepted.retain(|accepted| now - *accepted < minute);
+                if self.accepted.len() < max {
+                    self.accepted.push(now);
                     return Ok(());
                 }
-                self.taken[0] + minute - now
+                self.accepted[0] + minute - now
             }
-            Limit::Fixed(most) => {
-                let of = |at: Instant| (at - self.start).as_secs() / 60;
-                let here = of(now);
-                self.taken.retain(|taken| of(*taken) == here);
-                if self.taken.len() < most {
-                    self.taken.push(now);
+            Limit::Fixed(max) => {
+                let minute_of = |at: Instant| (at - self.start).as_secs() / 60;
+                let current = minute_of(now);
+                self.accepted
+                    .retain(|accepted| minute_of(*accepted) == current);
+                if self.accepted.len() < max {
+                    self.accepted.push(now);
                     return Ok(());
                 }
-                self.start + minute * (here as u32 + 1) - now
+                self.start + minute * (current as u32 + 1) - now
             }
         };
-        Err(match self.told {
-            Told::Nothing => None,
-            Told::Exact => Some(exact),
-            Told::Seconds(seconds) => Some(Duration::from_secs_f64(seconds)),
+        Err(match self.wait {
+            StatedWait::None => None,
+            StatedWait::Exact => Some(exact),
+            StatedWait::Seconds(seconds) => Some(Duration::from_secs_f64(seconds)),
         })
     }
 }
 
-/// The outcome of asking a server.
-pub(super) struct Asked {
+/// Result of a simulation.
+pub(super) struct Simulation {
     pub(super) seconds: f64,
     pub(super) refused: usize,
     sent: Vec<Instant>,
 }
 
-impl Asked {
-    /// The most requests in any 60 seconds.
-    pub(super) fn most_in_a_minute(&self) -> usize {
-        let within = |first: &Instant| {
-            let sent = self.sent.iter().filter(|sent| *sent >= first);
-            sent.filter(|sent| **sent - *first < Duration::from_mins(1))
+impl Simulation {
+    /// Maximum number of requests in any 60 seconds.
+    pub(super) fn max_per_minute(&self) -> usize {
+        let count_from = |first: &Instant| {
+            self.sent
+                .iter()
+                .filter(|sent| *sent >= first && **sent - *first < Duration::from_mins(1))
                 .count()
         };
-        self.sent.iter().map(within).max().unwrap_or(0)
+        self.sent.iter().map(count_from).max().unwrap_or(0)
     }
 }
 
-/// Asks a server for `items` replies, 16 at once, with replies that take 50 to 200 ms; refused requests come again.
-pub(super) async fn ask(limit: Limit, told: Told, items: usize, quota: Quota, seed: u64) -> Asked {
+/// Sends `items` requests to a server, 16 at once, and repeats refused ones. Replies take 50 to 200 ms.
+pub(super) async fn simulate(
+    limit: Limit,
+    wait: StatedWait,
+    items: usize,
+    quota: Quota,
+    seed: u64,
+) -> Simulation {
     let gate = Arc::new(Gate::new(quota));
-    let server = Arc::new(Mutex::new(MockServer::new(limit, told, seed)));
+    let server = Arc::new(Mutex::new(MockServer::new(limit, wait, seed)));
     let (left, refused) = (
         Arc::new(AtomicUsize::new(items)),
         Arc::new(AtomicUsize::new(0)),
@@ -157,7 +168,7 @@ pub(super) async fn ask(limit: Limit, told: Told, items: usize, quota: Quota, se
                 .fetch_update(Relaxed, Relaxed, |n| n.checked_sub(1))
                 .is_ok()
             {
-                let own = Duration::from_millis(250);
+                let default_wait = Duration::from_millis(250);
                 loop {
                     let sent = gate.pass().await;
                     sent_at.lock().unwrap().push(sent);
@@ -171,10 +182,10 @@ pub(super) async fn ask(limit: Limit, told: Told, items: usize, quota: Quota, se
                     refused.fetch_add(1, Relaxed);
                     tokio::time::sleep(Duration::from_millis(30)).await;
                     if !matches!(limit, Limit::Broken(_)) {
-                        gate.rate_limited(sent, wait);
+                        gate.record_rate_limited(sent, wait);
                     }
                     if wait.is_none() {
-                        tokio::time::sleep(own).await;
+                        tokio::time::sleep(default_wait).await;
                     }
                 }
             }
@@ -182,7 +193,7 @@ pub(super) async fn ask(limit: Limit, told: Told, items: usize, quota: Quota, se
     }
     while asking.join_next().await.is_some() {}
     let sent = sent_at.lock().unwrap().clone();
-    Asked {
+    Simulation {
         seconds: start.elapsed().as_secs_f64(),
         refused: refused.load(Relaxed),
         sent,

@@ -23,7 +23,7 @@ const RESERVED: [&str; 9] = [
 #[derive(Clone, Default)]
 pub struct CustomHeaders {
     map: HeaderMap,
-    /// Values from environment variables, whole and without a first word such as `Bearer`.
+    /// Values from environment variables, both whole and without a leading word such as `Bearer`.
     secrets: Vec<String>,
 }
 
@@ -84,7 +84,7 @@ impl CustomHeaders {
         let value = value.trim();
         self.add(name, value, "--header-env")?;
         self.secrets.push(value.to_owned());
-        // A server may repeat the secret without its first word: only the token of "Bearer …".
+        // A server may repeat the secret without its leading word: only the token of "Bearer …".
         if let Some((_, secret)) = value.split_once(' ') {
             self.secrets.push(secret.to_owned());
         }
@@ -122,8 +122,8 @@ impl CustomHeaders {
     /// Adds these headers to the headers of a request.
     ///
     /// # Errors
-    /// If the request already has a header of the same name, with the key or the account.
-    pub(super) fn extend(&self, headers: &mut HeaderMap) -> Result<()> {
+    /// If the request already has a header of the same name, for the key or the account.
+    pub(super) fn add_to(&self, headers: &mut HeaderMap) -> Result<()> {
         for (name, value) in &self.map {
             if headers.insert(name, value.clone()).is_some() {
                 let problem = format_args!(
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_secret_on_the_command_line_is_refused_and_not_shown() {
+    fn secrets_on_the_command_line_are_refused() {
         for secret in [
             "X-Any: sk-0123456789",
             "Authorization: Bearer abcdefghijklmnop",
@@ -192,8 +192,8 @@ mod tests {
     fn a_header_is_not_sent_twice() {
         let headers = read(&["X-Team: a"]).unwrap();
         let mut request = HeaderMap::new();
-        headers.extend(&mut request).unwrap();
+        headers.add_to(&mut request).unwrap();
         assert_eq!(request["x-team"], "a");
-        assert!(headers.extend(&mut request).is_err());
+        assert!(headers.add_to(&mut request).is_err());
     }
 }

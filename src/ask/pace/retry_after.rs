@@ -1,33 +1,37 @@
-//! The wait that a server asks for: [`asked_wait`].
+//! The wait that a server asks for in its response headers: [`retry_after`].
 
 use std::time::{Duration, SystemTime};
 
 use reqwest::header::{DATE, HeaderMap, RETRY_AFTER};
 
-/// The wait that a server asks for in its headers: `retry-after-ms`, which the vendors' clients follow first, else `Retry-After` in
-/// seconds (fractions too) or as a date. A date is compared with the server's clock if it sends `Date`. `None` without a header, for no wait, or in an unknown form.
-pub(in crate::ask) fn asked_wait(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
-    let text = |name: &str| headers.get(name)?.to_str().ok();
-    let after = || text(RETRY_AFTER.as_str());
-    let date = |text: &str| httpdate::parse_http_date(text.trim()).ok();
-    let until = || {
-        let until = date(after()?)?;
-        let now = text(DATE.as_str()).and_then(date).unwrap_or(now);
-        let wait = until.duration_since(now).ok();
-        wait.filter(|wait| !wait.is_zero())
-    };
-    let exact = text("retry-after-ms").and_then(|ms| seconds(ms, 1e-3));
-    let after = after().and_then(|after| seconds(after, 1.0)).or_else(until);
-    exact.or(after)
+/// Wait from the headers `retry-after-ms` or `Retry-After`; the former has priority, as in the vendors' clients.
+///
+/// `Retry-After` is a number of seconds, possibly with a fraction, or a date. A date is relative to the server's clock if the response
+/// has a `Date`. `None` without a valid header, or for a wait of zero.
+pub(in crate::ask) fn retry_after(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
+    let header = |name: &str| headers.get(name)?.to_str().ok();
+    if let Some(wait) = header("retry-after-ms").and_then(|ms| parse_duration(ms, 1e-3)) {
+        return Some(wait);
+    }
+    let retry_after = header(RETRY_AFTER.as_str())?;
+    parse_duration(retry_after, 1.0).or_else(|| {
+        let now = header(DATE.as_str()).and_then(parse_date).unwrap_or(now);
+        let wait = parse_date(retry_after)?.duration_since(now).ok()?;
+        (!wait.is_zero()).then_some(wait)
+    })
 }
 
-/// A duration as Google's services write it, `45.837906927s`.
+fn parse_date(text: &str) -> Option<SystemTime> {
+    httpdate::parse_http_date(text.trim()).ok()
+}
+
+/// Parses a duration in Protobuf's JSON form, such as `45.837906927s`.
 pub(in crate::ask) fn protobuf_duration(text: &str) -> Option<Duration> {
-    seconds(text.trim().strip_suffix('s')?, 1.0)
+    parse_duration(text.trim().strip_suffix('s')?, 1.0)
 }
 
-/// A positive number of units as a duration, at most [`Duration::MAX`].
-fn seconds(text: &str, unit: f64) -> Option<Duration> {
+/// Parses a positive number of units of `unit` seconds; values beyond [`Duration::MAX`] are cut to it.
+fn parse_duration(text: &str, unit: f64) -> Option<Duration> {
     let seconds = text.trim().parse::<f64>().ok()? * unit;
     (seconds.is_finite() && seconds > 0.0)
         .then(|| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX))
@@ -43,11 +47,11 @@ mod tests {
             headers.insert(*name, value.parse().unwrap());
         }
         let now = SystemTime::UNIX_EPOCH + Duration::from_secs(784_111_777);
-        asked_wait(&headers, now)
+        retry_after(&headers, now)
     }
 
     #[test]
-    fn waits_of_every_form_are_read() {
+    fn waits_of_every_form_are_parsed() {
         let ms = |ms| Some(Duration::from_millis(ms));
         for (pairs, expected) in [
             (vec![("retry-after", "2")], ms(2000)),

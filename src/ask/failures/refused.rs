@@ -1,14 +1,14 @@
-//! The failure of a refused request, [`AskError::refused`]: whether to retry it, which other requests would fail, and which flag helps.
+//! Classification of refused requests, [`AskError::refused`]: whether to retry, which other requests would fail, and which flag helps.
 
-use super::complaint::Complaint;
-use super::failure::{Again, AskError, Reach};
+use super::api_error::ApiError;
+use super::ask_error::{AskError, Reach, Retry};
 use super::wording::Wording;
 use crate::ask::requests::{AdaptableField, FieldState, RequestField, SentFields, is_unsupported};
-use crate::ask::wire::other_wire;
+use crate::ask::wire::requested_wire;
 use crate::ask::wire_kind::Wire;
 use crate::types::FailureKind;
 
-/// Codes and types that mean: no credit. Some servers send them with status 429, although waiting does not help.
+/// Error codes and kinds for an account without credit. Some servers send them with status 429, although waiting does not help.
 const NO_CREDIT: [&str; 6] = [
     "Arrearage",
     "credit_limit",
@@ -17,7 +17,9 @@ const NO_CREDIT: [&str; 6] = [
     "billing_not_active",
     "exceeded_current_quota_error",
 ];
-const NO_CREDIT_WORDS: [&str; 6] = [
+
+/// Phrases for an account without credit.
+const NO_CREDIT_PHRASES: [&str; 6] = [
     "all available credits",
     "spending limit",
     "credit balance",
@@ -26,7 +28,7 @@ const NO_CREDIT_WORDS: [&str; 6] = [
     "out of credits",
 ];
 
-/// Codes and types that mean: moderation refused the content. Another question may be accepted.
+/// Error codes and kinds for content rejected by moderation. Another question may be accepted.
 const MODERATED: [&str; 6] = [
     "DataInspectionFailed",
     "content_filter",
@@ -36,44 +38,45 @@ const MODERATED: [&str; 6] = [
     "data_inspection_failed",
 ];
 
-/// The words of servers, with status 413 or 429, for a request that is larger than a whole minute's limit: no wait helps.
+/// Phrases for a request larger than the limit of a whole minute (status 413 or 429): waiting does not help.
 const TOO_LARGE: [&str; 2] = ["request too large", "request is too large"];
 
-/// The remedy for a request that is too large.
+/// Remedy for a request that is too large.
 const SMALLER: &str = "send smaller images: --image max-side=N, or --image jpeg:95";
 
-/// The remedy for a limit that resets once a day.
+/// Remedy for a limit that resets once a day.
 const NEXT_DAY: &str =
     "a limit for the day is reached: continue with --resume when the day is over";
 
-/// The remedy for an account without credit.
+/// Remedy for an account without credit.
 const ADD_CREDIT: &str = "the account has no credit left: add some, then continue with --resume";
 
 impl AskError {
-    /// The failure of a refused request, from its status and the server's error. Its message is the remedy alone, empty if none is
-    /// known.
+    /// Classifies a refused request by its status and the server's error. The message is only the remedy; empty if none is known.
     pub(in crate::ask) fn refused(
         status: u16,
-        complaint: &Complaint,
+        api_error: &ApiError,
         wire: Wire,
         sent: SentFields<'_>,
     ) -> Self {
-        if let Some(wanted) = other_wire(complaint, wire).filter(|_| (400..500).contains(&status)) {
-            return Self::from_wire(wanted);
+        if let Some(wanted) =
+            requested_wire(api_error, wire).filter(|_| (400..500).contains(&status))
+        {
+            return Self::needs_wire(wanted);
         }
-        let no_credit = complaint.has_code(&NO_CREDIT)
+        let no_credit = api_error.has_code(&NO_CREDIT)
             || (matches!(status, 400 | 402 | 403 | 429)
-                && complaint.mentions_any(&NO_CREDIT_WORDS));
-        // OpenAI forbids probabilities by a status that else is about the key.
+                && api_error.mentions_any(&NO_CREDIT_PHRASES));
+        // OpenAI refuses logprobs with a status that otherwise concerns the key.
         if status == 403
-            && let Some(failed) = Self::from_refused_field(complaint, wire, sent)
+            && let Some(failed) = Self::from_refused_field(api_error, wire, sent)
         {
             return failed;
         }
         if status >= 400
             && status != 401
             && !no_credit
-            && let Some(wording) = Wording::find(complaint, sent.has_image)
+            && let Some(wording) = Wording::find(api_error, sent.has_image)
         {
             return Self {
                 reach: wording.reach(),
@@ -99,7 +102,7 @@ impl AskError {
                 "the proxy asks for a user and password: set them in HTTP_PROXY, or name the host in NO_PROXY",
             ),
             400..500
-                if complaint.has_code(&MODERATED) || (status == 403 && moderated(complaint)) =>
+                if api_error.has_code(&MODERATED) || (status == 403 && is_moderated(api_error)) =>
             {
                 Self::new(FailureKind::Filtered, String::new())
             }
@@ -114,22 +117,22 @@ impl AskError {
             )),
             408 | 425 => Self::transient(FailureKind::Timeout),
             413 => Self::new(FailureKind::Request, SMALLER.to_owned()),
-            429 if complaint.mentions_any(&TOO_LARGE) => {
+            429 if api_error.mentions_any(&TOO_LARGE) => {
                 Self::new(FailureKind::Request, SMALLER.to_owned())
             }
-            429 if complaint.is_daily() => Self {
+            429 if api_error.is_daily() => Self {
                 reach: Reach::Endpoint,
                 ..Self::new(FailureKind::RateLimit, NEXT_DAY.to_owned())
             },
             429 => Self::transient(FailureKind::RateLimit),
-            // 424 is the status of Text Generation Inference for a generation that failed, 498 Groq's for no capacity, 499 nginx's
-            // for a connection that the client closed.
+            // 424: failed generation (Text Generation Inference); 498: no capacity (Groq); 499: connection closed by the client
+            // (nginx).
             409 | 424 | 498 | 499 | 500.. => Self::transient(FailureKind::Server),
-            _ => Self::from_field(complaint, &wire.fields(sent)),
+            _ => Self::from_field(api_error, &wire.fields(sent)),
         }
     }
 
-    /// A failure that every other request would have too.
+    /// Error that every other request would have too.
     fn permanent(hint: &str) -> Self {
         Self {
             reach: Reach::Endpoint,
@@ -137,16 +140,16 @@ impl AskError {
         }
     }
 
-    /// A failure after which the same request may succeed later.
+    /// Error after which the same request may succeed later.
     fn transient(kind: FailureKind) -> Self {
         Self {
-            again: Again::Later,
+            retry: Retry::AfterDelay,
             ..Self::new(kind, String::new())
         }
     }
 
-    /// The failure of a request that the server takes through another wire alone.
-    fn from_wire(wanted: Wire) -> Self {
+    /// Error of a request that the server accepts only through another API.
+    fn needs_wire(wanted: Wire) -> Self {
         let hint = match wanted {
             Wire::Responses => "ask the model through the Responses API: --request wire=responses",
             _ => "ask for a stream: --request wire=chat-stream",
@@ -157,43 +160,45 @@ impl AskError {
         }
     }
 
-    /// The failure of a request that was refused for a field that the program can send in another way; `None` if it was not.
-    fn from_refused_field(complaint: &Complaint, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
-        Some(Self::from_field(complaint, &wire.fields(sent)))
+    /// Error of a request that was refused for a field that the program can send in another way; `None` for other refusals.
+    fn from_refused_field(api_error: &ApiError, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
+        Some(Self::from_field(api_error, &wire.fields(sent)))
             .filter(|failed| failed.refused_field.is_some())
     }
 
-    /// The failure of a request that may have been refused for one of its fields. If the server names the field, every other
-    /// request with it fails too, and so does every request if the server refuses what is not sent any more. If only the text mentions it, the
-    /// cause may be this request alone.
-    fn from_field(complaint: &Complaint, fields: &[RequestField<'_>]) -> Self {
-        let with = |state| fields.iter().filter(move |field| field.state == state);
-        let mut withdrawn = with(FieldState::Withdrawn);
-        let mut by_param = with(FieldState::Sent).filter(|field| field.is_param(complaint));
-        let mut named = with(FieldState::Sent).filter(|field| field.is_named(complaint));
-        let (reach, field) = match by_param.next().or_else(|| named.next()) {
-            Some(field) => (Reach::Endpoint, field),
-            None if withdrawn.any(|field| field.is_named(complaint)) => {
-                return Self::permanent("the server refuses a field that is no longer sent");
-            }
-            None => match with(FieldState::Sent).find(|field| field.is_mentioned(complaint)) {
-                Some(field) => (Reach::Trial, field),
-                None => return Self::new(FailureKind::Request, String::new()),
-            },
+    /// Error of a request that may have been refused for one of its fields.
+    ///
+    /// If the server names a sent field as the cause, every other request with it fails too. If it names a field that is no longer sent,
+    /// every request fails. If the text only mentions a field, the cause may be this request alone.
+    fn from_field(api_error: &ApiError, fields: &[RequestField<'_>]) -> Self {
+        let in_state = |state| fields.iter().filter(move |field| field.state == state);
+        let named = in_state(FieldState::Sent)
+            .find(|field| field.is_param(api_error))
+            .or_else(|| in_state(FieldState::Sent).find(|field| field.is_named(api_error)));
+        let (reach, field) = if let Some(field) = named {
+            (Reach::Endpoint, field)
+        } else if in_state(FieldState::Withdrawn).any(|field| field.is_named(api_error)) {
+            return Self::permanent("the server refuses a field that is no longer sent");
+        } else if let Some(field) =
+            in_state(FieldState::Sent).find(|field| field.is_mentioned(api_error))
+        {
+            (Reach::Trial, field)
+        } else {
+            return Self::new(FailureKind::Request, String::new());
         };
         Self {
             reach,
-            // A number of tokens that is too large is not called unsupported.
+            // Servers do not call a too large number of logprobs unsupported.
             refused_field: field.adaptable.filter(|adaptable| {
-                *adaptable == AdaptableField::TopLogprobs || is_unsupported(complaint)
+                *adaptable == AdaptableField::TopLogprobs || is_unsupported(api_error)
             }),
             ..Self::permanent(field.hint)
         }
     }
 }
 
-fn moderated(complaint: &Complaint) -> bool {
-    complaint.moderated || complaint.mentions_any(&["moderation", "flagged"])
+fn is_moderated(api_error: &ApiError) -> bool {
+    api_error.is_moderated || api_error.mentions_any(&["moderation", "flagged"])
 }
 
 #[cfg(test)]

@@ -22,16 +22,16 @@ fn classify(status: u16, body: &str) -> AskError {
         has_image: true,
         has_key: true,
     };
-    AskError::refused(status, &Complaint::from_body(body), Wire::Chat, sent)
+    AskError::refused(status, &ApiError::from_body(body), Wire::Chat, sent)
 }
 
 #[test]
-fn each_status_has_its_class() {
+fn statuses_are_classified() {
     for status in [301, 302, 307, 401, 402, 403, 404, 405, 407, 410] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.again),
-            (Reach::Endpoint, Again::Never),
+            (class.reach, class.retry),
+            (Reach::Endpoint, Retry::Never),
             "{status}"
         );
         assert!(!class.failure.message.is_empty(), "{status}");
@@ -49,8 +49,8 @@ fn each_status_has_its_class() {
     ] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.again),
-            (Reach::Trial, Again::Later),
+            (class.reach, class.retry),
+            (Reach::Trial, Retry::AfterDelay),
             "{status}"
         );
         assert_eq!(class.failure.kind, kind);
@@ -58,15 +58,15 @@ fn each_status_has_its_class() {
     for status in [400, 413, 415, 422] {
         let class = classify(status, "");
         assert_eq!(
-            (class.reach, class.again),
-            (Reach::Trial, Again::Never),
+            (class.reach, class.retry),
+            (Reach::Trial, Retry::Never),
             "{status}"
         );
     }
 }
 
 #[test]
-fn codes_and_texts_overrule_the_status() {
+fn codes_and_messages_override_the_status() {
     for (status, body) in [
         (
             429,
@@ -92,27 +92,27 @@ fn codes_and_texts_overrule_the_status() {
     ] {
         let class = classify(status, body);
         assert_eq!(
-            (class.reach, class.again),
-            (Reach::Endpoint, Again::Never),
+            (class.reach, class.retry),
+            (Reach::Endpoint, Retry::Never),
             "{body}"
         );
     }
-    // Gemini's limit per minute mentions a quota too; waiting helps.
+    // Gemini's limit per minute also mentions a quota, but waiting helps.
     let minute = r#"{"error":{"code":429,"status":"RESOURCE_EXHAUSTED","message":"You exceeded your current quota, please check your plan"}}"#;
-    assert_eq!(classify(429, minute).again, Again::Later);
+    assert_eq!(classify(429, minute).retry, Retry::AfterDelay);
     let moderated = r#"{"error":{"code":403,"message":"x","metadata":{"reasons":["violence"]}}}"#;
     let filtered = r#"{"error":{"code":"content_filter","message":"x","innererror":{"code":"ResponsibleAIPolicyViolation"}}}"#;
     for (status, body) in [(403, moderated), (400, filtered)] {
         let class = classify(status, body);
         assert_eq!(
-            (class.reach, class.again, class.failure.kind),
-            (Reach::Trial, Again::Never, FailureKind::Filtered)
+            (class.reach, class.retry, class.failure.kind),
+            (Reach::Trial, Retry::Never, FailureKind::Filtered)
         );
     }
 }
 
 #[test]
-fn the_flag_that_helps_is_named() {
+fn the_message_names_the_helpful_flag() {
     for (body, reach, flag) in [
         (
             r#"{"error":{"param":"temperature","message":"x"}}"#,
@@ -139,7 +139,7 @@ fn the_flag_that_helps_is_named() {
             Reach::Endpoint,
             "--temperature default",
         ),
-        // The words may be about this request alone.
+        // The message may concern this request alone.
         (
             r#"{"error":{"message":"max_tokens is too large for this prompt: 1024"}}"#,
             Reach::Trial,
@@ -155,7 +155,7 @@ fn the_flag_that_helps_is_named() {
         assert_eq!(class.reach, reach, "{body}");
         assert!(class.failure.message.contains(flag), "{body}");
     }
-    // A field that was not sent is not the cause.
+    // A field that was not sent cannot be the cause.
     for body in [
         r#"{"error":{"param":"max_completion_tokens","message":"x"}}"#,
         r#"{"error":{"param":"messages.[0].content.[1].image_url.detail","message":"x"}}"#,
@@ -165,7 +165,7 @@ fn the_flag_that_helps_is_named() {
 }
 
 #[test]
-fn an_unsupported_field_differs_from_one_with_a_wrong_value() {
+fn unsupported_fields_differ_from_wrong_values() {
     for (body, refused_field) in [
         (
             r#"{"error":{"param":"max_tokens","code":"unsupported_parameter","message":"x"}}"#,

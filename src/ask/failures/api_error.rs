@@ -1,4 +1,4 @@
-//! The error in a server's response, in any of the known JSON shapes: [`Complaint`].
+//! Errors in the responses of servers, in all known JSON shapes: [`ApiError`].
 
 use std::time::Duration;
 
@@ -8,41 +8,41 @@ use crate::ask::pace::{protobuf_duration, wait_in_words};
 use crate::ask::replies::bounded_json::{parse, parse_start};
 use crate::types::Usage;
 
-/// An error as the server states it; secrets are not yet removed.
+/// Error that a server reports in a response. Secrets are not yet removed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(in crate::ask) struct Complaint {
-    /// The error text of the server.
+pub(in crate::ask) struct ApiError {
+    /// Error text of the server.
     pub(in crate::ask) message: String,
-    /// The kind of error, as `invalid_request_error` or `insufficient_quota`.
+    /// Kind of error, such as `invalid_request_error` or `insufficient_quota`.
     pub(super) kind: Option<String>,
-    /// The error code, as `model_not_found`, or a number as text.
+    /// Error code, such as `model_not_found`, or a number as text.
     pub(in crate::ask) code: Option<String>,
-    /// The field of the request that the error is about.
+    /// Request field that caused the error.
     pub(in crate::ask) param: Option<String>,
-    /// Whether moderation refused the content of the request, and not the account.
-    pub(super) moderated: bool,
-    /// The wait that the error states, in a field or in words.
+    /// True if moderation rejected the content of the request, as opposed to the account.
+    pub(super) is_moderated: bool,
+    /// Wait stated in the error, in a field or in its text.
     pub(in crate::ask) wait: Option<Duration>,
-    /// Ids of the limits that were reached, as `GenerateRequestsPerDayPerProject`.
+    /// Ids of the reached limits, such as `GenerateRequestsPerDayPerProject`.
     limits: Vec<String>,
-    /// Google's words for the cause, as `API_KEY_INVALID`.
+    /// Google's names of the cause, such as `API_KEY_INVALID`.
     reasons: Vec<String>,
 }
 
-/// The number of errors within errors that are opened: routers pass on a server's error as text.
-const MOST_NESTED: usize = 3;
+/// Maximum depth of errors nested in errors: routers embed the error of a server as text.
+const MAX_DEPTH: usize = 3;
 
-/// The longest message that is read, in bytes; chosen: it is searched for many phrases, and its first line is shown.
-const LONGEST_MESSAGE: usize = 64 << 10;
+/// Maximum length of a message, in bytes; chosen: it is searched for many phrases, and its first line is printed.
+const MAX_MESSAGE: usize = 64 << 10;
 
-/// Words and ids of a limit that resets once a day.
+/// Phrases in the text or the id of a limit that resets once a day.
 const DAILY: [&str; 6] = ["(rpd)", "(tpd)", "perday", "per day", "per-day", "daily"];
 
-impl Complaint {
-    /// The error at the top level of a body, if there is one: `error` as an object or text, or the flat shapes of vLLM, FastAPI
-    /// and problem+json.
+impl ApiError {
+    /// Parses the error at the top level of a body: `error` as an object or text, or the flat shapes of vLLM, FastAPI and
+    /// problem+json. `None` if the body has no error.
     pub(in crate::ask) fn from_json(body: &Value) -> Option<Self> {
-        // Gemini sends a list with one error.
+        // Gemini sends a list of one error.
         if let Value::Array(items) = body {
             return items.first().and_then(Self::from_json);
         }
@@ -53,54 +53,56 @@ impl Complaint {
                 .then(|| Self::from_error(body))
         });
         found.map(|found| Self {
-            // Hugging Face states it beside the error.
+            // Hugging Face puts the wait next to the error.
             wait: found.wait.max(stated_wait(body)),
             ..found
         })
     }
 
-    /// The error in the field `error`; flat shapes are not read.
+    /// Parses the error in the field `error`; flat shapes are ignored.
     pub(in crate::ask) fn in_error(body: &Value) -> Option<Self> {
         body.get("error")
             .filter(|error| is_filled(error))
             .map(Self::from_error)
     }
 
-    /// The error in the value of a field `error`.
+    /// Parses the value of a field `error`.
     pub(in crate::ask) fn from_error(error: &Value) -> Self {
-        Self::nested(error, MOST_NESTED)
+        Self::nested(error, MAX_DEPTH)
     }
 
-    /// The error in a value, or in its message if that is an error as text or as an object; at most `depth` levels are opened.
+    /// Parses an error, and up to `depth` levels of errors nested in its message as an object or as JSON text.
     fn nested(error: &Value, depth: usize) -> Self {
-        let own = Self::flat(error);
-        let message = error.get("message").or_else(|| error.get("error"));
-        let inner = message
+        let outer = Self::flat(error);
+        let inner = error
+            .get("message")
+            .or_else(|| error.get("error"))
             .filter(|_| depth > 0)
             .and_then(|message| match message {
                 Value::Object(_) => Some(message.clone()),
-                Value::String(text) => object_in(text),
+                Value::String(text) => embedded_error(text),
                 _ => None,
             });
         let Some(inner) = inner else {
-            return own;
+            return outer;
         };
         let inner = match inner.get("error").filter(|error| error.is_object()) {
             Some(error) => Self::nested(error, depth - 1),
             None => Self::nested(&inner, depth - 1),
         };
         Self {
-            kind: inner.kind.or(own.kind),
-            code: inner.code.or(own.code),
-            param: inner.param.or(own.param),
-            moderated: inner.moderated || own.moderated,
-            wait: inner.wait.max(own.wait),
-            limits: [inner.limits, own.limits].concat(),
-            reasons: [inner.reasons, own.reasons].concat(),
+            kind: inner.kind.or(outer.kind),
+            code: inner.code.or(outer.code),
+            param: inner.param.or(outer.param),
+            is_moderated: inner.is_moderated || outer.is_moderated,
+            wait: inner.wait.max(outer.wait),
+            limits: [inner.limits, outer.limits].concat(),
+            reasons: [inner.reasons, outer.reasons].concat(),
             message: inner.message,
         }
     }
 
+    /// Parses an error without the errors nested in it.
     fn flat(error: &Value) -> Self {
         let metadata = error.get("metadata");
         let mut message = text(error)
@@ -110,21 +112,21 @@ impl Complaint {
                     .find_map(|f| text(error.get(f)?))
             })
             .unwrap_or_else(|| error.to_string());
-        // OpenRouter sends the provider's text in addition to its own.
+        // OpenRouter adds the text of the provider.
         if let Some(raw) = metadata.and_then(|metadata| text(metadata.get("raw")?)) {
             message = format!("{message}: {raw}");
         }
-        let message = shortened(message);
+        let message = truncated(message);
         let field = |name| error.get(name).and_then(text_or_number);
         Self {
             kind: field("type"),
             code: field("code").or_else(|| field("status")),
-            param: field("param").or_else(|| located(error)),
-            moderated: metadata.is_some_and(|metadata| {
+            param: field("param").or_else(|| error_location(error)),
+            is_moderated: metadata.is_some_and(|metadata| {
                 metadata.get("reasons").is_some() || metadata.get("flagged_input").is_some()
             }),
             wait: wait_in_words(&message).max(stated_wait(error)),
-            limits: limits(error),
+            limits: quota_ids(error),
             reasons: details(error)
                 .filter_map(|detail| text_or_number(detail.get("reason")?))
                 .collect(),
@@ -132,29 +134,29 @@ impl Complaint {
         }
     }
 
-    /// Whether the limit that was reached resets once a day.
+    /// True if the reached limit resets once a day.
     pub(super) fn is_daily(&self) -> bool {
         let message = self.message.to_lowercase();
         self.limits
             .iter()
             .map(|limit| limit.to_lowercase())
             .chain([message])
-            .any(|text| DAILY.iter().any(|words| text.contains(words)))
+            .any(|text| DAILY.iter().any(|phrase| text.contains(phrase)))
     }
 
-    /// The error in the body of a refused request: JSON, an HTML page or plain text.
+    /// Parses the body of a refused request: JSON, an HTML page or plain text.
     pub(in crate::ask) fn from_body(body: &str) -> Self {
         let parsed = parse(body).ok();
         parsed
             .as_ref()
             .and_then(Self::from_json)
             .unwrap_or_else(|| Self {
-                message: page_title(body).unwrap_or_else(|| shortened(body.trim().to_owned())),
+                message: page_title(body).unwrap_or_else(|| truncated(body.trim().to_owned())),
                 ..Self::default()
             })
     }
 
-    /// Whether the code or kind is one of these.
+    /// True if the code or the kind is one of these.
     pub(in crate::ask) fn has_code(&self, codes: &[&str]) -> bool {
         [&self.code, &self.kind]
             .into_iter()
@@ -162,14 +164,14 @@ impl Complaint {
             .any(|code| codes.contains(&code.as_str()))
     }
 
-    /// Whether the message has one of these phrases, without regard to letter case.
+    /// True if the message contains one of these lower-case phrases, ignoring case.
     pub(in crate::ask) fn mentions_any(&self, phrases: &[&str]) -> bool {
         let message = self.message.to_lowercase();
         phrases.iter().any(|phrase| message.contains(phrase))
     }
 
-    /// The message, the codes and the causes, in lower case.
-    pub(super) fn texts(&self) -> Vec<String> {
+    /// Code, kind, causes and message, in lower case.
+    pub(super) fn lower_case_texts(&self) -> Vec<String> {
         [&self.code, &self.kind]
             .into_iter()
             .flatten()
@@ -179,63 +181,63 @@ impl Complaint {
             .collect()
     }
 
-    /// The error code as an HTTP status; `None` if it is not one from 400 to 599.
+    /// The error code as an HTTP status; `None` unless it is a number from 400 to 599.
     pub(in crate::ask) fn status(&self) -> Option<u16> {
         let status = self.code.as_ref()?.parse().ok()?;
         (400..600).contains(&status).then_some(status)
     }
 }
 
-/// The reason why a body with a status of success has no reply.
+/// Reason why a response with a success status has no reply.
 #[derive(Debug, PartialEq, Eq)]
-pub(in crate::ask) enum UnreadableReply {
-    /// The body states an error.
-    Complaint(Box<Complaint>),
-    /// The body has no reply of the API.
-    Other(Box<Unreadable>),
+pub(in crate::ask) enum ReplyError {
+    /// The body contains an error of the server.
+    Api(Box<ApiError>),
+    /// The body contains no reply in the form of the API.
+    Unreadable(Box<Unreadable>),
 }
 
-/// A body without a usable reply.
+/// A response body without a usable reply.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(in crate::ask) struct Unreadable {
-    /// The content of the body, in words.
-    pub(in crate::ask) what: String,
-    /// The tokens that it was charged; `None` if the server does not state it.
+    /// Description of the body, as a phrase that follows "answered with".
+    pub(in crate::ask) description: String,
+    /// Tokens charged for it; `None` if the server does not report them.
     pub(in crate::ask) usage: Option<Usage>,
-    /// The word for the reason why the model stopped, if that is not known or is no end.
+    /// Finish reason of the server, if it is unknown or means that the reply is incomplete.
     pub(in crate::ask) finish: Option<String>,
-    /// Whether the same request would end in the same way.
+    /// True if the same request would fail in the same way.
     pub(in crate::ask) is_final: bool,
 }
 
 impl Unreadable {
-    /// A body of this content, which was not charged as far as is known.
-    pub(in crate::ask) fn new(what: impl Into<String>) -> Self {
+    /// A body with this description, without known charges.
+    pub(in crate::ask) fn new(description: impl Into<String>) -> Self {
         Self {
-            what: what.into(),
+            description: description.into(),
             ..Self::default()
         }
     }
 
-    /// The same body with the tokens that it was charged.
-    pub(in crate::ask) fn charged(self, usage: Option<Usage>) -> Self {
+    /// The same body with the tokens charged for it.
+    pub(in crate::ask) fn with_usage(self, usage: Option<Usage>) -> Self {
         Self { usage, ..self }
     }
 }
 
-impl From<Unreadable> for UnreadableReply {
+impl From<Unreadable> for ReplyError {
     fn from(unreadable: Unreadable) -> Self {
-        Self::Other(Box::new(unreadable))
+        Self::Unreadable(Box::new(unreadable))
     }
 }
 
-/// The beginning of a long message.
-fn shortened(mut message: String) -> String {
-    message.truncate(message.floor_char_boundary(LONGEST_MESSAGE));
+/// Cuts a message to [`MAX_MESSAGE`].
+fn truncated(mut message: String) -> String {
+    message.truncate(message.floor_char_boundary(MAX_MESSAGE));
     message
 }
 
-/// The title of an HTML page; `None` if the body is not one.
+/// Describes an HTML page by its title; `None` if the body is not an HTML page.
 pub(in crate::ask) fn page_title(body: &str) -> Option<String> {
     // ASCII lower case keeps byte positions.
     let lower = body.trim_start().to_ascii_lowercase();
@@ -254,8 +256,8 @@ pub(in crate::ask) fn page_title(body: &str) -> Option<String> {
     Some(format!("an HTML page titled {title:?}"))
 }
 
-/// The JSON object in a text that may have words before it; `None` if there is none.
-fn object_in(text: &str) -> Option<Value> {
+/// Parses the first JSON object in a text; `None` if there is none or it does not look like an error.
+fn embedded_error(text: &str) -> Option<Value> {
     let object = &text[text.find('{')?..];
     let value = parse_start(object).ok()?;
     let is_error = ["error", "message", "detail"]
@@ -264,8 +266,8 @@ fn object_in(text: &str) -> Option<Value> {
     is_error.then_some(value)
 }
 
-/// The field that a list of `detail` or of errors points to: the last part of its first `loc`.
-fn located(error: &Value) -> Option<String> {
+/// Name of the request field that caused the error: the last part of the first `loc` in `detail` or in a list of errors.
+fn error_location(error: &Value) -> Option<String> {
     [error.get("detail"), Some(error)]
         .into_iter()
         .flatten()
@@ -274,7 +276,7 @@ fn located(error: &Value) -> Option<String> {
         .find_map(|item| text_or_number(item.get("loc")?.as_array()?.last()?))
 }
 
-/// The entries of Google's `details`.
+/// Entries of Google's `details`.
 fn details(error: &Value) -> impl Iterator<Item = &Value> {
     error
         .get("details")
@@ -283,28 +285,30 @@ fn details(error: &Value) -> impl Iterator<Item = &Value> {
         .flatten()
 }
 
-/// The wait that an error states in a field: Google's `retryDelay`, OpenRouter's `retry_after_seconds` and headers, Hugging Face's
-/// `estimated_time`.
+/// Longest wait in the fields of an error: Google's `retryDelay`, OpenRouter's `retry_after_seconds` and headers, and
+/// Hugging Face's `estimated_time`.
 fn stated_wait(error: &Value) -> Option<Duration> {
-    let delays =
-        details(error).filter_map(|detail| protobuf_duration(detail.get("retryDelay")?.as_str()?));
     let metadata = error.get("metadata");
-    let headers = metadata.and_then(|metadata| metadata.get("headers")?.as_object());
-    let header = headers.and_then(|headers| {
-        let (_, value) = headers
-            .iter()
-            .find(|(name, _)| name.eq_ignore_ascii_case("retry-after"))?;
-        text_or_number(value)
-    });
+    let header = metadata
+        .and_then(|metadata| metadata.get("headers")?.as_object())
+        .into_iter()
+        .flatten()
+        .find(|(name, _)| name.eq_ignore_ascii_case("retry-after"))
+        .and_then(|(_, value)| text_or_number(value));
     let field = metadata.and_then(|metadata| text_or_number(metadata.get("retry_after_seconds")?));
     let estimated = error.get("estimated_time").and_then(text_or_number);
-    let seconds = [header, field, estimated].into_iter().flatten();
-    let seconds = seconds.filter_map(|seconds| protobuf_duration(&format!("{seconds}s")));
-    delays.chain(seconds).max()
+    let seconds = [header, field, estimated]
+        .into_iter()
+        .flatten()
+        .filter_map(|seconds| protobuf_duration(&format!("{seconds}s")));
+    details(error)
+        .filter_map(|detail| protobuf_duration(detail.get("retryDelay")?.as_str()?))
+        .chain(seconds)
+        .max()
 }
 
-/// The ids of the limits in Google's `details`.
-fn limits(error: &Value) -> Vec<String> {
+/// Ids of the limits in Google's `details`.
+fn quota_ids(error: &Value) -> Vec<String> {
     details(error)
         .filter_map(|detail| detail.get("violations")?.as_array())
         .flatten()
@@ -312,6 +316,7 @@ fn limits(error: &Value) -> Vec<String> {
         .collect()
 }
 
+/// True for a value with content: not null, false or empty.
 fn is_filled(value: &Value) -> bool {
     match value {
         Value::Null | Value::Bool(false) => false,
@@ -322,7 +327,7 @@ fn is_filled(value: &Value) -> bool {
     }
 }
 
-/// A text, or the joined texts of a list of errors, as FastAPI sends them.
+/// A string with content, or the joined messages of a list of errors, as FastAPI sends them.
 fn text(value: &Value) -> Option<String> {
     match value {
         Value::String(text) if !text.trim().is_empty() => Some(text.clone()),
@@ -337,7 +342,7 @@ fn text(value: &Value) -> Option<String> {
     }
 }
 
-/// A text or a number, as text.
+/// A string or a number, as text.
 fn text_or_number(value: &Value) -> Option<String> {
     match value {
         Value::String(text) => Some(text.clone()),
@@ -351,7 +356,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_of_every_shape_are_read() {
+    fn errors_of_every_shape_are_parsed() {
         for (body, message, code) in [
             (
                 r#"{"error":{"message":"m","type":"t","code":"c"}}"#,
@@ -396,14 +401,14 @@ mod tests {
             (" upstream\n", "upstream", None),
             ("", "", None),
         ] {
-            let complaint = Complaint::from_body(body);
-            assert_eq!(complaint.message, message, "{body}");
-            assert_eq!(complaint.code.as_deref(), code, "{body}");
+            let api_error = ApiError::from_body(body);
+            assert_eq!(api_error.message, message, "{body}");
+            assert_eq!(api_error.code.as_deref(), code, "{body}");
         }
     }
 
     #[test]
-    fn errors_within_errors_and_lists_are_opened() {
+    fn nested_errors_are_parsed() {
         for (body, message, code, param) in [
             (
                 r#"[{"error":{"message":"m","code":429}}]"#,
@@ -429,14 +434,14 @@ mod tests {
                 None,
                 Some("logprobs"),
             ),
-            // Five levels: the fourth is shown as it is.
+            // Five levels: the fourth remains JSON text.
             (
                 r#"{"error":{"message":{"message":{"message":{"message":{"message":"x"}}}}}}"#,
                 r#"{"message":{"message":"x"}}"#,
                 None,
                 None,
             ),
-            // Braces that are no error stay a part of the words.
+            // A JSON object that is not an error remains part of the message.
             (
                 r#"{"error":{"message":"use {\"a\": 1}"}}"#,
                 r#"use {"a": 1}"#,
@@ -444,15 +449,15 @@ mod tests {
                 None,
             ),
         ] {
-            let complaint = Complaint::from_body(body);
-            assert_eq!(complaint.message, message, "{body}");
-            assert_eq!(complaint.code.as_deref(), code, "{body}");
-            assert_eq!(complaint.param.as_deref(), param, "{body}");
+            let api_error = ApiError::from_body(body);
+            assert_eq!(api_error.message, message, "{body}");
+            assert_eq!(api_error.code.as_deref(), code, "{body}");
+            assert_eq!(api_error.param.as_deref(), param, "{body}");
         }
     }
 
     #[test]
-    fn waits_and_days_are_read_from_every_shape() {
+    fn waits_and_daily_limits_are_parsed() {
         let gemini = |id: &str| {
             format!(
                 r#"[{{"error":{{"code":429,"message":"You exceeded your current quota.","details":[{{"violations":[{{"quotaId":"{id}"}}]}},{{"@type":"type.googleapis.com/google.rpc.RetryInfo","retryDelay":"45.837906927s"}}]}}}}]"#
@@ -474,15 +479,15 @@ mod tests {
             ),
             (r#"{"error":{"message":"slow down"}}"#.to_owned(), None, false),
         ] {
-            let complaint = Complaint::from_body(&body);
-            let wait = complaint.wait.map(|wait| wait.as_secs_f64());
+            let api_error = ApiError::from_body(&body);
+            let wait = api_error.wait.map(|wait| wait.as_secs_f64());
             assert_eq!(wait, seconds, "{body}");
-            assert_eq!(complaint.is_daily(), is_daily, "{body}");
+            assert_eq!(api_error.is_daily(), is_daily, "{body}");
         }
     }
 
     #[test]
-    fn a_body_without_an_error_is_not_a_complaint() {
+    fn a_body_without_an_error_has_none() {
         for body in [
             r#"{"choices":[],"error":null}"#,
             r#"{"choices":[],"error":""}"#,
@@ -491,7 +496,7 @@ mod tests {
             r"[]",
         ] {
             assert_eq!(
-                Complaint::from_json(&serde_json::from_str(body).unwrap()),
+                ApiError::from_json(&serde_json::from_str(body).unwrap()),
                 None,
                 "{body}"
             );

@@ -12,7 +12,7 @@ use rustls::{
 };
 use rustls_platform_verifier::Verifier;
 
-/// The settings of a client that trusts these certificates besides the system's, as authorities and as certificates of a server.
+/// TLS settings of a client that trusts these certificates in addition to the system's, both as authorities and as server certificates.
 ///
 /// # Errors
 /// If a certificate cannot be used.
@@ -20,8 +20,8 @@ pub(super) fn client_config(
     trusted: &[CertificateDer<'static>],
     provider: Arc<CryptoProvider>,
 ) -> Result<ClientConfig, Error> {
-    let verifier = OwnCertificates {
-        usual: Verifier::new_with_extra_roots(trusted.iter().cloned(), Arc::clone(&provider))?,
+    let verifier = CustomVerifier {
+        platform: Verifier::new_with_extra_roots(trusted.iter().cloned(), Arc::clone(&provider))?,
         trusted: trusted.to_vec(),
     };
     let config =
@@ -34,17 +34,17 @@ pub(super) fn client_config(
     Ok(config)
 }
 
-/// The usual checks, but that a server may show a trusted certificate itself.
+/// Verifier of the platform that also accepts a trusted CA certificate as the server's own certificate.
 ///
-/// `openssl req -x509` makes certificates that may sign others (`CA:TRUE`), which no server may show by the usual checks. Other
-/// clients take one that the user trusts.
+/// `openssl req -x509` creates certificates with `CA:TRUE`, which the platform verifier rejects for a server. Other clients accept
+/// such a certificate if the user trusts it.
 #[derive(Debug)]
-struct OwnCertificates {
-    usual: Verifier,
+struct CustomVerifier {
+    platform: Verifier,
     trusted: Vec<CertificateDer<'static>>,
 }
 
-impl ServerCertVerifier for OwnCertificates {
+impl ServerCertVerifier for CustomVerifier {
     fn verify_server_cert(
         &self,
         end_entity: &CertificateDer<'_>,
@@ -53,14 +53,18 @@ impl ServerCertVerifier for OwnCertificates {
         ocsp_response: &[u8],
         now: UnixTime,
     ) -> Result<ServerCertVerified, Error> {
-        let usual = &self.usual;
-        let verified =
-            usual.verify_server_cert(end_entity, intermediates, server_name, ocsp_response, now);
-        // The dates are checked before.
+        let verified = self.platform.verify_server_cert(
+            end_entity,
+            intermediates,
+            server_name,
+            ocsp_response,
+            now,
+        );
+        // The platform verifier checks the dates before it reports this error.
         match verified {
             Err(Error::InvalidCertificate(CertificateError::Other(OtherError(error))))
                 if error.to_string().contains("CaUsedAsEndEntity")
-                    && self.trusted.iter().any(|own| own == end_entity) =>
+                    && self.trusted.iter().any(|trusted| trusted == end_entity) =>
             {
                 verify_server_name(&ParsedCertificate::try_from(end_entity)?, server_name)?;
                 Ok(ServerCertVerified::assertion())
@@ -75,7 +79,7 @@ impl ServerCertVerifier for OwnCertificates {
         cert: &CertificateDer<'_>,
         dss: &DigitallySignedStruct,
     ) -> Result<HandshakeSignatureValid, Error> {
-        self.usual.verify_tls12_signature(message, cert, dss)
+        self.platform.verify_tls12_signature(message, cert, dss)
     }
 
     fn verify_tls13_signature(
@@ -84,10 +88,10 @@ impl ServerCertVerifier for OwnCertificates {
         cert: &CertificateDer<'_>,
         dss: &DigitallySignedStruct,
     ) -> Result<HandshakeSignatureValid, Error> {
-        self.usual.verify_tls13_signature(message, cert, dss)
+        self.platform.verify_tls13_signature(message, cert, dss)
     }
 
     fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
-        self.usual.supported_verify_schemes()
+        self.platform.supported_verify_schemes()
     }
 }

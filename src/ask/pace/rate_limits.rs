@@ -70,7 +70,7 @@ impl RateLimits {
     }
 
     /// Advice for requests of `tokens` tokens each; the stricter limit decides.
-    pub(super) fn asks(&self, tokens: f64) -> PaceAdvice {
+    pub(super) fn advice(&self, tokens: f64) -> PaceAdvice {
         let requests = self
             .requests
             .map_or(PaceAdvice::Nothing, |limit| limit.advice(1.0));
@@ -184,7 +184,7 @@ mod tests {
                 ("x-ratelimit-remaining-requests", remaining),
                 ("x-ratelimit-reset-requests", reset),
             ])
-            .asks(1000.0)
+            .advice(1000.0)
         };
         assert_eq!(openai("499", "120ms"), PaceAdvice::Nothing);
         // 250 left of 500 a minute: the spacing matches the refill rate, one request in 120 ms.
@@ -210,11 +210,11 @@ mod tests {
             ("anthropic-ratelimit-tokens-reset", "2026-01-01T00:00:30Z"),
         ]);
         assert_eq!(
-            tokens.asks(1000.0),
+            tokens.advice(1000.0),
             PaceAdvice::Spacing(Duration::from_secs(3))
         );
         assert_eq!(
-            tokens.asks(20_000.0),
+            tokens.advice(20_000.0),
             PaceAdvice::Pause(Duration::from_secs(30))
         );
     }

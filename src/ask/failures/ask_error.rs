@@ -1,0 +1,129 @@
+//! Error of a request or a question without a reply: [`AskError`].
+
+use std::time::Duration;
+
+use super::quota_refusal::QuotaRefusal;
+use crate::ask::costs::Charge;
+use crate::ask::requests::AdaptableField;
+use crate::types::{Failure, FailureKind, LostAttempts, Usage};
+
+/// Requests that a failure affects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// Only this request; another may succeed.
+    Trial,
+    /// Every request of this size. Before the first reply of the model: every further request to it.
+    Alike,
+    /// Every further request to this model: the cause is the key, the credit, the address, the name or the parameters.
+    Endpoint,
+    /// No other request: the run ended before the reply, and the request may not have been sent.
+    Interrupted,
+}
+
+/// Whether and when to retry a request without a reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Retry {
+    /// Do not retry: the same request would fail again.
+    Never,
+    /// Retry after a delay; this uses one of `--retries`.
+    AfterDelay,
+    /// Retry as soon as the endpoint accepts requests again. This does not use a retry; only `--retries patience` ends it.
+    WhenAccepted,
+}
+
+/// Error of a request, or of a question after all its requests.
+///
+/// The run stores only its [`Failure`]; the other fields decide how the run continues.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}", failure.message)]
+pub struct AskError {
+    /// Failure to store; for a question, the failure of its last request.
+    pub failure: Failure,
+    /// Number of requests that were sent.
+    pub attempts: u32,
+    /// Requests that the failure affects.
+    pub reach: Reach,
+    /// Field that the server refused, if the program can send it in another way.
+    pub refused_field: Option<AdaptableField>,
+    /// Attempts that were charged.
+    pub lost: Box<LostAttempts>,
+    /// Finish reason of the server, if it is the reason for the missing reply.
+    pub finish: Option<String>,
+    pub(crate) retry: Retry,
+    /// Wait that the server asked for.
+    pub(crate) wait: Option<Duration>,
+    /// True if the request may have had an effect that the server did not report: a charge, a file or a batch.
+    pub(crate) may_have_effect: bool,
+    /// Refusal of a batch because too many tokens are enqueued; `None` for other reasons.
+    pub(crate) quota: Option<Box<QuotaRefusal>>,
+}
+
+impl AskError {
+    /// Error of one request without an HTTP status, which is not retried and does not affect other requests. It may have had an effect if
+    /// it timed out or has a response.
+    pub(crate) fn new(kind: FailureKind, message: String) -> Self {
+        Self {
+            may_have_effect: matches!(kind, FailureKind::Timeout | FailureKind::Response),
+            failure: Failure {
+                kind,
+                status: None,
+                message,
+            },
+            attempts: 1,
+            reach: Reach::Trial,
+            refused_field: None,
+            lost: Box::default(),
+            finish: None,
+            retry: Retry::Never,
+            wait: None,
+            quota: None,
+        }
+    }
+
+    /// Error of a question that was abandoned while its request was in flight. The request may be charged; the same command asks it again.
+    pub(crate) fn given_up() -> Self {
+        let message = "given up while in flight, because the run was interrupted".to_owned();
+        Self {
+            reach: Reach::Interrupted,
+            ..Self::new(FailureKind::Timeout, message)
+        }
+    }
+
+    /// Adds a charged attempt with these tokens.
+    pub(in crate::ask) fn with_charge(mut self, usage: Option<Usage>) -> Self {
+        self.lost.add(usage);
+        self
+    }
+
+    /// Charge for the request.
+    pub(in crate::ask) fn charge(&self) -> Charge {
+        match *self.lost {
+            lost if lost.attempts > 0 => Charge::Stated(lost.usage),
+            _ if self.may_have_effect => Charge::Unknown,
+            _ => Charge::Nothing,
+        }
+    }
+
+    /// Turns the error of the last request into the error of the question, with all its attempts and charges.
+    pub(in crate::ask) fn with_attempts(self, attempts: u32, lost: LostAttempts) -> Self {
+        Self {
+            attempts,
+            lost: Box::new(lost),
+            ..self
+        }
+    }
+
+    /// True if the same call of the Files or Batch API would fail again: the key, the address or the request is wrong.
+    pub(crate) fn is_permanent(&self) -> bool {
+        let is_temporary = matches!(
+            self.failure.status,
+            None | Some(408 | 409 | 425 | 429 | 500..)
+        );
+        !is_temporary && self.quota.is_none()
+    }
+
+    /// True if the server does not have the called API.
+    pub(crate) fn is_unsupported(&self) -> bool {
+        matches!(self.failure.status, Some(404 | 405 | 501))
+    }
+}
