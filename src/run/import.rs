@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::dataset::FolderArgs;
-use crate::dataset::frame_folder::{self, FramePaths};
+use crate::dataset::frame_folder::{self, FrameOutput};
 use crate::error::{Error, Result};
 use crate::files::reading::open;
 use crate::images::frames::InputTally;
@@ -210,7 +210,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let listing = adapter.listing();
     for scene in &scenes {
         if let Some(names) = listing.names.get(*scene) {
-            frame_folder::names(out, scene, names)?;
+            frame_folder::write_segment_names(out, scene, names)?;
         }
     }
     let mut info = json!({
@@ -224,7 +224,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
         info["renders"] = renders.clone();
     }
     let lines = written.iter().map(|written| &written.line);
-    frame_folder::finish(out, &listing.labels, &info, lines)?;
+    frame_folder::write_folder_files(out, &listing.labels, &info, lines)?;
     let listed = listing.frames.len();
     let mut output = format!(
         "{}: {} of {}{}{}\n{note}",
@@ -300,19 +300,19 @@ fn write_frame(
     let ImportedImage { file, rgb, maps } = ImportedImage::read(args, adapter, frame)?;
     let note = file.note();
     tally.add(&FrameId(frame.rgb.display().to_string()), &note);
-    let paths = FramePaths {
+    let output = FrameOutput {
         out,
         scene: &frame.scene,
         frame: &frame.frame,
     };
-    let mut line = paths.line((rgb.width(), rgb.height()));
+    let mut line = output.line((rgb.width(), rgb.height()));
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
     // All but plain PNG files are copied as they are, so that they are read here as anywhere else.
     let image = if file.ending() == "png" && note == InputNote::default() {
-        paths.write("rgb", "png", &png(&rgb)?)?
+        output.write("rgb", "png", &png(&rgb)?)?
     } else {
-        paths.write("rgb", file.ending(), file.bytes())?
+        output.write("rgb", file.ending(), file.bytes())?
     };
     line.insert("rgb".to_owned(), json!(image));
     let FrameMaps {
@@ -324,13 +324,13 @@ fn write_frame(
     let median = depth.as_ref().and_then(median);
     let depth_folder = adapter.depth_folder(frame);
     if let Some(depth) = &depth {
-        paths.depth(&mut line, depth, adapter.listing().depth_kind)?;
+        output.write_depth(&mut line, depth, adapter.listing().depth_kind)?;
     }
     if let Some(semantic) = &semantic {
-        paths.semantic(&mut line, semantic)?;
+        output.write_semantic(&mut line, semantic)?;
     }
     if let Some(segments) = &segments {
-        paths.segments(&mut line, segments, adapter.listing().segmentation)?;
+        output.write_segments(&mut line, segments, adapter.listing().segmentation)?;
     }
     // The camera of a data set is that of the image as it is stored.
     let is_stored = note.orientation.is_none();
