@@ -140,7 +140,7 @@ pub(super) fn depth(path: &Path, scale: Option<f64>) -> Result<Array2<u32>> {
     let file = DepthFile::new(path.to_owned(), scale)
         .map_err(|problem| wrong(problem + " (--depth-scale METRES sets it)"))?;
     let bytes = bytes(path)?;
-    file.decode_alone(&bytes).map_err(wrong)
+    file.decode_any_size(&bytes).map_err(wrong)
 }
 
 /// Depth in millimetres from metres in an HDF5 file.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
 use super::files::{IMAGES, MAPS, files, first_folder, folders};
 use super::map_files::MapFiles;
-use crate::dataset::image_names::ImageNames;
+use crate::dataset::image_paths::ImagePaths;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 use crate::types::{Labels, Rgb};
@@ -106,7 +106,7 @@ impl Folder {
                 }
             }
         }
-        ImageNames::from_paths(std::mem::take(&mut set.beside)).warn_of_unread(folder);
+        ImagePaths::from_paths(std::mem::take(&mut set.beside)).warn_of_unsupported(folder);
         Ok(set)
     }
 

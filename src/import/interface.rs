@@ -49,22 +49,22 @@ impl Interface {
             let Some(ImageSource::File(file)) = dataset.sources.get(&id) else {
                 continue;
             };
-            let view = &file.view;
-            if view.segmentation == Segmentation::Parts {
+            let facts = &file.facts;
+            if facts.segmentation == Segmentation::Parts {
                 listing.segmentation = Segmentation::Parts;
             }
             listing
                 .names
                 .entry(line.scene.clone())
-                .or_insert_with(|| view.names.as_ref().clone());
+                .or_insert_with(|| facts.names.as_ref().clone());
             listing.frames.push(ListedFrame {
                 rgb: file.rgb.clone(),
                 scene: line.scene,
                 frame: line.frame,
                 time: line.t,
                 pose: line.pose,
-                intrinsics: view.intrinsics,
-                room: view.room.clone(),
+                intrinsics: facts.intrinsics,
+                room: facts.room.clone(),
                 index,
             });
         }

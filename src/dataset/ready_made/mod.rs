@@ -27,14 +27,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::family::{checked, other};
+use super::family::{check_family, unnamed};
 use super::image_source::ImageSource;
 use super::root::Root;
 use crate::error::{Error, Result};
 use crate::types::{Family, FrameId, Question};
 
 pub(super) use choices::one_line;
-pub(super) use container::{Archive, holds_files};
+pub(super) use container::{Archive, is_set_folder};
 pub(crate) use omissions::SkipBad;
 pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
@@ -121,11 +121,11 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     let asked = finish(&opened, set, (frames, scenes), notes, hint)?;
     Ok(ReadySet {
         rows: asked.rows,
-        reading: asked.reading,
-        form: if is_own(&table) {
-            Form::Own
+        summary: asked.reading,
+        format: if is_own(&table) {
+            SetFormat::Native
         } else {
-            Form::Foreign
+            SetFormat::Foreign
         },
         title: info.name,
         name,
@@ -178,8 +178,8 @@ pub(super) struct ReadySet {
     pub(super) scenes: SceneNames,
     pub(super) questions: Vec<Question>,
     /// The inferred column mapping, one line per column.
-    pub(super) reading: Vec<String>,
-    pub(super) form: Form,
+    pub(super) summary: Vec<String>,
+    pub(super) format: SetFormat,
     pub(super) rows: RowCounts,
 }
 
@@ -191,23 +191,23 @@ pub(super) struct RowCounts {
     pub(super) bad: usize,
 }
 
-/// Whose form a set has.
+/// Origin of the layout of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum SetFormat {
     /// This program's, in which nothing has to be found out.
-    Own,
+    Native,
     /// Another tool's file.
     Foreign,
 }
 
 /// The questions of a file about frames of other data.
-pub(super) struct ReadQuestions {
+pub(super) struct FileQuestions {
     pub(super) questions: Vec<Question>,
     /// The scenes that the file gives to the frames.
     pub(super) scenes: SceneNames,
     /// The inferred column mapping, one line per column.
-    pub(super) reading: Vec<String>,
-    pub(super) form: Form,
+    pub(super) summary: Vec<String>,
+    pub(super) format: SetFormat,
     pub(super) rows: RowCounts,
 }
 
@@ -221,7 +221,7 @@ fn frame_map(table: &Table) -> Option<Map> {
 ///
 /// # Errors
 /// As [`open`].
-pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions> {
+pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<FileQuestions> {
     let mut table = Table::default();
     SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
     let own = frame_map(&table);
@@ -255,15 +255,15 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     let mut reading = asked.reading;
     let form = if is_own(&table) && info.map.is_none() {
         reading.retain(|line| line.starts_with(LEFT_OUT));
-        Form::Own
+        SetFormat::Native
     } else {
-        Form::Foreign
+        SetFormat::Foreign
     };
-    Ok(ReadQuestions {
+    Ok(FileQuestions {
         questions: asked.questions,
         scenes: asked.scenes,
-        reading,
-        form,
+        summary: reading,
+        format: form,
         rows: asked.rows,
     })
 }
@@ -353,7 +353,7 @@ fn finish(
 }
 
 /// Leaves out the rows with an image that is not there or is none, with `--skip bad`; without it such an image is named when it is read.
-/// Images that are there and cannot be decoded are left out later ([`Dataset::without`](crate::dataset::Dataset::without)).
+/// Images that are there and cannot be decoded are left out later ([`Dataset::without_unusable`](crate::dataset::Dataset::without_unusable)).
 fn leave_out_unusable(opened: &Opened<'_>, set: &mut ReadSet, frames: &Frames<'_>) -> Result<()> {
     if opened.args.bad.is_none() {
         return Ok(());
@@ -470,8 +470,9 @@ fn questions(
         scenes.add(table, row, &frame)?;
         let cells = &table.rows[row];
         let family = families.text(table, cells);
-        let family = family.unwrap_or_else(|| other().name().to_owned());
-        let family = checked(Family::from(family.as_str())).map_err(|e| e.at(table.place(row)))?;
+        let family = family.unwrap_or_else(|| unnamed().name().to_owned());
+        let family =
+            check_family(Family::from(family.as_str())).map_err(|e| e.at(table.place(row)))?;
         questions.push(Question {
             id: ids.id(at),
             frame,

@@ -133,7 +133,7 @@ impl Archive {
     ///
     /// # Errors
     /// If it cannot be read, or is longer than an image may be, whatever the directory states.
-    pub(in crate::dataset) fn image(&self, name: &str) -> Result<Vec<u8>> {
+    pub(in crate::dataset) fn read_image(&self, name: &str) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         self.copy(name, LONGEST_IMAGE, &mut bytes)?;
         Ok(bytes)

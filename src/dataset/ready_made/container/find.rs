@@ -36,7 +36,7 @@ pub(in crate::dataset::ready_made) enum Joined {
 }
 
 /// Whether a folder holds a set of other tools.
-pub(in crate::dataset) fn holds_files(folder: &Path) -> bool {
+pub(in crate::dataset) fn is_set_folder(folder: &Path) -> bool {
     let Ok(tree) = Tree::from_folder(folder) else {
         return true;
     };

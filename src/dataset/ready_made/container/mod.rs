@@ -24,7 +24,7 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 
 pub(in crate::dataset) use archive::Archive;
-pub(in crate::dataset) use find::holds_files;
+pub(in crate::dataset) use find::is_set_folder;
 pub(super) use find::{FoundFiles, Joined, find};
 
 /// The endings of the files that are read.

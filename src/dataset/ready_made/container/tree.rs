@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::SetFile;
 use super::archive::Archive;
-use crate::dataset::root::{LeadsTo, Root};
+use crate::dataset::root::{Location, Root};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
@@ -128,7 +128,7 @@ impl Scan {
                 continue;
             }
             let is_link = fs::symlink_metadata(&path).is_ok_and(|facts| facts.is_symlink());
-            if is_link && self.root.leads_to(&path) != LeadsTo::Within {
+            if is_link && self.root.locate(&path) != Location::Inside {
                 self.outside.push(path);
             } else if path.is_dir() && !is_link {
                 if depth < DEEPEST {

@@ -117,7 +117,7 @@ impl Omissions {
                     _ => "leaves them out",
                 };
                 let flag = match why {
-                    OmissionReason::Bad => SkipBad::enough(*count, rows).flag(),
+                    OmissionReason::Bad => SkipBad::allowing(*count, rows).flag(),
                     why => why.flag().to_owned(),
                 };
                 let other = match why {

@@ -32,7 +32,7 @@ impl SkipBad {
             "{bad} of {all} {noun} are broken; the first: {first}; {} leaves out at most {} %: repair the data, or raise the limit with {}",
             self.flag(),
             self.most,
-            Self::enough(bad, all).flag()
+            Self::allowing(bad, all).flag()
         ))
     }
 
@@ -45,7 +45,7 @@ impl SkipBad {
     }
 
     /// The usual share, or one in whole percent that allows a number of broken rows of a set.
-    pub(crate) fn enough(bad: usize, all: usize) -> Self {
+    pub(crate) fn allowing(bad: usize, all: usize) -> Self {
         Self {
             most: share(bad, all).ceil().max(USUAL_PERCENT),
         }

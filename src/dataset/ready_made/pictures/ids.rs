@@ -129,7 +129,7 @@ impl Frames<'_> {
                 return Ok(files[&name]);
             }
             Found::Member(name) => {
-                let image = self.archive.map(|archive| archive.image(&name.0));
+                let image = self.archive.map(|archive| archive.read_image(&name.0));
                 let digest = Digest::from_bytes(&image.transpose()?.unwrap_or_default());
                 (name, digest)
             }

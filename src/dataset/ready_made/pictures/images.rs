@@ -184,7 +184,7 @@ impl EmbeddedImage {
     ///
     /// # Errors
     /// If the file of rows cannot be read, or has changed since it was opened.
-    pub(in crate::dataset) fn image(&self, rule: ReadingRule) -> Result<ImageFile> {
+    pub(in crate::dataset) fn read_image(&self, rule: ReadingRule) -> Result<ImageFile> {
         let place = format!("{}, {}", self.file.label.path.display(), self.row);
         let value = self
             .file

@@ -102,7 +102,7 @@ fn a_well_known_set_of_configurations_may_be_one_file() {
     let (_folder, path) = with(vec![
         json!({"question": "?", "options": "['x', 'y']", "answer": "A", "image_1": base64(1), "image_2": null}),
     ]);
-    let place = crate::dataset::place(&format!("mmmu:{}", path.display())).unwrap();
+    let place = crate::dataset::parse_data_place(&format!("mmmu:{}", path.display())).unwrap();
     let dataset = crate::dataset::Dataset::open(&place, None, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 1);
 }

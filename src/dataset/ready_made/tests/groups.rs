@@ -60,7 +60,7 @@ fn a_group_is_a_column_a_template_or_a_run_of_numbers() {
     );
     // The open question is left out, and its group knows that it lacks one.
     assert_eq!(groups(&by_image)[4], Some(("2.png", 2)));
-    let said = by_image.reading().join("\n");
+    let said = by_image.summary().join("\n");
     assert!(
         said.contains("group = image: 3 groups of 2 questions, 1 with questions that are left out, never complete"),
         "{said}"
@@ -76,13 +76,13 @@ fn a_group_is_a_column_a_template_or_a_run_of_numbers() {
             Some(("s1_1", 1))
         ]
     );
-    let said = template.reading().join("\n");
+    let said = template.summary().join("\n");
     assert!(
         said.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete; 1 question without a group"),
         "{said}"
     );
     let alone = read("id=nr,group={nr:1}");
-    let said = alone.reading().join("\n");
+    let said = alone.summary().join("\n");
     assert!(
         said.contains("5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"),
         "{said}"
@@ -99,7 +99,7 @@ fn a_group_is_a_column_a_template_or_a_run_of_numbers() {
     assert_ne!(groups(&from_nought), groups(&runs));
     assert!(
         from_nought
-            .reading()
+            .summary()
             .join("\n")
             .contains("about several images")
     );
@@ -153,7 +153,8 @@ fn what_a_run_stores_keeps_its_groups() {
 #[test]
 fn known_sets_bring_their_groups() {
     let known = |name: &str, path: &std::path::Path, args: &SetArgs| {
-        let place = crate::dataset::place(&format!("{name}:{}", path.display())).unwrap();
+        let place =
+            crate::dataset::parse_data_place(&format!("{name}:{}", path.display())).unwrap();
         Dataset::open(&place, None, args).unwrap()
     };
     let mme = |number: usize| {
@@ -176,7 +177,7 @@ fn known_sets_bring_their_groups() {
     let (_folder, path) = made(&without.collect::<Vec<_>>());
     let dataset = known("mme", &path, &SetArgs::default());
     assert_eq!(groups(&dataset), [None; 4]);
-    let said = dataset.reading().join("\n");
+    let said = dataset.summary().join("\n");
     assert!(
         said.contains("no groups: MME scores questions together by {category}_{question_id} or"),
         "{said}"

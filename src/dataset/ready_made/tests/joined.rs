@@ -36,7 +36,7 @@ fn the_names_of_rows_are_their_ids() {
     let mut ids: Vec<String> = read(&dataset).into_iter().map(|read| read.0).collect();
     ids.sort();
     assert_eq!(ids, ["q2", "q7"]);
-    let said = dataset.reading().join("\n");
+    let said = dataset.summary().join("\n");
     assert!(
         said.contains("id = id") && said.contains("the names of the rows"),
         "{said}"
@@ -50,7 +50,7 @@ fn the_names_of_rows_are_their_ids() {
     assert_eq!(ids, ["1", "2"]);
     assert!(
         !dataset
-            .reading()
+            .summary()
             .join("\n")
             .contains("the names of the rows")
     );
@@ -96,9 +96,9 @@ fn a_configuration_is_a_family_where_no_column_varies() {
     let families: Vec<String> = read(&dataset).into_iter().map(|read| read.1).collect();
     assert_eq!(families, ["Art", "Music"]);
     assert!(
-        dataset.reading()[0].contains("in 2 families (by configuration)"),
+        dataset.summary()[0].contains("in 2 families (by configuration)"),
         "{:?}",
-        dataset.reading()
+        dataset.summary()
     );
     // A column that the user names goes first, and so does one of a single configuration.
     let mapped = SetArgs {
@@ -207,7 +207,7 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
     assert_eq!(dataset.questions().len(), 38);
     assert!(
         dataset
-            .reading()
+            .summary()
             .join("\n")
             .contains("left out: 2 of 40 rows")
     );
@@ -217,7 +217,7 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
     assert_eq!(dataset.questions().len(), 40);
     assert!(
         dataset
-            .reading()
+            .summary()
             .join("\n")
             .contains("that repeat an earlier one, with its image and options: 1;")
     );
@@ -305,7 +305,7 @@ fn a_bmp_image_is_read() {
     let (_folder, path) = set("set.jsonl", &[row(question(json!({"image": text})))]);
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(read(&dataset)[0].5, 7);
-    assert!(dataset.reading().join("\n").contains("BMP 1"));
+    assert!(dataset.summary().join("\n").contains("BMP 1"));
     let (_folder, path) = set(
         "set.jsonl",
         &[row(question(

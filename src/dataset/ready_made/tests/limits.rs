@@ -183,7 +183,7 @@ fn a_card_names_splits_as_fields_and_a_folder() {
     .unwrap();
     let dataset = card("- config_name: default\n  data_files: &x y\n").unwrap();
     assert_eq!(read(&dataset).len(), 1);
-    let said = dataset.reading().join("\n");
+    let said = dataset.summary().join("\n");
     assert!(
         said.contains("README.md cannot be read") && said.contains("names of files decide"),
         "{said}"

@@ -45,7 +45,7 @@ fn a_column_names_the_scene_in_every_form() {
         let (_folder, path) = made(name, &rows("Scene", TWO.map(|scene| json!(scene))));
         let read = open(&path, &SetArgs::default()).unwrap();
         assert_eq!(scenes(&read), ["a", "a", "b"], "{name}");
-        let said = read.reading().join("\n");
+        let said = read.summary().join("\n");
         assert!(
             said.contains("scene = Scene: 2 scenes of 3 images"),
             "{said}"
@@ -76,7 +76,7 @@ fn the_questions_of_a_folder_name_the_scenes_of_its_frames() {
     let read = Dataset::open(&place, None, &SetArgs::default()).unwrap();
     assert_eq!(scenes(&read), ["a", "a", "b"]);
     // It is this program's own form still.
-    assert_eq!(read.reading_to_say().count(), 0);
+    assert_eq!(read.printed_summary().count(), 0);
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn some_frames_may_have_no_scene() {
     let (_folder, path) = made("set.jsonl", &rows("scene", some));
     let read = open(&path, &map("id=id")).unwrap();
     assert_eq!(scenes(&read), ["a", "", "b"]);
-    let said = read.reading().join("\n");
+    let said = read.summary().join("\n");
     assert!(
         said.contains("2 scenes of 3 images, 1 image without a scene"),
         "{said}"
@@ -121,7 +121,7 @@ fn an_image_of_two_scenes_is_refused_or_no_scene_is_used() {
     let (_folder, path) = made("set.jsonl", &foreign);
     let read = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(scenes(&read), ["", "", ""]);
-    let said = read.reading().join("\n");
+    let said = read.summary().join("\n");
     assert!(
         said.contains("scene is not used as the scene: the image \"0.png\" is of"),
         "{said}"

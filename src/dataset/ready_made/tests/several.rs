@@ -25,7 +25,7 @@ fn shown(rows: &[Map<String, Value>]) -> Vec<Shown> {
             .questions()
             .iter()
             .map(|question| {
-                let frames = dataset.shown(&question.frame).iter().map(|frame| {
+                let frames = dataset.shown_frames(&question.frame).iter().map(|frame| {
                     let picture = dataset.picture(frame).unwrap().decode().unwrap();
                     (frame.0.clone(), picture.samples()[0])
                 });
@@ -132,7 +132,7 @@ fn a_mark_without_an_image_makes_a_bad_row() {
         bad: Some(crate::dataset::SkipBad::default()),
         ..send()
     };
-    let reading = open(&path, &args).unwrap().reading().join("\n");
+    let reading = open(&path, &args).unwrap().summary().join("\n");
     assert!(
         reading.contains("2 questions show 2 images, all in one request"),
         "{reading}"

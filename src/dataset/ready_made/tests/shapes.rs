@@ -207,7 +207,7 @@ fn ids_that_are_not_unique_are_passed_over() {
     let (_folder, path) = set("set.json", &rows);
     let reading = open(&path, &SetArgs::default())
         .unwrap()
-        .reading()
+        .summary()
         .join("\n");
     assert!(
         reading.contains("id = content (question_id does not tell all rows apart)"),
@@ -254,7 +254,7 @@ fn several_images_none_and_open_questions_are_left_out_only_by_a_flag() {
     ] {
         assert!(problem.contains(says), "{problem}");
     }
-    let reading = open(&path, &args).unwrap().reading().join("\n");
+    let reading = open(&path, &args).unwrap().summary().join("\n");
     assert!(
         reading.contains("left out: 1 of 3 rows (several images)"),
         "{reading}"
@@ -309,11 +309,11 @@ fn an_image_folder_and_files_beside_a_table() {
         read(&open(&path, &map("image=MMVP Images/{Index}.jpg")).unwrap())[0].5,
         6
     );
-    let known = crate::dataset::place(&format!("mmvp:{}", path.display())).unwrap();
+    let known = crate::dataset::parse_data_place(&format!("mmvp:{}", path.display())).unwrap();
     let dataset = crate::dataset::Dataset::open(&known, None, &SetArgs::default()).unwrap();
     assert!(
         dataset
-            .reading()
+            .summary()
             .join("\n")
             .contains("read by the rules of MMVP: Tong et al.")
     );
