@@ -149,7 +149,7 @@ impl Archive {
     }
 
     /// The text of a file.
-    pub(in crate::dataset::ready_made) fn text(&self, name: &str) -> Result<String> {
+    pub(in crate::dataset::ready_made) fn read_text(&self, name: &str) -> Result<String> {
         let mut bytes = Vec::new();
         self.copy(name, 1 << 22, &mut bytes)?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())

@@ -1,4 +1,4 @@
-//! The files of a set in a folder, a repository of a hub on disk, a ZIP file, a pattern or a file: [`find`].
+//! The files of a set in a folder, a repository of a hub on disk, a ZIP file, a pattern or a file: [`find_files`].
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -47,7 +47,7 @@ pub(in crate::dataset) fn is_set_folder(folder: &Path) -> bool {
 ///
 /// # Errors
 /// If there are none, or it is not clear which are meant; the error lists the files.
-pub(in crate::dataset::ready_made) fn find(
+pub(in crate::dataset::ready_made) fn find_files(
     places: &[PathBuf],
     args: &SetArgs,
 ) -> Result<FoundFiles> {

@@ -242,11 +242,11 @@ fn push(
     let mut cells = Vec::new();
     for (name, value) in around.into_iter().flatten() {
         if !fields.contains_key(name) {
-            cells.push((table.column(name)?, Cell::from(value.clone())));
+            cells.push((table.add_column(name)?, Cell::from(value.clone())));
         }
     }
     for (name, value) in fields {
-        cells.push((table.column(&name)?, Cell::from(value)));
+        cells.push((table.add_column(&name)?, Cell::from(value)));
     }
     table.push(place, cells)
 }

@@ -25,7 +25,7 @@ use crate::files::reading;
 
 pub(in crate::dataset) use archive::Archive;
 pub(in crate::dataset) use find::is_set_folder;
-pub(super) use find::{FoundFiles, Joined, find};
+pub(super) use find::{FoundFiles, Joined, find_files};
 
 /// The endings of the files that are read.
 pub(super) const READ: &str =
@@ -169,7 +169,7 @@ impl SetFile {
             }
             (RowPlace::Record(_), _) => Cell::Absent,
         };
-        match cell.at(steps) {
+        match cell.value_at(steps) {
             Some(Cell::Bytes(bytes)) => Ok(bytes.into_vec()),
             Some(Cell::Text(text)) => Ok(text.into_bytes()),
             _ => {

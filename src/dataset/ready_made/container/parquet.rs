@@ -17,7 +17,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
 
-use super::super::cells::{Cell, MOST_ROWS, RowPlace, Step, Table, list, too_many_rows};
+use super::super::cells::{Cell, MAX_ROWS, RowPlace, Step, Table, parse_list, too_many_rows};
 use super::json_scan::LONGEST_ROW;
 use crate::error::{Error, Result};
 use crate::files::guarded::guarded;
@@ -75,7 +75,7 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
     check_codecs(path, &*footer.metadata(path)?)?;
     // The footer has the number of rows: reject a large file before reading any row.
     let stated = footer.metadata(path)?.file_metadata().num_rows();
-    if usize::try_from(stated).is_ok_and(|rows| rows > MOST_ROWS) {
+    if usize::try_from(stated).is_ok_and(|rows| rows > MAX_ROWS) {
         return Err(Error::data(path.display(), too_many_rows()));
     }
     let file = open(path)?;
@@ -94,7 +94,7 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
         let mut cells = Vec::new();
         for (at, (name, field)) in record.into_columns().into_iter().enumerate() {
             if columns.get(at).is_none_or(|(known, _)| *known != name) {
-                let column = table.column(&name)?;
+                let column = table.add_column(&name)?;
                 columns.truncate(at);
                 columns.push((name, column));
             }
@@ -336,7 +336,7 @@ pub(super) fn bytes(
         // The column has no list: the value is a list as text.
         std::str::from_utf8(&value)
             .ok()
-            .and_then(list)
+            .and_then(parse_list)
             .and_then(|items| items.into_iter().nth(item))
             .map(String::into_bytes)
             .ok_or_else(|| "the value is gone".to_owned())

@@ -94,7 +94,7 @@ impl Tree {
     pub(super) fn text(&self, path: &str) -> Result<String> {
         match self {
             Self::Folder { folder, .. } => reading::text(&folder.join(path)),
-            Self::Archive(archive) => archive.text(path),
+            Self::Archive(archive) => archive.read_text(path),
         }
     }
 
