@@ -26,7 +26,7 @@ use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::keyframes::{KeyFrameArgs, choose};
 use crate::import::{
-    Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, left_over, open_all,
+    Adapter, DataSetKind, FrameMaps, ListedFrame, MapArgs, open_all, unread_files,
 };
 use crate::picture::ImageFile;
 use crate::picture::png;
@@ -96,7 +96,7 @@ struct ImportArgs {
     name: Option<String>,
     /// Facts about the maps that the data set does not state.
     #[command(flatten)]
-    stated: StatedArgs,
+    map_args: MapArgs,
     /// The flags that select key frames.
     #[command(flatten)]
     key_frames: KeyFrameArgs,
@@ -167,7 +167,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
             "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let adapter = open_all(args.kind, src, &args.stated, &args.folders.root.data_root)?;
+    let adapter = open_all(args.kind, src, &args.map_args, &args.folders.root.data_root)?;
     let frames = choose(
         &adapter.listing().frames,
         args.key_frames.selection(),
@@ -204,7 +204,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let note = depths(&written)?
         + &without_maps(&written)
         + &depth_folders(&written)
-        + &left_over(src, &*adapter)?.line();
+        + &unread_files(src, &*adapter)?.line();
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
     let listing = adapter.listing();
@@ -272,7 +272,7 @@ impl ImportedImage {
     fn read(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<Self> {
         let file = ImageFile::open(&frame.rgb, args.folders.decode.rule())?.never_turned();
         let rgb = file.decode()?;
-        let maps = adapter.read(frame, &rgb)?;
+        let maps = adapter.read_maps(frame, &rgb)?;
         let has_maps = maps.depth.is_some() || maps.semantic.is_some() || maps.segments.is_some();
         if has_maps || file.note() == InputNote::default() {
             return Ok(Self { file, rgb, maps });
