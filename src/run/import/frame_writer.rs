@@ -12,7 +12,7 @@ use crate::dataset::frame_folder::{self, FrameOutput};
 use crate::error::{Error, Result};
 use crate::images::frames::InputTally;
 use crate::import::recording::{
-    Channel, Content, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
+    Channel, ChannelContent, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
 };
 use crate::picture::ImageFile;
 use crate::picture::raw_image::RawPixels;
@@ -352,7 +352,7 @@ pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<T
 
 fn parse<'a>(channel: &Channel, bytes: &'a [u8]) -> Result<ImageMessage<'a>, String> {
     match channel.content {
-        Content::Image(encoding) => ImageMessage::parse(&channel.schema, encoding, bytes),
+        ChannelContent::Image(encoding) => ImageMessage::parse(&channel.schema, encoding, bytes),
         _ => Err(format!("a message of {}, not an image", channel.schema)),
     }
 }
