@@ -1,7 +1,7 @@
-//! Questions that are asked about every photograph, without anybody knowing the answers: [`Bank`], and [`BankPlace`], where they are.
+//! Questions without known answers, asked about every photograph: [`Bank`], and its file or built-in name: [`BankPlace`].
 //!
-//! A line is `{"id", "question", "choices", "family"}`, the last optional. There is no image and no answer in it: a question without a
-//! true answer cannot be scored as right or wrong, and its lines have no room for one.
+//! Each line is `{"id", "question", "choices", "family"}`; `family` is optional. A line has no image, because its question is asked
+//! about all images, and no answer, so replies are never scored as right or wrong.
 
 use std::collections::HashMap;
 use std::convert::Infallible;
@@ -13,7 +13,7 @@ use std::str::FromStr;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::family::{checked, other};
+use super::family::{check_family, unnamed};
 use super::ready_made::one_line;
 use crate::error::{Error, Result};
 use crate::files::reading::text;
@@ -24,33 +24,33 @@ use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 /// The built-in bank.
 const HOME: &str = include_str!("../../prompts/ask/home.jsonl");
 
-/// The place of a bank: what `--ask` names.
+/// Value of `--ask`: the built-in bank or a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum BankPlace {
-    /// The built-in bank, with or without a way out of each question.
-    Home(WayOut),
-    /// A file of the user.
+    /// The built-in bank.
+    Home(OptOut),
+    /// A file of questions.
     File(PathBuf),
 }
 
-/// Whether each question of the built-in bank has the last choice “cannot tell”.
+/// Whether a model may answer “cannot tell” to the questions of the built-in bank.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum WayOut {
-    /// Every choice says something about the photograph.
+pub(crate) enum OptOut {
+    /// Every choice describes the photograph.
     None,
-    /// The last choice is “cannot tell”.
+    /// “Cannot tell” is added as the last choice.
     CannotTell,
 }
 
 impl FromStr for BankPlace {
     type Err = Infallible;
 
-    /// A file named `home` is a path.
+    /// Parses `home`, `home:uncertain` or a path. An existing file named `home` is a path.
     fn from_str(text: &str) -> Result<Self, Infallible> {
         let path = PathBuf::from(text);
         Ok(match text {
-            "home" if !path.is_file() => Self::Home(WayOut::None),
-            "home:uncertain" => Self::Home(WayOut::CannotTell),
+            "home" if !path.is_file() => Self::Home(OptOut::None),
+            "home:uncertain" => Self::Home(OptOut::CannotTell),
             _ => Self::File(path),
         })
     }
@@ -59,14 +59,14 @@ impl FromStr for BankPlace {
 impl fmt::Display for BankPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Home(WayOut::None) => f.write_str("home"),
-            Self::Home(WayOut::CannotTell) => f.write_str("home:uncertain"),
+            Self::Home(OptOut::None) => f.write_str("home"),
+            Self::Home(OptOut::CannotTell) => f.write_str("home:uncertain"),
             Self::File(path) => path.display().fmt(f),
         }
     }
 }
 
-/// A question of a bank, about no photograph yet.
+/// Question of a bank, not yet about a photograph.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct BankQuestion {
     id: String,
@@ -81,24 +81,24 @@ struct BankLine {
     id: Value,
     question: String,
     choices: Vec<String>,
-    #[serde(default = "other")]
+    #[serde(default = "unnamed")]
     family: Family,
 }
 
-/// The questions of a bank, checked: no two have one id or one text.
+/// Questions of a bank. Ids and texts are unique.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Bank {
     questions: Vec<BankQuestion>,
 }
 
 impl Bank {
-    /// The bank at a place.
+    /// Opens a bank.
     ///
     /// # Errors
-    /// If the file cannot be read, or a line is no question of a bank; the error names the file and the line.
+    /// If the file cannot be read or a line is invalid; the error names the file and the line.
     pub(crate) fn open(place: &BankPlace) -> Result<Self> {
         match place {
-            BankPlace::Home(way_out) => Self::parse(HOME, Path::new("home"), *way_out),
+            BankPlace::Home(opt_out) => Self::parse(HOME, Path::new("home"), *opt_out),
             BankPlace::File(path) if !path.exists() => Err(Error::usage(
                 "--ask",
                 format_args!(
@@ -106,16 +106,18 @@ impl Bank {
                     path.display()
                 ),
             )),
-            BankPlace::File(path) => Self::parse(&text(path)?, path, WayOut::None),
+            BankPlace::File(path) => Self::parse(&text(path)?, path, OptOut::None),
         }
     }
 
-    fn parse(text: &str, path: &Path, way_out: WayOut) -> Result<Self> {
-        let mut questions: Vec<(usize, BankQuestion)> = Vec::new();
+    fn parse(text: &str, path: &Path, opt_out: OptOut) -> Result<Self> {
+        let mut questions: Vec<BankQuestion> = Vec::new();
         let (mut ids, mut texts) = (HashMap::new(), HashMap::new());
-        let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
-        for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-            let question = line_of(line, way_out, path, number)?;
+        for (number, line) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
+            if line.trim().is_empty() {
+                continue;
+            }
+            let question = parse_line(line, opt_out, path, number)?;
             for (known, name, value) in [
                 (&mut ids, "id", question.id.clone()),
                 (&mut texts, "question", question.text.clone()),
@@ -128,33 +130,32 @@ impl Bank {
                     return Err(Error::line(path, number, problem));
                 }
             }
-            questions.push((number, question));
+            questions.push(question);
         }
         if questions.is_empty() {
             return Err(Error::data(path.display(), "no questions in it"));
         }
-        Ok(Self {
-            questions: questions
-                .into_iter()
-                .map(|(_, question)| question)
-                .collect(),
-        })
+        Ok(Self { questions })
     }
 
-    /// The digest of everything that is asked, whatever the file is called.
+    /// Digest of all questions. The name of the file is not part of it.
     ///
     /// # Errors
     /// None in practice: the questions are text.
     pub(crate) fn digest(&self) -> Result<Digest> {
-        let lines = self.questions.iter().map(|question| {
-            json!([
-                question.id,
-                question.text,
-                question.choices.texts(),
-                question.family
-            ])
-        });
-        Digest::canonical("darkqa.bank/1", &lines.collect::<Vec<_>>())
+        let lines: Vec<Value> = self
+            .questions
+            .iter()
+            .map(|question| {
+                json!([
+                    question.id,
+                    question.text,
+                    question.choices.texts(),
+                    question.family
+                ])
+            })
+            .collect();
+        Digest::canonical("darkqa.bank/1", &lines)
     }
 
     /// Number of questions.
@@ -162,26 +163,26 @@ impl Bank {
         self.questions.len()
     }
 
-    /// Every question about every photograph, photograph by photograph in the order of the bank.
+    /// Combines every photograph with every question, photograph by photograph in the order of the bank.
     ///
-    /// With a number, so many of them about each: those whose text has the lowest digest together with the photograph's name. Other
-    /// photographs, another order of the bank or further questions therefore do not change which of two is taken first.
-    pub(crate) fn about<'f>(
+    /// `per_image` limits the questions about each photograph to those with the lowest digest of the photograph's name and the question.
+    /// The rank of two questions therefore does not depend on other photographs, other questions or the order of the bank.
+    pub(crate) fn questions_about<'f>(
         &self,
         frames: impl IntoIterator<Item = &'f FrameId>,
         per_image: Option<NonZeroUsize>,
     ) -> Vec<Question> {
-        let most = per_image.map_or(usize::MAX, NonZeroUsize::get);
+        let limit = per_image.map_or(usize::MAX, NonZeroUsize::get);
         frames
             .into_iter()
             .flat_map(|frame| {
                 let mut drawn: Vec<usize> = (0..self.questions.len()).collect();
-                if most < drawn.len() {
+                if limit < drawn.len() {
                     drawn.sort_by_cached_key(|index| {
                         let text = self.questions[*index].text.as_bytes();
                         *Digest::from_parts([b"ask", frame.0.as_bytes(), text]).as_bytes()
                     });
-                    drawn.truncate(most);
+                    drawn.truncate(limit);
                     drawn.sort_unstable();
                 }
                 drawn
@@ -193,7 +194,7 @@ impl Bank {
 }
 
 impl BankQuestion {
-    /// The question about a photograph.
+    /// Asks the question about a photograph.
     fn about(&self, frame: &FrameId) -> Question {
         Question {
             id: QuestionId(format!("{}@{}", self.id, frame.0)),
@@ -207,8 +208,8 @@ impl BankQuestion {
     }
 }
 
-/// The question in a line.
-fn line_of(line: &str, way_out: WayOut, path: &Path, number: usize) -> Result<BankQuestion> {
+/// Parses and checks one line; `number` is its line number.
+fn parse_line(line: &str, opt_out: OptOut, path: &Path, number: usize) -> Result<BankQuestion> {
     let wrong = |problem: String| Error::line(path, number, problem);
     let value: Value =
         serde_json::from_str(line).map_err(|e| Error::json_line(path, number, &e))?;
@@ -249,7 +250,7 @@ fn line_of(line: &str, way_out: WayOut, path: &Path, number: usize) -> Result<Ba
     for choice in &mut line.choices {
         *choice = one_line(choice);
     }
-    if way_out == WayOut::CannotTell {
+    if opt_out == OptOut::CannotTell {
         line.choices.push(CANNOT_TELL.to_owned());
     }
     let at = |e: Error| e.at(format!("{}, line {number}", path.display()));
@@ -257,7 +258,7 @@ fn line_of(line: &str, way_out: WayOut, path: &Path, number: usize) -> Result<Ba
         id,
         text: line.question.trim().to_owned(),
         choices: Choices::without_truth(line.choices).map_err(at)?,
-        family: checked(line.family).map_err(at)?,
+        family: check_family(line.family).map_err(at)?,
     })
 }
 
@@ -268,7 +269,7 @@ mod tests {
     use super::*;
 
     fn bank(text: &str) -> Result<Bank> {
-        Bank::parse(text, Path::new("bank.jsonl"), WayOut::None)
+        Bank::parse(text, Path::new("bank.jsonl"), OptOut::None)
     }
 
     fn frames(names: &[&str]) -> Vec<FrameId> {
@@ -281,13 +282,13 @@ mod tests {
     );
 
     #[test]
-    fn the_built_in_bank_has_25_questions_with_and_without_a_way_out() {
+    fn built_in_bank_has_25_questions_with_and_without_opt_out() {
         let home = Bank::open(&"home".parse().unwrap()).unwrap();
         let uncertain = Bank::open(&"home:uncertain".parse().unwrap()).unwrap();
         assert_eq!((home.len(), uncertain.len()), (25, 25));
         let presence = |question: &&BankQuestion| question.family == Family::Presence;
         assert_eq!(home.questions.iter().filter(presence).count(), 15);
-        for (bare, with_way_out) in home.questions.iter().zip(&uncertain.questions) {
+        for (bare, with_opt_out) in home.questions.iter().zip(&uncertain.questions) {
             assert!(
                 !bare
                     .choices
@@ -295,17 +296,17 @@ mod tests {
                     .iter()
                     .any(|text| text.contains("cannot"))
             );
-            let (last, others) = with_way_out.choices.texts().split_last().unwrap();
+            let (last, others) = with_opt_out.choices.texts().split_last().unwrap();
             assert_eq!((&**last, others), (CANNOT_TELL, bare.choices.texts()));
         }
         assert_ne!(home.digest().unwrap(), uncertain.digest().unwrap());
     }
 
     #[test]
-    fn every_question_is_asked_about_every_photograph_and_has_no_truth() {
+    fn every_question_is_asked_about_every_photograph() {
         let asked = bank(TWO)
             .unwrap()
-            .about(&frames(&["a.png", "b/c.png"]), None);
+            .questions_about(&frames(&["a.png", "b/c.png"]), None);
         let ids: Vec<&str> = asked.iter().map(|question| &*question.id.0).collect();
         assert_eq!(ids, ["lamp@a.png", "2@a.png", "lamp@b/c.png", "2@b/c.png"]);
         assert!(
@@ -317,25 +318,27 @@ mod tests {
     }
 
     #[test]
-    fn fewer_questions_a_photograph_are_drawn_by_names_alone() {
-        let home = Bank::open(&BankPlace::Home(WayOut::None)).unwrap();
+    fn questions_per_image_are_drawn_by_photograph_name() {
+        let home = Bank::open(&BankPlace::Home(OptOut::None)).unwrap();
         let frames = frames(&["a.png", "b.png", "c.png"]);
-        let drawn = |frames: &[FrameId], most| -> BTreeSet<String> {
-            let asked = home.about(frames, NonZeroUsize::new(most));
-            asked.into_iter().map(|question| question.id.0).collect()
+        let drawn = |frames: &[FrameId], per_image| -> BTreeSet<String> {
+            home.questions_about(frames, NonZeroUsize::new(per_image))
+                .into_iter()
+                .map(|question| question.id.0)
+                .collect()
         };
         let (five, six) = (drawn(&frames, 5), drawn(&frames, 6));
         assert_eq!((five.len(), six.len()), (15, 18));
         assert!(five.is_subset(&six));
         assert!(drawn(&frames[1..], 5).is_subset(&five));
-        // Photographs are not all asked the same ones.
+        // The questions differ between photographs.
         let questions: BTreeSet<&str> = five.iter().filter_map(|id| id.split('@').next()).collect();
         assert!(questions.len() > 5, "{questions:?}");
         assert_eq!(drawn(&frames, 99).len(), 75);
     }
 
     #[test]
-    fn broken_lines_are_named() {
+    fn errors_name_the_invalid_line() {
         let line = |rest: &str| format!("{}{rest}", TWO.trim_start_matches('\u{feff}'));
         for (rest, says) in [
             ("{", "bank.jsonl, line 4: EOF"),
@@ -399,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bank_is_known_by_what_it_asks() {
+    fn digest_covers_questions_but_not_blank_lines() {
         let digest = |text: &str| bank(text).unwrap().digest().unwrap();
         assert_eq!(digest(TWO), digest(&TWO.replace("\n\n", "\n")));
         for other in [

@@ -1,4 +1,4 @@
-//! The photographs of a frame's scene in the dark, as a line of `frames.jsonl` names them: [`DarkPhoto`].
+//! Photographs of a frame's scene in the dark, from the field `dark` of `frames.jsonl`: [`DarkPhoto`].
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -7,75 +7,74 @@ use serde::Deserialize;
 
 use crate::types::PhotoName;
 
-/// A photograph of a frame's scene in the dark.
+/// Photograph of a frame's scene in the dark.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DarkPhoto {
-    /// The name of the condition in which it is shown.
+    /// Name of the condition that shows the photograph.
     pub(crate) name: PhotoName,
-    /// Its file.
+    /// Image file.
     pub(crate) path: PathBuf,
-    /// How much darker than its frame it was exposed, in EV, by shutter and gain; `None` if the data do not state it.
+    /// Difference in exposure from the frame (shutter time and gain), in EV, positive if darker; `None` if unknown.
     pub(crate) ev: Option<f64>,
 }
 
-/// The value of `dark` in a line of `frames.jsonl`: a path, an object, or a list of them.
+/// Value of `dark` in a line of `frames.jsonl`: a path, an object, or a list of these.
 #[derive(Debug, Deserialize)]
 #[serde(
     untagged,
     expecting = "a path, {\"path\", \"ev\", \"name\"} or a list of them expected for dark"
 )]
 pub(super) enum DarkField {
-    /// One photograph.
     One(DarkEntry),
-    /// Several, brightest or darkest first.
+    /// Photographs, brightest or darkest first.
     Several(Vec<DarkEntry>),
 }
 
-/// One photograph of the field `dark`.
+/// Photograph in the field `dark`.
 #[derive(Debug, Deserialize)]
 #[serde(untagged)]
 pub(super) enum DarkEntry {
-    /// Its path alone.
+    /// Path of its file.
     Path(PathBuf),
-    /// Its path with its known facts.
-    Known(KnownPhoto),
+    /// Path with exposure and name.
+    Details(PhotoDetails),
 }
 
-/// A photograph with facts about it.
+/// Path of a photograph, with its exposure and name if known.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct KnownPhoto {
+pub(super) struct PhotoDetails {
     path: PathBuf,
     ev: Option<f64>,
     name: Option<String>,
 }
 
 impl DarkField {
-    /// The photographs in their order; one without a name is `dark`, `dark-2` and so on by its place. `existing` turns a path of the
-    /// line into that of a file.
+    /// Converts the field to photographs, in order. `resolve` finds the file of a path in the data. Photographs without a name are called
+    /// `dark`, `dark-2` and so on by their position.
     ///
     /// # Errors
-    /// If a name is none, or is given twice, an exposure is no drop, or a file is missing.
-    pub(super) fn photos(
+    /// If a name is invalid or occurs twice, an `ev` is not in (0, 30], or `resolve` fails.
+    pub(super) fn into_photos(
         self,
-        existing: impl Fn(PathBuf) -> Result<PathBuf, String>,
+        resolve: impl Fn(PathBuf) -> Result<PathBuf, String>,
     ) -> Result<Vec<DarkPhoto>, String> {
         let entries = match self {
             Self::One(entry) => vec![entry],
             Self::Several(entries) => entries,
         };
         let mut names = BTreeSet::new();
-        entries.into_iter().enumerate().map(|(place, entry)| {
-            let KnownPhoto { path, ev, name } = match entry {
-                DarkEntry::Known(known) => known,
-                DarkEntry::Path(path) => KnownPhoto {
+        entries.into_iter().enumerate().map(|(index, entry)| {
+            let PhotoDetails { path, ev, name } = match entry {
+                DarkEntry::Details(details) => details,
+                DarkEntry::Path(path) => PhotoDetails {
                     path,
                     ev: None,
                     name: None,
                 },
             };
             let name = match name {
-                None => PhotoName::numbered(place),
+                None => PhotoName::numbered(index),
                 Some(name) => PhotoName::new(&name).map_err(|e| e.to_string())?,
             };
             if let Some(ev) = ev.filter(|ev| !(ev.is_finite() && *ev > 0.0 && *ev <= 30.0)) {
@@ -90,7 +89,7 @@ impl DarkField {
             }
             Ok(DarkPhoto {
                 name,
-                path: existing(path)?,
+                path: resolve(path)?,
                 ev,
             })
         }).collect()
@@ -103,18 +102,18 @@ mod tests {
 
     fn photos(json: &str) -> Result<Vec<(String, Option<f64>)>, String> {
         let field: DarkField = serde_json::from_str(json).map_err(|e| e.to_string())?;
-        let photos = field.photos(|path| {
-            let is_there = path.starts_with("low");
-            is_there.then_some(path).ok_or("no such file".to_owned())
+        let photos = field.into_photos(|path| {
+            let exists = path.starts_with("low");
+            exists.then_some(path).ok_or("no such file".to_owned())
         })?;
-        let named = photos.into_iter();
-        Ok(named
+        Ok(photos
+            .into_iter()
             .map(|photo| (photo.name.to_string(), photo.ev))
             .collect())
     }
 
     #[test]
-    fn photographs_are_named_by_their_place_or_as_they_are() {
+    fn default_names_are_numbered_by_position() {
         let named = |name: &str, ev| (name.to_owned(), ev);
         for (json, expected) in [
             (r#""low/0.png""#, vec![named("dark", None)]),
@@ -137,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_photograph_is_told() {
+    fn invalid_photographs_are_errors() {
         for (json, part) in [
             ("3", "for dark"),
             (r#"{"file":"low/0.png"}"#, "for dark"),

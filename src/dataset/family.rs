@@ -1,18 +1,18 @@
-//! The families of questions in files: [`other`], [`checked`].
+//! Families of questions in files: [`unnamed`], [`check_family`].
 
 use crate::error::{Error, Result};
 use crate::types::Family;
 
-/// The family of a question that names none.
-pub(super) fn other() -> Family {
+/// Family of a question that names none.
+pub(super) fn unnamed() -> Family {
     Family::Other("other".to_owned())
 }
 
-/// The family, unless it has the name that the tables use for the total.
+/// Returns the family unchanged.
 ///
 /// # Errors
-/// If it has.
-pub(super) fn checked(family: Family) -> Result<Family> {
+/// If its name is the one that tables use for the total over all families.
+pub(super) fn check_family(family: Family) -> Result<Family> {
     if family.name().trim() == Family::TOTAL {
         return Err(Error::data(
             "family",

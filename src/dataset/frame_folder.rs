@@ -1,4 +1,4 @@
-//! Writing frames into a folder of the common interface, which [`crate::dataset::frames`] reads: [`FramePaths`].
+//! Writer of a folder of frames in the format that [`crate::dataset::frames`] reads: [`FrameOutput`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,12 +12,13 @@ use crate::labels;
 use crate::picture::grey_png;
 use crate::types::{DepthKind, Labels, SegmentName, Segmentation};
 
-/// The file that lists the frames.
+/// File that lists the frames.
 pub(crate) const FRAMES: &str = "frames.jsonl";
 
-/// The output folder, scene and name that decide the paths of the files of one frame.
+/// Writes the files of one frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct FramePaths<'a> {
+pub(crate) struct FrameOutput<'a> {
+    /// Output folder of all frames.
     pub(crate) out: &'a Path,
     pub(crate) scene: &'a str,
     pub(crate) frame: &'a str,
@@ -26,8 +27,8 @@ pub(crate) struct FramePaths<'a> {
 /// One line of `frames.jsonl`.
 type ListLine = Map<String, Value>;
 
-impl FramePaths<'_> {
-    /// The first fields of the line of the frame: scene, frame, width and height.
+impl FrameOutput<'_> {
+    /// Starts the line of the frame with its scene, name, width and height.
     pub(crate) fn line(&self, (width, height): (usize, usize)) -> ListLine {
         let facts = [
             ("scene", json!(self.scene)),
@@ -41,7 +42,7 @@ impl FramePaths<'_> {
             .collect()
     }
 
-    /// Writes one file of the frame, and returns its path below the folder.
+    /// Writes one file of the frame, and returns its path relative to the output folder.
     pub(crate) fn write(&self, kind: &str, ending: &str, bytes: &[u8]) -> Result<String> {
         let path = format!("scenes/{}/{kind}/{}.{ending}", self.scene, self.frame);
         write(&self.out.join(&path), bytes)?;
@@ -49,14 +50,14 @@ impl FramePaths<'_> {
     }
 
     /// Writes the depth in millimetres as a 16-bit PNG, and adds it to the line.
-    pub(crate) fn depth(
+    pub(crate) fn write_depth(
         &self,
         line: &mut ListLine,
         depth: &Array2<u32>,
         kind: DepthKind,
     ) -> Result<()> {
         let units = depth.mapv(|depth| u16::try_from(depth).unwrap_or(u16::MAX));
-        let path = self.write("depth", "png", &grey(&units)?)?;
+        let path = self.write("depth", "png", &grey16_png(&units)?)?;
         line.insert("depth".to_owned(), json!(path));
         line.insert("depth_scale".to_owned(), json!(0.001));
         line.insert("depth_kind".to_owned(), json!(kind));
@@ -64,14 +65,14 @@ impl FramePaths<'_> {
     }
 
     /// Writes the class of each pixel as a 16-bit PNG, and adds it to the line.
-    pub(crate) fn semantic(&self, line: &mut ListLine, semantic: &Array2<u16>) -> Result<()> {
-        let path = self.write("sem", "png", &grey(semantic)?)?;
+    pub(crate) fn write_semantic(&self, line: &mut ListLine, semantic: &Array2<u16>) -> Result<()> {
+        let path = self.write("sem", "png", &grey16_png(semantic)?)?;
         line.insert("sem".to_owned(), json!(path));
         Ok(())
     }
 
     /// Writes the segments as a 16-bit PNG, or as `.npy` if an id needs more than 16 bits, and adds them to the line.
-    pub(crate) fn segments(
+    pub(crate) fn write_segments(
         &self,
         line: &mut ListLine,
         segments: &Array2<u32>,
@@ -79,9 +80,9 @@ impl FramePaths<'_> {
     ) -> Result<()> {
         let max_id = segments.iter().copied().max().unwrap_or(0);
         let path = if u16::try_from(max_id).is_ok() {
-            self.write("over", "png", &grey(&segments.mapv(|id| id as u16))?)?
+            self.write("over", "png", &grey16_png(&segments.mapv(|id| id as u16))?)?
         } else {
-            self.write("over", "npy", &npy(segments))?
+            self.write("over", "npy", &npy_bytes(segments))?
         };
         let source = match segmentation {
             Segmentation::Instances => "renderer",
@@ -94,7 +95,11 @@ impl FramePaths<'_> {
 }
 
 /// Writes the names of the segments of a scene; no file if there are none.
-pub(crate) fn names(out: &Path, scene: &str, names: &BTreeMap<u32, SegmentName>) -> Result<()> {
+pub(crate) fn write_segment_names(
+    out: &Path,
+    scene: &str,
+    names: &BTreeMap<u32, SegmentName>,
+) -> Result<()> {
     if names.is_empty() {
         return Ok(());
     }
@@ -103,8 +108,8 @@ pub(crate) fn names(out: &Path, scene: &str, names: &BTreeMap<u32, SegmentName>)
     write(&path, text.as_bytes())
 }
 
-/// Writes the files about the whole folder. The list of frames is last, because it marks the folder as complete.
-pub(crate) fn finish<'a>(
+/// Writes the files about the whole folder. The list of frames comes last, because it marks the folder as complete.
+pub(crate) fn write_folder_files<'a>(
     out: &Path,
     labels: &Labels,
     info: &Value,
@@ -121,12 +126,12 @@ pub(crate) fn finish<'a>(
     write(&out.join(FRAMES), list.as_bytes())
 }
 
-/// The bytes of a `.npy` file (numpy.lib.format, version 1.0).
-fn npy(segments: &Array2<u32>) -> Vec<u8> {
+/// Encodes segments as a `.npy` file (numpy.lib.format, version 1.0).
+fn npy_bytes(segments: &Array2<u32>) -> Vec<u8> {
     let (height, width) = segments.dim();
     let header =
         format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
-    // The header ends with a newline at a multiple of 64 bytes, where the numbers begin.
+    // The header ends with a newline, padded so that the data start at a multiple of 64 bytes.
     let length = (header.len() + 11).next_multiple_of(64) - 10;
     let mut file = b"\x93NUMPY\x01\x00".to_vec();
     file.extend((length as u16).to_le_bytes());
@@ -135,8 +140,8 @@ fn npy(segments: &Array2<u32>) -> Vec<u8> {
     file
 }
 
-/// The bytes of a map as a 16-bit grey PNG.
-fn grey(map: &Array2<u16>) -> Result<Vec<u8>> {
+/// Encodes a map as a 16-bit grey PNG.
+fn grey16_png(map: &Array2<u16>) -> Result<Vec<u8>> {
     let (height, width) = map.dim();
     let samples: Vec<u16> = map.iter().copied().collect();
     grey_png((width, height), &samples)

@@ -1,6 +1,6 @@
-//! A folder of frames.
+//! Reader of a folder of frames.
 //!
-//! A folder with a `frames.jsonl` has the common interface. Its paths are relative to the folder:
+//! The common format is a folder with a `frames.jsonl`. Paths are relative to the folder:
 //!
 //! - `frames.jsonl`: one frame per line, `{"scene", "frame", "rgb", …}`; the name of a frame is `scene/frame`. A line may name
 //!   maps of the size of the image: `depth`, in metres as `.npy` or in units of `depth_scale` metres as PNG; `sem`, the
@@ -13,8 +13,8 @@
 //!   `dark` for photographs that were taken in the dark.
 //! - `scenes/<scene>/segments.json`: the segments that have names, `{"7": {"name", "canonical", "region"}}`.
 //!
-//! Without the list, every PNG, JPEG, WebP, TIFF and BMP file in the folder is a frame, named by its file name. The questions are in
-//! `questions.jsonl` in the same folder.
+//! Without `frames.jsonl`, every PNG, JPEG, WebP, TIFF and BMP file in the folder is a frame, named by its file name. The questions
+//! are in `questions.jsonl` in the same folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -24,11 +24,11 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::dark_photos::DarkField;
-use super::image_names::{ImageNames, is_image};
+use super::frame_facts::FrameFacts;
+use super::image_paths::{ImagePaths, is_image};
 use super::image_source::FrameFile;
 use super::maps::{DepthFile, MapPaths};
-use super::root::LeadsTo;
-use super::view::FrameFacts;
+use super::root::Location;
 use super::{Dataset, ImageSource, Root, SetArgs, SkipBad, ready_made, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::{entries, json, json_lines};
@@ -36,20 +36,20 @@ use crate::labels;
 use crate::picture::image_file::format::READ;
 use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation, SetLight};
 
-/// The file that lists the frames of the common interface.
+/// File that lists the frames.
 pub(super) const FRAMES: &str = "frames.jsonl";
-/// The file of the questions about the frames of the folder.
+/// File of the questions about the frames.
 pub(super) const QUESTIONS: &str = "questions.jsonl";
-/// The file with the class of each number in the semantic maps.
+/// File with the class of each number in the semantic maps.
 const CLASSES: &str = "classes.json";
-/// The file with the name of the data set and the kind of its depth.
+/// File with the name of the data set, its light and the kind of its depth.
 const DATASET: &str = "dataset.json";
-/// The value of `schema` in `dataset.json`.
+/// Value of `schema` in `dataset.json`.
 const SCHEMA: &str = "darkqa.dataset/1";
-/// The file with the names of the segments of a scene.
+/// File with the names of the segments of a scene.
 const SEGMENTS: &str = "segments.json";
 
-/// The fields of `dataset.json` that are used.
+/// Fields of `dataset.json` that are used.
 #[derive(Debug, Default, Deserialize)]
 struct DataSetInfo {
     schema: String,
@@ -59,9 +59,9 @@ struct DataSetInfo {
 }
 
 /// Scene → segment number → name. The file of each scene is read once.
-type SceneNames = BTreeMap<String, Arc<BTreeMap<u32, SegmentName>>>;
+type SegmentNames = BTreeMap<String, Arc<BTreeMap<u32, SegmentName>>>;
 
-/// The fields of a line of `frames.jsonl` that are used.
+/// Fields of a line of `frames.jsonl` that are used.
 #[derive(Debug, Deserialize)]
 struct FrameLine {
     scene: String,
@@ -87,47 +87,49 @@ enum SegmentSource {
     Superpixel,
 }
 
-/// The treatment of listed files that do not exist.
+/// Treatment of listed files that do not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MissingFiles {
-    /// The list is refused.
-    Refused,
-    /// They are named when they are read, so that `--skip bad` leaves out their frames.
-    Named,
+    /// Refuse the list.
+    Refuse,
+    /// Report a missing file when it is read, so that `--skip bad` can leave out its frame.
+    Defer,
 }
 
 impl MissingFiles {
     pub(super) fn new(skip: Option<SkipBad>) -> Self {
         match skip {
-            Some(_) => Self::Named,
-            None => Self::Refused,
+            Some(_) => Self::Defer,
+            None => Self::Refuse,
         }
     }
 }
 
 impl FrameLine {
-    /// The files of the frame and the other facts of its line.
-    fn source(
+    /// Converts the line to the files of its frame and the facts about it.
+    fn into_source(
         self,
         root: &Root,
         info: &DataSetInfo,
-        names: &SceneNames,
+        names: &SegmentNames,
         missing: MissingFiles,
     ) -> Result<ImageSource, String> {
-        let existing = |file: PathBuf| match missing {
-            MissingFiles::Refused => root.file(root.folder(), &file),
-            MissingFiles::Named => root.place(root.folder(), &file),
+        let resolve = |file: PathBuf| match missing {
+            MissingFiles::Refuse => root.file(root.folder(), &file),
+            MissingFiles::Defer => root.path(root.folder(), &file),
         };
-        let rgb = existing(self.rgb)?;
-        let dark = self.dark.map(|dark| dark.photos(existing)).transpose()?;
-        let dark = dark.unwrap_or_default();
-        let depth = self.depth.map(existing).transpose()?;
+        let rgb = resolve(self.rgb)?;
+        let dark = match self.dark {
+            Some(dark) => dark.into_photos(resolve)?,
+            None => Vec::new(),
+        };
+        let depth = self.depth.map(resolve).transpose()?;
         let maps = MapPaths {
             depth: depth
                 .map(|path| DepthFile::new(path, self.depth_scale))
                 .transpose()?,
-            semantic: self.sem.map(existing).transpose()?,
-            segments: self.over.map(existing).transpose()?,
+            semantic: self.sem.map(resolve).transpose()?,
+            segments: self.over.map(resolve).transpose()?,
         };
         let focal = self
             .intrinsics
@@ -137,7 +139,7 @@ impl FrameLine {
                 "a focal length of {focal} pixels; fx and fy above 0 expected"
             ));
         }
-        let view = FrameFacts {
+        let facts = FrameFacts {
             depth_kind: self.depth_kind.or(info.depth_kind).unwrap_or_default(),
             intrinsics: self.intrinsics,
             segmentation: match self.over_source {
@@ -153,13 +155,13 @@ impl FrameLine {
         Ok(ImageSource::File(Box::new(FrameFile {
             rgb,
             maps,
-            view,
+            facts,
             dark,
         })))
     }
 }
 
-/// The frames of a folder and the labels of its maps, without questions.
+/// Opens a folder of frames with the labels of its maps, without questions.
 pub(super) fn frames(folder: &Path, further: &[PathBuf], missing: MissingFiles) -> Result<Dataset> {
     let info = data_set_info(folder)?;
     let labels = labels(folder)?;
@@ -177,11 +179,10 @@ pub(super) fn frames(folder: &Path, further: &[PathBuf], missing: MissingFiles) 
     })
 }
 
-/// The labels of the semantic maps of a folder; `None` without a `classes.json`.
+/// Labels of the semantic maps of a folder; `None` without a `classes.json`.
 pub(super) fn labels(folder: &Path) -> Result<Option<Labels>> {
     let classes = folder.join(CLASSES);
-    let labels = classes.exists().then(|| labels::read(&classes));
-    labels.transpose()
+    classes.exists().then(|| labels::read(&classes)).transpose()
 }
 
 fn data_set_info(folder: &Path) -> Result<DataSetInfo> {
@@ -197,12 +198,12 @@ fn data_set_info(folder: &Path) -> Result<DataSetInfo> {
     Ok(info)
 }
 
-/// The light in which the photographs of a folder were taken: as `dataset.json` states, else lit.
+/// Light in which the photographs of a folder were taken, from `dataset.json`; lit by default.
 pub(super) fn light(folder: &Path) -> Result<SetLight> {
     Ok(data_set_info(folder)?.light.unwrap_or_default())
 }
 
-/// Segment number → name in a scene; empty without a `segments.json`.
+/// Names of the segments of a scene by number; empty without a `segments.json`.
 fn segment_names(root: &Root, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentName>>> {
     let below = Path::new("scenes").join(scene).join(SEGMENTS);
     let path = root.folder().join(&below);
@@ -227,6 +228,7 @@ fn segment_names(root: &Root, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentNa
     Ok(Arc::new(names))
 }
 
+/// Opens a folder of frames with its questions; `questions` replaces its `questions.jsonl`.
 pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
     let file = questions.map_or_else(|| folder.join(QUESTIONS), Path::to_owned);
     let missing = MissingFiles::new(set.bad);
@@ -245,24 +247,25 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
         );
         return Err(Error::data(folder.display(), problem));
     }
-    let mut others = other_questions(folder).filter(|_| questions.is_none());
-    if let Some(other) = others.next() {
+    if questions.is_none()
+        && let Some(other) = other_question_files(folder).next()
+    {
         tracing::warn!(
             "{0} is not read, because {QUESTIONS} is in the same folder; --data {0} reads it alone",
             other.display()
         );
     }
-    let read = ready_made::about_frames(&file, set)?;
+    let read = ready_made::questions_about_frames(&file, set)?;
     Dataset::new(
         stem(folder),
         sources(folder, &set.root.data_root, missing)?,
         Vec::new(),
     )
-    .with_questions_of(&file, read, set.bad)
+    .with_file_questions(&file, read, set.bad)
 }
 
-/// The files of questions that are in a folder besides [`QUESTIONS`].
-pub(super) fn other_questions(folder: &Path) -> impl Iterator<Item = PathBuf> {
+/// Question files of a folder other than [`QUESTIONS`].
+pub(super) fn other_question_files(folder: &Path) -> impl Iterator<Item = PathBuf> {
     ["csv", "tsv", "json", "parquet"]
         .map(|ending| format!("questions.{ending}"))
         .map(|name| folder.join(name))
@@ -270,14 +273,17 @@ pub(super) fn other_questions(folder: &Path) -> impl Iterator<Item = PathBuf> {
         .filter(|file| file.exists())
 }
 
-/// Whether a place is a folder of frames, and not a ready-made set.
+/// True if the place is a folder of frames, not a ready-made set.
 pub(super) fn is_folder_of_frames(place: &Path, questions: Option<&Path>) -> bool {
     let has = |name: &str| place.join(name).exists();
     place.is_dir()
-        && (questions.is_some() || has(FRAMES) || has(QUESTIONS) || !ready_made::holds_files(place))
+        && (questions.is_some()
+            || has(FRAMES)
+            || has(QUESTIONS)
+            || !ready_made::is_set_folder(place))
 }
 
-/// The frames of a folder: those in `frames.jsonl`, or every image if there is no such list.
+/// Frames of a folder: those in `frames.jsonl`, or every image if there is no such list.
 pub(super) fn sources(
     folder: &Path,
     further: &[PathBuf],
@@ -285,13 +291,13 @@ pub(super) fn sources(
 ) -> Result<BTreeMap<FrameId, ImageSource>> {
     let list = folder.join(FRAMES);
     if list.exists() {
-        frames_of_list(&Root::new(folder, further)?, &list, missing)
+        listed_frames(&Root::new(folder, further)?, &list, missing)
     } else {
         images(&Root::new(folder, further)?)
     }
 }
 
-/// One image file as a data set of one frame, named by its file name.
+/// A single frame from an image file, named by its file name.
 pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -299,22 +305,22 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     Ok([(id, ImageSource::image(path.to_owned()))].into())
 }
 
-fn frames_of_list(
+fn listed_frames(
     root: &Root,
     list: &Path,
     missing: MissingFiles,
 ) -> Result<BTreeMap<FrameId, ImageSource>> {
-    let (info, mut names) = (data_set_info(root.folder())?, SceneNames::new());
+    let (info, mut names) = (data_set_info(root.folder())?, SegmentNames::new());
     let mut sources = BTreeMap::new();
     for (number, line) in json_lines::<FrameLine>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
         if !names.contains_key(&line.scene) {
-            let of_scene = segment_names(root, &line.scene)
+            let scene_names = segment_names(root, &line.scene)
                 .map_err(|problem| Error::line(list, number, problem))?;
-            names.insert(line.scene.clone(), of_scene);
+            names.insert(line.scene.clone(), scene_names);
         }
         let source = line
-            .source(root, &info, &names, missing)
+            .into_source(root, &info, &names, missing)
             .map_err(|problem| Error::line(list, number, problem))?;
         if sources.insert(id.clone(), source).is_some() {
             let problem = format_args!("a second frame {:?}", id.0);
@@ -324,29 +330,27 @@ fn frames_of_list(
     Ok(sources)
 }
 
-/// Every image of a folder. Links that lead out of it are not followed, and a warning names them.
+/// Every image of a folder. Links out of the folder are not followed; a warning names the first.
 fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
     let folder = root.folder();
     let mut sources = BTreeMap::new();
     let (mut all, mut links_out) = (Vec::new(), Vec::new());
     for path in entries(folder)? {
-        match root.leads_to(&path) {
-            LeadsTo::Within => all.push(path),
-            LeadsTo::Outside => links_out.push(path),
-            LeadsTo::Nowhere => {}
+        match root.locate(&path) {
+            Location::Inside => all.push(path),
+            Location::Outside => links_out.push(path),
+            Location::Missing => {}
         }
     }
     root.warn_of_links_out(&links_out);
-    let names = ImageNames::from_paths(all.clone());
-    for path in &names.images {
+    let found = ImagePaths::from_paths(all.clone());
+    for path in &found.images {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         sources.insert(FrameId(name.into_owned()), ImageSource::image(path.clone()));
     }
     if sources.is_empty() {
-        let has_images =
-            |inner: &&PathBuf| entries(inner).is_ok_and(|of| of.iter().any(|path| is_image(path)));
         let questions = folder.join(QUESTIONS);
-        let remedy = match all.iter().find(has_images) {
+        let remedy = match all.iter().find(|path| has_images(path)) {
             Some(inner) if questions.exists() => format!(
                 "; name {} if its lines have paths such as {}/IMAGE",
                 questions.display(),
@@ -358,15 +362,20 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
             ),
             None => String::new(),
         };
-        let unread = names
-            .unread()
+        let unread = found
+            .unsupported_note()
             .map_or(String::new(), |unread| format!("; {unread}"));
         let problem =
             format_args!("neither a {FRAMES} nor any {READ} image in this folder{unread}{remedy}");
         return Err(Error::data(folder.display(), problem));
     }
-    names.warn_of_unread(folder);
+    found.warn_of_unsupported(folder);
     Ok(sources)
+}
+
+/// True if the path is a folder with an image directly in it.
+fn has_images(folder: &Path) -> bool {
+    entries(folder).is_ok_and(|inner| inner.iter().any(|path| is_image(path)))
 }
 
 #[cfg(test)]
@@ -393,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_has_the_maps_its_line_names() {
+    fn frame_has_the_maps_of_its_line() {
         let id = FrameId("a/0".into());
         let bare = folder(r#","depth":null,"depth_scale":0.001"#);
         let frame = open(bare.path(), None, &SetArgs::default())
@@ -415,10 +424,10 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_of_folders_of_images_names_one_of_them() {
+    fn folder_without_images_suggests_a_subfolder() {
         let folder = tempfile::tempdir().unwrap();
         let problem = || {
-            sources(folder.path(), &[], MissingFiles::Refused)
+            sources(folder.path(), &[], MissingFiles::Refuse)
                 .err()
                 .unwrap()
                 .to_string()
@@ -432,7 +441,7 @@ mod tests {
     }
 
     #[test]
-    fn every_file_that_a_line_names_must_exist() {
+    fn missing_or_invalid_maps_are_errors() {
         for (keys, says) in [
             (r#","depth":"no.png","depth_scale":1"#, "no.png"),
             (r#","sem":"no.png""#, "no such file: "),
@@ -456,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn a_byte_order_mark_is_ignored() {
+    fn byte_order_mark_is_ignored() {
         let folder = folder("");
         let list = folder.path().join(FRAMES);
         let text = fs::read_to_string(&list).unwrap();
@@ -465,7 +474,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_line_is_named_once() {
+    fn error_names_the_broken_line_once() {
         let folder = folder("");
         fs::write(folder.path().join(FRAMES), "\n{\n").unwrap();
         let error = open(folder.path(), None, &SetArgs::default())

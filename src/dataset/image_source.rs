@@ -1,32 +1,33 @@
-//! Where an image lies: [`ImageSource`].
+//! Location of an image: [`ImageSource`].
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::dark_photos::DarkPhoto;
+use super::frame_facts::FrameFacts;
 use super::maps::MapPaths;
 use super::ready_made::{Archive, EmbeddedImage};
-use super::view::FrameFacts;
 use crate::rooms;
 
-/// The place of one image and of its maps.
+/// Location of one image and its maps.
 #[derive(Debug, Clone)]
 pub(crate) enum ImageSource {
+    /// An image file.
     File(Box<FrameFile>),
-    /// An image of this name in a ZIP file.
+    /// An image in a ZIP file, under the name of the frame.
     Member(Arc<Archive>),
-    /// An image inside a file of rows.
+    /// An image inside a table.
     Embedded(EmbeddedImage),
     /// A frame of the built-in rooms.
     Room(rooms::Room),
 }
 
-/// An image file, its map files, the other facts about the frame, and photographs of its scene in the dark.
+/// Image file of a frame, with its maps, metadata and photographs of its scene in the dark.
 #[derive(Debug, Clone)]
 pub(crate) struct FrameFile {
     pub(crate) rgb: PathBuf,
     pub(crate) maps: MapPaths,
-    pub(crate) view: FrameFacts,
+    pub(crate) facts: FrameFacts,
     pub(crate) dark: Vec<DarkPhoto>,
 }
 
@@ -36,7 +37,7 @@ impl ImageSource {
         Self::File(Box::new(FrameFile {
             rgb,
             maps: MapPaths::default(),
-            view: FrameFacts::default(),
+            facts: FrameFacts::default(),
             dark: Vec::new(),
         }))
     }

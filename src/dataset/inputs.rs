@@ -1,4 +1,4 @@
-//! The images of a command whose arguments are files and folders: [`Inputs`].
+//! Images of a command that takes files and folders as arguments: [`Inputs`].
 
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -7,25 +7,26 @@ use super::{Dataset, Picture, ReadingRule};
 use crate::error::{Error, Result};
 use crate::types::FrameId;
 
-/// The frames of all files and folders.
+/// Frames of all input files and folders.
 pub(crate) struct Inputs {
     sets: Vec<Dataset>,
     pub(crate) entries: Vec<InputFrame>,
 }
 
-/// One frame, and the name of its output files.
+/// Frame with the name of its output files.
 pub(crate) struct InputFrame {
+    /// Index of its data set in [`Inputs`].
     set: usize,
     pub(crate) id: FrameId,
-    /// The path below the output folder, without the file extension.
+    /// Path relative to the output folder, without the file extension.
     pub(crate) stem: String,
 }
 
 impl Inputs {
-    /// The frames of the inputs; `further` are folders that paths in them may lead to. No image is read.
+    /// Opens the inputs. Paths in them may also lead into the folders in `further`. No image is read.
     ///
     /// # Errors
-    /// If an input is missing, two frames would have the same name, or a name leads out of the output folder.
+    /// If an input is missing, two frames would have the same output name, or a name leads outside the output folder.
     pub(crate) fn open(inputs: &[PathBuf], further: &[PathBuf], rule: ReadingRule) -> Result<Self> {
         let sets: Vec<Dataset> = inputs
             .iter()
@@ -54,13 +55,16 @@ impl Inputs {
         self.sets[entry.set].picture(&entry.id)
     }
 
-    /// The focal length of a frame along a row, in pixels of its image; `None` if it is not known.
+    /// Horizontal focal length of a frame, in pixels of its image; `None` if unknown.
     pub(crate) fn focal(&self, entry: &InputFrame) -> Option<f64> {
         self.sets[entry.set].focal(&entry.id)
     }
 }
 
-/// The name of the output files of a frame: the name of the frame, without an image extension.
+/// Name of the output files of a frame: the name of the frame, without an image extension.
+///
+/// # Errors
+/// If the name leads outside the output folder.
 pub(crate) fn stem(id: &FrameId) -> Result<String> {
     let path = Path::new(&id.0);
     if !path

@@ -1,28 +1,29 @@
-//! Folders of images by class as a data set with one question: [`dataset`].
+//! Image folders named by class, as a classification question about each image: [`open`].
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use super::image_names::ImageNames;
+use super::image_paths::ImagePaths;
 use super::{Dataset, ImageSource};
 use crate::error::{Error, Result};
 use crate::files::reading::{self, entries};
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
-/// A question about each image of the folders in a folder. A frame is named `CLASS/FILE`, and so is its question. The choices are the
-/// names of all folders in alphabetical order, or its own and others that are drawn by the content of the image, in the same order.
+/// Opens a folder with a subfolder for each class, and asks `question` about each image. Frames and questions are named `CLASS/FILE`.
+/// The choices are all class names in alphabetical order, or `choices` of them: the true one and others drawn by the content of the
+/// image.
 ///
 /// # Errors
-/// If there are fewer than two classes, more than can be choices, or an image cannot be read.
-pub(super) fn dataset(
+/// If there are fewer than two classes or too many for the choices, or an image cannot be read.
+pub(super) fn open(
     folder: &Path,
     question: &str,
     choices: Option<NonZeroUsize>,
 ) -> Result<Dataset> {
     let classes = classes(folder)?;
     let names: Vec<&str> = classes.keys().map(String::as_str).collect();
-    let count = count(folder, names.len(), choices)?;
+    let count = choice_count(folder, names.len(), choices)?;
     tracing::warn!(
         "a photograph may show things of several of the {} classes, and the folder names one of them: that name is the true choice; with \
          boxes or tags, make questions instead",
@@ -38,7 +39,7 @@ pub(super) fn dataset(
                 names.clone()
             } else {
                 let bytes = reading::bytes(path)?;
-                drawn(&names, class, count, &Digest::from_bytes(&bytes))
+                draw_choices(&names, class, count, &Digest::from_bytes(&bytes))
             };
             let truth = offered.iter().position(|name| name == class);
             let texts = offered.into_iter().map(str::to_owned).collect();
@@ -57,26 +58,25 @@ pub(super) fn dataset(
     Ok(Dataset::new(super::stem(folder), sources, questions))
 }
 
-/// The images of each folder that has some, by the folder's name. Says which folders have none, and which images are left out.
+/// Images of each class folder, by its name. Warns about folders without images and about images in unsupported formats.
 fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
     let mut classes = BTreeMap::new();
-    let is_hidden = |name: &str| name.starts_with('.');
     for inner in entries(folder)?.into_iter().filter(|path| path.is_dir()) {
         let name = inner
             .file_name()
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        if is_hidden(&name) {
+        if name.starts_with('.') {
             continue;
         }
-        let images = ImageNames::from_paths(entries(&inner)?);
-        images.warn_of_unread(&inner);
-        if images.images.is_empty() {
+        let found = ImagePaths::from_paths(entries(&inner)?);
+        found.warn_of_unsupported(&inner);
+        if found.images.is_empty() {
             tracing::warn!("{}: no images in it, so it is not a class", inner.display());
             continue;
         }
-        classes.insert(name, images.images);
+        classes.insert(name, found.images);
     }
     if classes.len() < 2 {
         let problem = format_args!(
@@ -88,8 +88,11 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
     Ok(classes)
 }
 
-/// The number of choices of each question.
-fn count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) -> Result<usize> {
+/// Number of choices of each question.
+///
+/// # Errors
+/// If `choices` is not from 2 to the number of classes, or is not given for too many classes.
+fn choice_count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) -> Result<usize> {
     let wrong = |problem: String| Err(Error::usage("--choices", problem));
     match choices.map(usize::from) {
         None if classes > Choices::MOST => wrong(format!(
@@ -109,8 +112,8 @@ fn count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) -> Result
     }
 }
 
-/// The own class of an image and others with the lowest digests beside its content, in their order.
-fn drawn<'n>(names: &[&'n str], own: &str, count: usize, image: &Digest) -> Vec<&'n str> {
+/// The true class of an image and the others with the lowest digest of the image and their name, in the order of `names`.
+fn draw_choices<'n>(names: &[&'n str], own: &str, count: usize, image: &Digest) -> Vec<&'n str> {
     let mut others: Vec<&str> = names.iter().copied().filter(|name| *name != own).collect();
     others.sort_by_cached_key(|name| {
         *Digest::from_parts([&b"darkqa.label/1"[..], image.as_bytes(), name.as_bytes()]).as_bytes()
@@ -130,8 +133,8 @@ mod tests {
     const NAMES: [&str; 5] = ["Bicycle", "Boat", "Cup", "Dog", "Table"];
 
     #[test]
-    fn others_are_drawn_by_content_and_the_truth_is_always_there() {
-        let draw = |content: &[u8]| drawn(&NAMES, "Cup", 3, &Digest::from_bytes(content));
+    fn drawn_choices_depend_on_content_and_include_truth() {
+        let draw = |content: &[u8]| draw_choices(&NAMES, "Cup", 3, &Digest::from_bytes(content));
         let mut seen = std::collections::BTreeSet::new();
         for content in 0..40_u8 {
             let names = draw(&[content]);
@@ -144,9 +147,10 @@ mod tests {
     }
 
     #[test]
-    fn more_classes_than_choices_are_an_error_without_a_number() {
+    fn wrong_numbers_of_choices_are_errors() {
         let count = |classes, choices| {
-            count(Path::new("d"), classes, NonZeroUsize::new(choices)).map_err(|e| e.to_string())
+            choice_count(Path::new("d"), classes, NonZeroUsize::new(choices))
+                .map_err(|e| e.to_string())
         };
         assert_eq!(count(12, 0), Ok(12));
         assert_eq!(count(30, 4), Ok(4));

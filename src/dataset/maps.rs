@@ -1,7 +1,7 @@
-//! The maps of an image, read from their files: [`MapPaths`].
+//! Depth, semantic and segment maps of an image: [`MapPaths`], [`MapFiles`].
 //!
-//! A map has one number for each pixel of its image, so both have the same size. A map of another size is refused and
-//! not scaled, because ids cannot be interpolated.
+//! A map has one number for each pixel of its image. A map of another size is refused instead of scaled, because ids cannot be
+//! interpolated.
 
 use std::path::{Path, PathBuf};
 
@@ -16,30 +16,30 @@ use crate::picture::raw_png::{RawPng, SampleForm};
 use crate::picture::reading_rule::MOST_PIXELS;
 use crate::types::Digest;
 
-/// The maximum depth of a pixel in millimetres: a kilometre (chosen). No room is as deep. A larger value means a wrong
-/// unit, as millimetres that are read as metres.
-const MOST_DEPTH: f64 = 1e6;
+/// Maximum depth of a pixel, in millimetres: a kilometre, deeper than any room (chosen). A larger value means a wrong unit, such as
+/// millimetres read as metres.
+const MAX_DEPTH_MM: f64 = 1e6;
 
-/// The map files of a frame, each of which may be missing.
+/// Paths of the maps that a frame has.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct MapPaths {
     pub(crate) depth: Option<DepthFile>,
-    /// The class of each pixel: a PNG file of 8-bit grey, 16-bit grey or palette indices.
+    /// Class of each pixel: a PNG file of 8-bit grey, 16-bit grey or palette indices.
     pub(crate) semantic: Option<PathBuf>,
-    /// The segment of each pixel, 0 for none: a 16-bit grey PNG file, or a `.npy` file of integers.
+    /// Segment of each pixel, 0 for none: a 16-bit grey PNG file, or a `.npy` file of integers.
     pub(crate) segments: Option<PathBuf>,
 }
 
-/// The file of a depth map.
+/// File of a depth map.
 #[derive(Debug, Clone)]
 pub(crate) enum DepthFile {
-    /// A 16-bit grey PNG file; 0 means no depth.
+    /// 16-bit grey PNG file; 0 means no depth.
     Png {
         path: PathBuf,
         /// Metres per unit of the samples.
         scale: f64,
     },
-    /// A `.npy` file of metres as 2-, 4- or 8-byte floats. NaN, an infinity, 0 and negative numbers mean no depth.
+    /// `.npy` file of metres as 2-, 4- or 8-byte floats. NaN, infinity, 0 and negative numbers mean no depth.
     Npy(PathBuf),
 }
 
@@ -70,8 +70,8 @@ impl DepthFile {
         }
     }
 
-    /// The depth in millimetres, in the size that the file has.
-    pub(crate) fn decode_alone(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
+    /// Decodes the depth in millimetres, whatever the size of the map.
+    pub(crate) fn decode_any_size(&self, bytes: &[u8]) -> Result<Array2<u32>, String> {
         let size = match self {
             Self::Png { .. } => RawPng::open(bytes, &[SampleForm::Grey16], MOST_PIXELS)?.size,
             Self::Npy(_) => Npy::parse(bytes)?.size,
@@ -79,14 +79,14 @@ impl DepthFile {
         self.decode(bytes, size)
     }
 
+    /// Decodes the depth in millimetres of a map that must have this size.
     fn decode(&self, bytes: &[u8], size: Size) -> Result<Array2<u32>, String> {
         match self {
             Self::Png { scale, .. } => {
-                // Multiplied first: most scales are a round number of millimetres, and then this is exact.
+                // Convert the scale first: most scales are a whole number of millimetres, so the product is exact.
                 let unit = scale * 1_000.0;
                 let table: Vec<u32> = (0..=u16::MAX)
-                    .map(|units| millimetres(units.into(), unit))
-                    .map(|depth| depth.unwrap_or(u32::MAX))
+                    .map(|units| millimetres(units.into(), unit).unwrap_or(u32::MAX))
                     .collect();
                 let depths = png(bytes, &[SampleForm::Grey16], size, |units| {
                     table[usize::from(units)]
@@ -99,14 +99,14 @@ impl DepthFile {
             }
             Self::Npy(_) => {
                 let metres = npy(bytes, size)?.floats()?;
-                grid(size, metres.map(|metres| millimetres(metres, 1_000.0)))
+                collect_grid(size, metres.map(|metres| millimetres(metres, 1_000.0)))
             }
         }
     }
 }
 
 impl MapPaths {
-    /// The files of the maps.
+    /// Paths of all map files.
     pub(crate) fn paths(&self) -> impl Iterator<Item = PathBuf> {
         self.depth
             .iter()
@@ -119,19 +119,19 @@ impl MapPaths {
             )
     }
 
-    /// The paths of a frame without maps.
+    /// A frame without maps.
     pub(crate) const NONE: Self = Self {
         depth: None,
         semantic: None,
         segments: None,
     };
 
-    /// Whether the frame has no maps.
+    /// True if the frame has no maps.
     pub(super) fn is_empty(&self) -> bool {
         self.depth.is_none() && self.semantic.is_none() && self.segments.is_none()
     }
 
-    /// The paths of the files with height and width of the maps, from their headers.
+    /// Path and size (height, width) of each map, from its header.
     ///
     /// # Errors
     /// If a file cannot be read or is not a map; the error names it.
@@ -146,20 +146,20 @@ impl MapPaths {
                 let size = if is_npy(path) {
                     Npy::parse(&bytes).map(|npy| npy.size)
                 } else {
-                    let png = RawPng::open(&bytes, &SampleForm::ALL, MOST_PIXELS);
-                    png.map(|png| png.size).map_err(String::from)
+                    RawPng::open(&bytes, &SampleForm::ALL, MOST_PIXELS)
+                        .map(|png| png.size)
+                        .map_err(String::from)
                 };
-                Ok((path, in_file(path, size)?))
+                Ok((path, with_path(path, size)?))
             })
             .collect()
     }
 
-    /// The image file that these maps belong to. Maps are not turned, so the image is not turned either if they have the size of the
-    /// image as stored.
+    /// Turns off the EXIF rotation of the image if it has maps: maps are not rotated, so they must have the size of the image as stored.
     ///
     /// # Errors
-    /// If the file states a turn and a map has another size than the image as stored.
-    pub(super) fn beside(&self, image: ImageFile) -> Result<ImageFile> {
+    /// If the file states a rotation and a map has another size than the image as stored.
+    pub(super) fn match_orientation(&self, image: ImageFile) -> Result<ImageFile> {
         if self.is_empty() {
             return Ok(image);
         }
@@ -186,23 +186,22 @@ impl MapPaths {
         Ok(image.never_turned())
     }
 
-    /// The bytes of the files, not decoded.
+    /// Reads the map files without decoding them.
     ///
     /// # Errors
     /// If a file cannot be read; the error names it.
     pub(crate) fn read(&self) -> Result<MapFiles<'_>> {
-        let read = |path| reading::bytes(path);
-        let depth = self.depth.as_ref().map(DepthFile::path);
+        let read = |path: Option<&Path>| path.map(reading::bytes).transpose();
         Ok(MapFiles {
             maps: self,
-            depth: depth.map(read).transpose()?,
-            semantic: self.semantic.as_deref().map(read).transpose()?,
-            segments: self.segments.as_deref().map(read).transpose()?,
+            depth: read(self.depth.as_ref().map(DepthFile::path))?,
+            semantic: read(self.semantic.as_deref())?,
+            segments: read(self.segments.as_deref())?,
         })
     }
 }
 
-/// The bytes of a frame's map files.
+/// Bytes of a frame's map files.
 #[derive(Debug)]
 pub(crate) struct MapFiles<'a> {
     maps: &'a MapPaths,
@@ -212,7 +211,7 @@ pub(crate) struct MapFiles<'a> {
 }
 
 impl MapFiles<'_> {
-    /// The digest of the files and of the unit of depth.
+    /// Digest of the files and of the unit of depth.
     pub(crate) fn digest(&self) -> Digest {
         let unit = match &self.maps.depth {
             Some(DepthFile::Png { scale, .. }) => scale.to_string(),
@@ -220,8 +219,9 @@ impl MapFiles<'_> {
             None => String::new(),
         };
         let files = [&self.depth, &self.semantic, &self.segments].map(|file| {
-            let digest = file.as_deref().map(Digest::from_bytes);
-            digest.map_or_else(Vec::new, |digest| digest.as_bytes().to_vec())
+            file.as_deref().map_or_else(Vec::new, |bytes| {
+                Digest::from_bytes(bytes).as_bytes().to_vec()
+            })
         });
         Digest::from_parts(
             [unit.as_bytes()]
@@ -230,32 +230,37 @@ impl MapFiles<'_> {
         )
     }
 
-    /// Depth in millimetres.
+    /// Decodes the depth of each pixel, in millimetres; `None` without a depth map.
     ///
     /// # Errors
-    /// If the file has another form, another size than the image, or an impossible value; the error names it. The same
-    /// holds for the other maps.
+    /// If the file has another format, another size than the image, or an impossible value; the error names it.
     pub(crate) fn depth(&self, size: Size) -> Result<Option<Array2<u32>>> {
         let Some((file, bytes)) = self.maps.depth.as_ref().zip(self.depth.as_ref()) else {
             return Ok(None);
         };
-        in_file(file.path(), file.decode(bytes, size)).map(Some)
+        with_path(file.path(), file.decode(bytes, size)).map(Some)
     }
 
-    /// The class of each pixel.
+    /// Decodes the class of each pixel; `None` without a semantic map.
+    ///
+    /// # Errors
+    /// As [`Self::depth`].
     pub(crate) fn semantic(&self, size: Size) -> Result<Option<Array2<u16>>> {
         let Some((path, bytes)) = self.maps.semantic.as_ref().zip(self.semantic.as_ref()) else {
             return Ok(None);
         };
-        in_file(path, semantic(bytes, size)).map(Some)
+        with_path(path, semantic(bytes, size)).map(Some)
     }
 
-    /// The segment of each pixel.
+    /// Decodes the segment of each pixel; `None` without a segment map.
+    ///
+    /// # Errors
+    /// As [`Self::depth`].
     pub(crate) fn segments(&self, size: Size) -> Result<Option<Array2<u32>>> {
         let Some((path, bytes)) = self.maps.segments.as_ref().zip(self.segments.as_ref()) else {
             return Ok(None);
         };
-        in_file(path, segments(bytes, size, is_npy(path))).map(Some)
+        with_path(path, segments(bytes, size, is_npy(path))).map(Some)
     }
 }
 
@@ -267,17 +272,17 @@ fn semantic(bytes: &[u8], size: Size) -> Result<Array2<u16>, String> {
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
-fn segments(bytes: &[u8], size: Size, as_npy: bool) -> Result<Array2<u32>, String> {
-    if as_npy {
-        return grid(size, npy(bytes, size)?.integers()?.map(segment));
+fn segments(bytes: &[u8], size: Size, is_npy: bool) -> Result<Array2<u32>, String> {
+    if is_npy {
+        return collect_grid(size, npy(bytes, size)?.integers()?.map(segment_id));
     }
-    // 8 bits hold 255 segments only, and a larger id that was written to them is lost without an error.
+    // 8-bit files are refused: they have room for 255 segments, and larger ids are lost silently when they are written.
     let ids = png(bytes, &[SampleForm::Grey16], size, u32::from)?;
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
-/// The id of a segment, checked for its range.
-fn segment(id: i128) -> Result<u32, String> {
+/// Checks the range of a segment id.
+fn segment_id(id: i128) -> Result<u32, String> {
     u32::try_from(id).map_err(|_| {
         format!(
             "{id} is not the id of a segment; 0 (none) to {} expected",
@@ -286,17 +291,17 @@ fn segment(id: i128) -> Result<u32, String> {
     })
 }
 
-/// A depth in whole millimetres, rounded half to even; 0 if there is none. `unit` is millimetres per unit.
+/// Converts a depth to whole millimetres, rounded half to even; 0 if there is no depth. `unit` is millimetres per unit.
 pub(crate) fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
     if !units.is_finite() || units <= 0.0 {
         return Ok(0);
     }
     let depth = units * unit;
-    if depth > MOST_DEPTH {
+    if depth > MAX_DEPTH_MM {
         return Err(format!(
             "a depth of {} m, deeper than any room ({} m at most); a .npy file is in metres and a PNG in units of its depth_scale, with 0 where there is no depth",
             depth / 1_000.0,
-            MOST_DEPTH / 1_000.0
+            MAX_DEPTH_MM / 1_000.0
         ));
     }
     Ok(depth.round_ties_even() as u32)
@@ -307,22 +312,24 @@ fn is_npy(path: &Path) -> bool {
         .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
 }
 
-/// A result whose error names the file.
-fn in_file<T>(path: &Path, read: Result<T, String>) -> Result<T> {
+/// Adds the path of the file to the error.
+fn with_path<T>(path: &Path, read: Result<T, String>) -> Result<T> {
     read.map_err(|problem| Error::data(path.display(), problem))
 }
 
+/// Decodes a PNG map of this size and converts each sample.
 fn png<T: Clone>(
     bytes: &[u8],
     forms: &[SampleForm],
     size: Size,
-    of: impl Fn(u16) -> T,
+    convert: impl Fn(u16) -> T,
 ) -> Result<Vec<T>, String> {
     let png = RawPng::open(bytes, forms, MOST_PIXELS)?;
     check_size(png.size, size)?;
-    png.samples(of)
+    png.samples(convert)
 }
 
+/// Parses a `.npy` map of this size.
 fn npy(bytes: &[u8], size: Size) -> Result<Npy<'_>, String> {
     let npy = Npy::parse(bytes)?;
     check_size(npy.size, size)?;
@@ -339,7 +346,7 @@ fn check_size(map: Size, image: Size) -> Result<(), String> {
     ))
 }
 
-fn grid<T>(
+fn collect_grid<T>(
     size: Size,
     values: impl Iterator<Item = Result<T, String>>,
 ) -> Result<Array2<T>, String> {

@@ -6,9 +6,10 @@
 mod bank;
 mod dark_photos;
 mod family;
+mod frame_facts;
 pub(crate) mod frame_folder;
 pub(crate) mod frames;
-pub(crate) mod image_names;
+pub(crate) mod image_paths;
 mod image_source;
 pub(crate) mod inputs;
 mod label_folders;
@@ -23,7 +24,6 @@ mod root;
 mod scene_args;
 mod settings;
 mod unusable;
-mod view;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
@@ -37,6 +37,8 @@ use crate::types::{Frame, FrameId, Labels, PhotoName, Question};
 
 pub(crate) use bank::{Bank, BankPlace};
 use dark_photos::DarkPhoto;
+use frame_facts::FrameFacts;
+pub(crate) use frame_facts::FrameFiles;
 use frames::MissingFiles;
 pub(crate) use image_source::ImageSource;
 use maps::MapPaths;
@@ -44,36 +46,34 @@ pub(crate) use photographs::Photographs;
 pub(crate) use picture::Picture;
 pub use ready_made::SetArgs;
 pub(crate) use ready_made::SkipBad;
-use ready_made::{Form, LEFT_OUT, ReadQuestions, RowCounts, SceneNames, Series};
+use ready_made::{FileQuestions, LEFT_OUT, RowCounts, SceneNames, Series, SetFormat};
 pub(crate) use root::Root;
 pub(crate) use root::RootArgs;
 pub(crate) use scene_args::SceneArgs;
 pub(crate) use settings::{
-    BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, place,
+    BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, parse_data_place,
 };
-use view::FrameFacts;
-pub(crate) use view::FrameFiles;
 
-/// The place of the data: what `--data` names.
+/// Where the data are, as given by `--data`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DataPlace {
     /// The built-in rooms with these settings.
     Rooms(Rooms),
-    /// A folder or file of the user.
+    /// A folder or file.
     Path(PathBuf),
     /// Several files of one set, in this order.
     Files(Vec<PathBuf>),
-    /// A well-known set, read by its rules.
+    /// A well-known set, read by its preset.
     Known {
-        /// The name of the set.
+        /// Name of the preset.
         name: String,
-        /// Its file or folder.
+        /// File or folder of the set.
         path: PathBuf,
     },
 }
 
 impl DataPlace {
-    /// The folder or file, of several files the first; `None` for the built-in rooms.
+    /// The folder or file (the first of several files); `None` for the built-in rooms.
     #[must_use]
     pub fn path(&self) -> Option<&Path> {
         match self {
@@ -91,16 +91,16 @@ pub struct Dataset {
     /// The `name` in `dataset.json`; empty if there is none.
     title: String,
     pub(crate) sources: BTreeMap<FrameId, ImageSource>,
-    /// The frames of each question that shows several, by the name that the question has for all of them.
+    /// Frames of each question with several images, by the name that stands for all of them in [`Question::frame`].
     series: Series,
-    /// The scenes that the questions give to their frames; they go before those of the frames themselves.
+    /// Scenes that the questions assign to their frames. They take precedence over the scenes of the frames.
     scenes: SceneNames,
     questions: Vec<Question>,
     labels: Option<Labels>,
     rule: ReadingRule,
-    /// The inferred column mapping of a ready-made set, one line per column; empty for other data.
-    reading: Vec<String>,
-    form: Form,
+    /// How a ready-made set was read (column mapping, omissions), one fact per line; empty for other data.
+    summary: Vec<String>,
+    format: SetFormat,
     rows: RowCounts,
 }
 
@@ -119,13 +119,13 @@ impl Dataset {
             questions,
             labels: None,
             rule: ReadingRule::default(),
-            reading: Vec::new(),
-            form: Form::Own,
+            summary: Vec::new(),
+            format: SetFormat::Native,
             rows: RowCounts::default(),
         }
     }
 
-    /// The frames at a place, without questions; `further` are folders that its paths may lead to. No image is read.
+    /// Opens the frames at a place, without questions. Paths may also lead into the folders in `further`. No image is read.
     ///
     /// # Errors
     /// If the place is not a folder of frames.
@@ -155,12 +155,11 @@ impl Dataset {
         }
     }
 
-    /// The data of a ready-made set.
     fn from_set(set: ready_made::ReadySet) -> Self {
         Self {
             title: set.title,
-            reading: set.reading,
-            form: set.form,
+            summary: set.summary,
+            format: set.format,
             rows: set.rows,
             series: set.series,
             scenes: set.scenes,
@@ -168,30 +167,33 @@ impl Dataset {
         }
     }
 
-    /// The same data set with these questions.
+    /// Replaces the questions.
     #[must_use]
     pub fn with_questions(self, questions: Vec<Question>) -> Self {
         Self { questions, ..self }
     }
 
-    /// Its questions, which it has no longer, so that those of large sets are held once.
+    /// Takes the questions out, to avoid a second copy of a large set.
     #[must_use]
     pub(crate) fn take_questions(&mut self) -> Vec<Question> {
         std::mem::take(&mut self.questions)
     }
 
-    /// The same data set with the questions of a file. Each must be about one of its frames; others are left out with `--skip bad`.
-    fn with_questions_of(
+    /// Replaces the questions by those of a file.
+    ///
+    /// # Errors
+    /// If a question is about a frame that the data set does not have. With `--skip bad`, such questions are left out instead.
+    fn with_file_questions(
         self,
         file: &Path,
-        read: ReadQuestions,
+        read: FileQuestions,
         skip: Option<SkipBad>,
     ) -> Result<Self> {
-        let ReadQuestions {
+        let FileQuestions {
             questions,
             scenes,
-            reading,
-            form,
+            summary,
+            format,
             rows,
         } = read;
         let unmatched = questions
@@ -207,35 +209,35 @@ impl Dataset {
                 self.name
             )
         });
-        let asked = Self {
+        let dataset = Self {
             scenes,
             questions,
-            reading,
-            form,
+            summary,
+            format,
             rows,
             ..self
         };
         match (problem, skip) {
-            (None, _) => Ok(asked),
-            (Some(problem), Some(skip)) => asked.without_strangers(&problem, skip),
+            (None, _) => Ok(dataset),
+            (Some(problem), Some(skip)) => dataset.without_unmatched_questions(&problem, skip),
             (Some(problem), None) => {
                 Err(Error::data(problem, "--skip bad leaves such questions out"))
             }
         }
     }
 
-    /// The images of an image file or a folder of frames, without questions; `further` are folders that its paths may lead to. No image
-    /// is read.
+    /// Opens an image file or a folder of frames, without questions. Paths may also lead into the folders in `further`. No image is
+    /// read.
     pub fn from_images(path: &Path, further: &[PathBuf]) -> Result<Self> {
         let sources = if path.is_dir() {
-            frames::sources(path, further, MissingFiles::Refused)?
+            frames::sources(path, further, MissingFiles::Refuse)?
         } else {
             frames::image(path)?
         };
         Ok(Self::new(stem(path), sources, Vec::new()))
     }
 
-    /// The frames of a folder and the labels of its maps, without questions. No image is read.
+    /// Opens a folder of frames with the labels of its maps, without questions. No image is read.
     pub fn from_frames(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         if !folder.is_dir() {
             return Err(Error::usage(
@@ -243,10 +245,10 @@ impl Dataset {
                 format_args!("{}: no such folder of frames", folder.display()),
             ));
         }
-        frames::frames(folder, further, MissingFiles::Refused)
+        frames::frames(folder, further, MissingFiles::Refuse)
     }
 
-    /// The labels of the semantic maps at a place, whether or not it has questions.
+    /// Labels of the semantic maps at a place; `None` without a `classes.json`.
     ///
     /// # Errors
     /// If `classes.json` cannot be read; the error names the file.
@@ -258,13 +260,13 @@ impl Dataset {
         }
     }
 
-    /// The meaning of each number in the semantic maps; `None` if the data set has no `classes.json`.
+    /// Meaning of each number in the semantic maps; `None` if the data set has no `classes.json`.
     #[must_use]
     pub fn labels(&self) -> Option<&Labels> {
         self.labels.as_ref()
     }
 
-    /// The same data set, whose images are read by this rule.
+    /// Sets the rule by which images are decoded.
     #[must_use]
     pub fn with_rule(self, rule: ReadingRule) -> Self {
         Self { rule, ..self }
@@ -275,30 +277,30 @@ impl Dataset {
         self.sources.keys()
     }
 
-    /// The frames that a question about `frame` shows, in order: this frame alone, or the several that it stands for.
+    /// Frames that a question about `frame` shows, in order: `frame` itself, or each image of a question with several images.
     #[must_use]
-    pub(crate) fn shown<'a>(&'a self, frame: &'a FrameId) -> &'a [FrameId] {
+    pub(crate) fn shown_frames<'a>(&'a self, frame: &'a FrameId) -> &'a [FrameId] {
         match self.series.get(frame) {
             Some(frames) => frames,
             None => std::slice::from_ref(frame),
         }
     }
 
-    /// The frames of a question that shows several, in order; none of a question that shows one.
+    /// Frames of a question with several images, in order; empty for a question with one image.
     #[must_use]
-    pub(crate) fn several(&self, frame: &FrameId) -> &[FrameId] {
+    pub(crate) fn image_series(&self, frame: &FrameId) -> &[FrameId] {
         self.series.get(frame).map_or(&[], Vec::as_slice)
     }
 
-    /// Whether the images of a frame, or of the several that it stands for, are in the data set.
+    /// True if the data set has the frame, or every frame of a question with several images.
     #[must_use]
-    pub(crate) fn has(&self, frame: &FrameId) -> bool {
-        self.shown(frame)
+    pub(crate) fn has_frames(&self, frame: &FrameId) -> bool {
+        self.shown_frames(frame)
             .iter()
             .all(|frame| self.sources.contains_key(frame))
     }
 
-    /// The scene of a frame, or of several that a question shows together; empty if the data set names none.
+    /// Scene of a frame, or the scene that all frames of a question with several images share; empty if there is none.
     #[must_use]
     pub fn scene(&self, id: &FrameId) -> String {
         if let Some(scene) = self.scenes.get(id) {
@@ -312,25 +314,25 @@ impl Dataset {
             };
         }
         match self.sources.get(id) {
-            Some(ImageSource::File(file)) => file.view.scene.clone(),
+            Some(ImageSource::File(file)) => file.facts.scene.clone(),
             Some(ImageSource::Room(room)) => room.scene(),
             Some(ImageSource::Embedded(_) | ImageSource::Member(_)) | None => String::new(),
         }
     }
 
-    /// The data at a place; `questions` replaces the `questions.jsonl` of a folder of frames.
+    /// Opens the data at a place; `questions` replaces the `questions.jsonl` of a folder of frames.
     ///
-    /// No image is read. Every question is checked: its choices, its answer among them, its frame among the images. The
-    /// built-in rooms, and a folder of frames with maps but no questions, have none yet. The caller makes those by rule
-    /// from [`Self::labels`] and adds them by [`Self::with_questions`].
+    /// No image is read. Every question is checked: its choices, that its answer is one of them, and that its frame exists.
+    /// The built-in rooms, and a folder of frames with maps but no questions, have no questions yet: the caller generates
+    /// them from [`Self::labels`] and adds them with [`Self::with_questions`].
     pub fn open(place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => {
                 let rooms = Self::from_rooms(*rooms);
                 match questions {
                     Some(file) => {
-                        let questions = ready_made::about_frames(file, set)?;
-                        rooms.with_questions_of(file, questions, set.bad)?
+                        let questions = ready_made::questions_about_frames(file, set)?;
+                        rooms.with_file_questions(file, questions, set.bad)?
                     }
                     None => rooms,
                 }
@@ -339,26 +341,15 @@ impl Dataset {
                 frames::open(path, questions, set)?
             }
             DataPlace::Path(path) => {
-                refuse(questions, "a ready-made set brings its own questions")?;
-                let places = std::slice::from_ref(path);
-                Self::from_set(ready_made::open(places, &stem(path), set)?)
+                Self::open_ready_made(std::slice::from_ref(path), questions, set)?
             }
-            DataPlace::Files(paths) => {
-                refuse(questions, "a ready-made set brings its own questions")?;
-                let first = paths.first().map_or(Path::new(""), PathBuf::as_path);
-                Self::from_set(ready_made::open(paths, &stem(first), set)?)
-            }
+            DataPlace::Files(paths) => Self::open_ready_made(paths, questions, set)?,
             DataPlace::Known { name, path } => {
-                refuse(questions, "a ready-made set brings its own questions")?;
-                let preset = Some(name.clone());
-                Self::from_set(ready_made::open(
-                    std::slice::from_ref(path),
-                    &stem(path),
-                    &SetArgs {
-                        preset,
-                        ..set.clone()
-                    },
-                )?)
+                let set = SetArgs {
+                    preset: Some(name.clone()),
+                    ..set.clone()
+                };
+                Self::open_ready_made(std::slice::from_ref(path), questions, &set)?
             }
         };
         if dataset.questions.is_empty() && dataset.labels.is_none() {
@@ -378,7 +369,21 @@ impl Dataset {
         Ok(dataset)
     }
 
-    /// A short name for tables and folders: the name of the folder, or of the file without its extension.
+    /// Opens a ready-made set, named after its first file or folder.
+    ///
+    /// # Errors
+    /// If the set cannot be read, or the user gives other questions than its own.
+    fn open_ready_made(
+        places: &[PathBuf],
+        questions: Option<&Path>,
+        set: &SetArgs,
+    ) -> Result<Self> {
+        refuse_questions(questions, "a ready-made set brings its own questions")?;
+        let first = places.first().map_or(Path::new(""), PathBuf::as_path);
+        Ok(Self::from_set(ready_made::open(places, &stem(first), set)?))
+    }
+
+    /// Short name for tables and folders: the name of the folder, or of the file without its extension.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -390,17 +395,17 @@ impl Dataset {
         &self.title
     }
 
-    /// The inferred column mapping of a ready-made set, one line per column; empty for other data.
+    /// How a ready-made set was read (column mapping, omissions), one fact per line; empty for other data.
     #[must_use]
-    pub fn reading(&self) -> &[String] {
-        &self.reading
+    pub fn summary(&self) -> &[String] {
+        &self.summary
     }
 
-    /// The lines of [`Self::reading`] that the user should see: those about the omissions alone where the set has this program's own
-    /// form.
-    pub fn reading_to_say(&self) -> impl Iterator<Item = &String> {
-        let is_said = |line: &&String| self.form == Form::Foreign || line.starts_with(LEFT_OUT);
-        self.reading.iter().filter(is_said)
+    /// Lines of [`Self::summary`] to print: only the omissions if the set is in this program's own format.
+    pub fn printed_summary(&self) -> impl Iterator<Item = &String> {
+        self.summary
+            .iter()
+            .filter(|line| self.format == SetFormat::Foreign || line.starts_with(LEFT_OUT))
     }
 
     /// The questions, in the order of their file.
@@ -409,20 +414,20 @@ impl Dataset {
         &self.questions
     }
 
-    /// The image of a frame as it is stored, not decoded.
+    /// Image of a frame, not decoded.
     ///
     /// # Errors
-    /// If there is no such frame, its file cannot be read, or the image is to be turned and its maps do not fit.
+    /// If there is no such frame, its file cannot be read, or the orientation of the image does not fit its maps.
     pub fn picture(&self, frame: &FrameId) -> Result<Picture> {
         match self.sources.get(frame) {
             Some(ImageSource::File(file)) => {
                 let image = ImageFile::open(&file.rgb, self.rule)?;
-                file.maps.beside(image).map(Picture::Encoded)
+                file.maps.match_orientation(image).map(Picture::Encoded)
             }
-            Some(ImageSource::Embedded(image)) => image.image(self.rule).map(Picture::Encoded),
+            Some(ImageSource::Embedded(image)) => image.read_image(self.rule).map(Picture::Encoded),
             Some(ImageSource::Member(archive)) => {
                 let place = format!("{}, {}", archive.path().display(), frame.0);
-                let file = ImageFile::new(archive.image(&frame.0)?, place, self.rule);
+                let file = ImageFile::new(archive.read_image(&frame.0)?, place, self.rule);
                 Ok(Picture::Encoded(file))
             }
             Some(ImageSource::Room(room)) => Ok(Picture::Drawn(room.clone(), self.rule)),
@@ -433,7 +438,7 @@ impl Dataset {
         }
     }
 
-    /// The photographs of a frame's scene in the dark, in their order.
+    /// Photographs of the frame's scene in the dark, in the order of the data.
     #[must_use]
     pub(crate) fn photographs(&self, frame: &FrameId) -> &[DarkPhoto] {
         match self.sources.get(frame) {
@@ -442,7 +447,7 @@ impl Dataset {
         }
     }
 
-    /// A photograph of a frame's scene in the dark as it is stored, not decoded.
+    /// Photograph of the frame's scene in the dark, not decoded.
     ///
     /// # Errors
     /// If the frame has no photograph of this name, or its file cannot be read.
@@ -458,17 +463,17 @@ impl Dataset {
         ImageFile::open(&photo.path, self.rule).map(Picture::Encoded)
     }
 
-    /// The focal length of a frame along a row, in pixels of its image; `None` if the data set does not state it.
+    /// Horizontal focal length of a frame, in pixels of its image; `None` if unknown.
     #[must_use]
     pub fn focal(&self, frame: &FrameId) -> Option<f64> {
         match self.sources.get(frame)? {
-            ImageSource::File(file) => file.view.intrinsics.map(|camera| camera.fx),
+            ImageSource::File(file) => file.facts.intrinsics.map(|camera| camera.fx),
             ImageSource::Room(room) => Some(room.focal()),
             ImageSource::Embedded(_) | ImageSource::Member(_) => None,
         }
     }
 
-    /// The image file of a frame; `None` for a cell of a table or a built-in room.
+    /// Image file of a frame; `None` for an image in a table or a ZIP file, and for a built-in room.
     #[must_use]
     pub fn image_file(&self, frame: &FrameId) -> Option<&Path> {
         match self.sources.get(frame)? {
@@ -477,26 +482,26 @@ impl Dataset {
         }
     }
 
-    /// The files of a frame, not decoded.
+    /// Reads the files of a frame without decoding them.
     ///
     /// # Errors
     /// If a file cannot be read; the error names it.
     pub fn files<'a>(&'a self, frame: &'a FrameId) -> Result<FrameFiles<'a>> {
         const NONE: &MapPaths = &MapPaths::NONE;
         static UNKNOWN: LazyLock<FrameFacts> = LazyLock::new(FrameFacts::default);
-        let (maps, view) = match self.sources.get(frame) {
-            Some(ImageSource::File(file)) => (&file.maps, &file.view),
+        let (maps, facts) = match self.sources.get(frame) {
+            Some(ImageSource::File(file)) => (&file.maps, &file.facts),
             _ => (NONE, &*UNKNOWN),
         };
         Ok(FrameFiles {
             id: frame,
             picture: self.picture(frame)?,
             maps: maps.read()?,
-            view,
+            facts,
         })
     }
 
-    /// A frame with its image and its maps, decoded.
+    /// Decodes a frame with its image and its maps.
     ///
     /// # Errors
     /// If an image or a map cannot be read, or a map has another size than the image; the error names the file.
@@ -505,16 +510,18 @@ impl Dataset {
     }
 }
 
-fn refuse(questions: Option<&Path>, why: &str) -> Result<()> {
-    questions.map_or(Ok(()), |path| {
-        Err(Error::usage(
+/// Error if `--questions` is given for data that cannot use it.
+fn refuse_questions(questions: Option<&Path>, why: &str) -> Result<()> {
+    match questions {
+        None => Ok(()),
+        Some(path) => Err(Error::usage(
             "--questions",
             format_args!("{} cannot be used: {why}", path.display()),
-        ))
-    })
+        )),
+    }
 }
 
-/// The name of a folder, or of a file without its extension.
+/// Name of a folder, or of a file without its extension.
 fn stem(path: &Path) -> String {
     let named = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let name = if named.is_dir() {
@@ -535,7 +542,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_a_file_loses_its_extension() {
+    fn only_files_lose_their_extension() {
         let folder = tempfile::tempdir().unwrap();
         let (inner, set) = (
             folder.path().join("data.v1"),

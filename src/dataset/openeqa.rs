@@ -1,5 +1,5 @@
-//! OpenEQA's episodic-memory questions and the frames of their walks: [`OpenQuestion`], [`questions`] and [`sampled`].
-//! After `facebookresearch/open-eqa` at cfa3fce.
+//! Episodic-memory questions of OpenEQA and the frames of their walks: [`OpenQuestion`], [`read_questions`], [`walk_frames`] and
+//! [`sample_indices`]. Follows `facebookresearch/open-eqa` at cfa3fce.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::files::reading::{bytes, entries};
 use crate::types::QuestionId;
 
-/// An open question about a walk through a building.
+/// Open question about a walk through a building.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 pub(crate) struct OpenQuestion {
     #[serde(rename = "question_id")]
@@ -18,29 +18,29 @@ pub(crate) struct OpenQuestion {
     #[serde(rename = "question")]
     pub text: String,
     pub answer: String,
-    /// Other right answers. `None`, if the item has no such key, leads to another prompt of the judge.
+    /// Further correct answers; `None` if the key is missing. The judge gets another prompt then.
     #[serde(rename = "extra_answers")]
     pub extra: Option<Vec<String>>,
-    /// The kind of question, as "object localization".
+    /// Kind of question, such as "object localization".
     pub category: String,
-    /// The name of the walk, as `hm3d-v0/000-hm3d-BFRyYbPCCPE`.
+    /// Name of the walk, such as `hm3d-v0/000-hm3d-BFRyYbPCCPE`.
     #[serde(rename = "episode_history")]
     pub episode: String,
 }
 
 impl OpenQuestion {
-    /// The split of the question: the first part of the name of its walk, as `hm3d-v0`.
+    /// Split of the question: the first part of the name of its walk, such as `hm3d-v0`.
     #[must_use]
     pub(crate) fn split(&self) -> &str {
         self.episode.split('/').next().unwrap_or_default()
     }
 }
 
-/// The questions of a file: a JSON array as upstream's `open-eqa-v0.json`.
+/// Reads a question file: a JSON array, like `open-eqa-v0.json` of OpenEQA.
 ///
 /// # Errors
 /// If the file cannot be read, is not such an array, is empty, or has two questions with the same id.
-pub(crate) fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
+pub(crate) fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     let text = bytes(path)?;
     let wrong = |problem: String| Error::data(path.display(), problem);
     let questions: Vec<OpenQuestion> = serde_json::from_slice(&text).map_err(|e| {
@@ -58,11 +58,11 @@ pub(crate) fn questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     Ok(questions)
 }
 
-/// The frames of a walk, sorted by name: the files of its folder that end in `-rgb.png`.
+/// Frames of a walk, sorted by name: the files in its folder that end in `-rgb.png`.
 ///
 /// # Errors
 /// If the folder is missing or has no such file.
-pub(crate) fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
+pub(crate) fn walk_frames(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
     let folder = frames.join(episode);
     let mut paths = entries(&folder)?;
     paths.retain(|path| path.to_string_lossy().ends_with("-rgb.png"));
@@ -74,25 +74,26 @@ pub(crate) fn walk(frames: &Path, episode: &str) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// The indices of the `k` frames that a model is shown: `np.round(np.linspace(0, n - 1, k))`. It rounds half to even and
-/// repeats frames if `n` is less than `k`; empty if `n` is 0.
+/// Indices of `k` frames out of `n`, like `np.round(np.linspace(0, n - 1, k))`: rounded half to even, with repeats if `n` is less than
+/// `k`; empty if `n` is 0.
 #[must_use]
-pub(crate) fn sampled(n: usize, k: usize) -> Vec<usize> {
+pub(crate) fn sample_indices(n: usize, k: usize) -> Vec<usize> {
     if n == 0 {
         return Vec::new();
     }
     let last = (n - 1) as f64;
-    // numpy computes arange(k) · step, and puts the end itself in the last place.
+    // numpy computes arange(k) · step, and sets the last value to the end of the range.
     let step = if k > 1 { last / (k - 1) as f64 } else { 0.0 };
-    let at = |index: usize| {
-        let place = if index + 1 == k && k > 1 {
-            last
-        } else {
-            index as f64 * step
-        };
-        place.round_ties_even() as usize
-    };
-    (0..k).map(at).collect()
+    (0..k)
+        .map(|index| {
+            let position = if index + 1 == k && k > 1 {
+                last
+            } else {
+                index as f64 * step
+            };
+            position.round_ties_even() as usize
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -104,13 +105,16 @@ mod tests {
     #[test]
     fn frames_are_sampled_as_numpy_does() {
         // numpy 2.4: np.round(np.linspace(0, n - 1, k)).astype(int).
-        assert_eq!(sampled(9, 5), [0, 2, 4, 6, 8]);
-        assert_eq!(sampled(4, 3), [0, 2, 3]);
-        assert_eq!(sampled(6, 3), [0, 2, 5]);
-        assert_eq!(sampled(3, 7), [0, 0, 1, 1, 1, 2, 2]);
-        assert_eq!(sampled(168, 5), [0, 42, 84, 125, 167]);
-        assert_eq!((sampled(1, 3), sampled(5, 1)), (vec![0, 0, 0], vec![0]));
-        assert!(sampled(0, 4).is_empty());
+        assert_eq!(sample_indices(9, 5), [0, 2, 4, 6, 8]);
+        assert_eq!(sample_indices(4, 3), [0, 2, 3]);
+        assert_eq!(sample_indices(6, 3), [0, 2, 5]);
+        assert_eq!(sample_indices(3, 7), [0, 0, 1, 1, 1, 2, 2]);
+        assert_eq!(sample_indices(168, 5), [0, 42, 84, 125, 167]);
+        assert_eq!(
+            (sample_indices(1, 3), sample_indices(5, 1)),
+            (vec![0, 0, 0], vec![0])
+        );
+        assert!(sample_indices(0, 4).is_empty());
     }
 
     #[test]
@@ -118,7 +122,7 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         let read = |text: &str| {
             fs::write(file.path(), text).unwrap();
-            questions(file.path())
+            read_questions(file.path())
         };
         let one = r#"{"question": "Where?", "answer": "there", "category": "object localization",
             "question_id": "a", "episode_history": "hm3d-v0/000-x"}"#;
@@ -142,12 +146,12 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_is_its_colour_frames_by_name() {
+    fn walk_frames_are_sorted_color_images() {
         let base = tempfile::tempdir().unwrap();
         let folder = base.path().join("hm3d-v0/000-x");
         fs::create_dir_all(&folder).unwrap();
         assert!(
-            walk(base.path(), "hm3d-v0/000-x")
+            walk_frames(base.path(), "hm3d-v0/000-x")
                 .unwrap_err()
                 .to_string()
                 .contains("-rgb.png")
@@ -160,8 +164,8 @@ mod tests {
         ] {
             fs::write(folder.join(name), "").unwrap();
         }
-        let names: Vec<_> = walk(base.path(), "hm3d-v0/000-x").unwrap();
+        let names: Vec<_> = walk_frames(base.path(), "hm3d-v0/000-x").unwrap();
         assert!(names[0].ends_with("00002-rgb.png") && names.len() == 2);
-        assert!(walk(base.path(), "nowhere").is_err());
+        assert!(walk_frames(base.path(), "nowhere").is_err());
     }
 }

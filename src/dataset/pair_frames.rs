@@ -1,23 +1,23 @@
-//! Pairs of photographs as frames with their photographs in the dark: [`dataset`].
+//! Pairs of photographs as frames, each with a photograph in the dark: [`open`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::dark_photos::DarkPhoto;
+use super::frame_facts::FrameFacts;
 use super::image_source::FrameFile;
 use super::maps::MapPaths;
 use super::pairs::Pairs;
-use super::view::FrameFacts;
 use super::{Dataset, ImageSource, stem};
 use crate::error::{Error, Result};
 use crate::types::{FrameId, PhotoName};
 
-/// The frames in normal light, named by their files, each with its photograph in low light; without questions. Says how many images
-/// have no partner.
+/// Makes a frame of each photograph in normal light, named by its file, with its partner in low light as dark photograph. Warns
+/// about images without a partner. The data set has no questions.
 ///
 /// # Errors
-/// If two of the photographs in normal light have the same name.
-pub(super) fn dataset(folder: &Path, pairs: Pairs) -> Result<Dataset> {
+/// If two photographs in normal light have the same name.
+pub(super) fn open(folder: &Path, pairs: Pairs) -> Result<Dataset> {
     if let Some(first) = pairs.unmatched.first() {
         tracing::warn!(
             "images without a partner in the other light, which are not asked: {}, first {}",
@@ -37,7 +37,7 @@ pub(super) fn dataset(folder: &Path, pairs: Pairs) -> Result<Dataset> {
         let source = ImageSource::File(Box::new(FrameFile {
             rgb: pair.normal.clone(),
             maps: MapPaths::default(),
-            view: FrameFacts::default(),
+            facts: FrameFacts::default(),
             dark: vec![dark],
         }));
         if sources.insert(id, source).is_some() {

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::image_names::ImageNames;
+use super::image_paths::ImagePaths;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 
-/// Names of the normal-light and the low-light folder: plain words, those of LOL, and those of LISU.
+/// Names of the normal-light and the low-light folder: plain words, and the names in the LOL and LISU data sets.
 const FOLDERS: [[&str; 2]; 3] = [
     ["normal", "low"],
     ["high", "low"],
@@ -127,42 +127,45 @@ fn add_image(side: &mut BTreeMap<String, PathBuf>, name: String, path: &Path) ->
     }
 }
 
-/// Whether two characters are in one word: in `yellow` the `l`s are, in `sofaLow`, `low1` and `1_low` those beside `low` are not.
-fn is_in_word(one: Option<char>, next: Option<char>) -> bool {
+/// True if two neighbouring characters belong to the same word. The letter case separates words, so `low` is a word in `sofaLow`, `low1`
+/// and `1_low`, but not in `yellow`.
+fn are_in_one_word(one: Option<char>, next: Option<char>) -> bool {
     let (Some(one), Some(next)) = (one, next) else {
         return false;
     };
     one.is_alphabetic() && next.is_alphabetic() && one.is_lowercase() == next.is_lowercase()
 }
 
-/// Splits a file name into the name of the pair and the side, which a word at its beginning or end states. If the two words
-/// contradict each other, the one at the beginning counts.
+/// Splits a file name into the name of the pair and the side, given by a word at its beginning or end. If the two words contradict
+/// each other, the one at the beginning counts.
 fn split_side(stem: &str) -> (String, Option<PairSide>) {
     const WORDS: [(&str, PairSide); 3] = [
         ("normal", PairSide::Normal),
         ("high", PairSide::Normal),
         ("low", PairSide::Low),
     ];
-    let trimmed = |rest: &str| rest.trim_matches(['_', '-', '.', ' ']).to_owned();
     let lower = stem.to_ascii_lowercase();
-    let is_whole = |at: usize| {
+    let is_word_boundary = |at: usize| {
         let (before, after) = stem.split_at(at);
-        !is_in_word(before.chars().next_back(), after.chars().next())
+        !are_in_one_word(before.chars().next_back(), after.chars().next())
     };
     let prefix = WORDS.iter().find(|(word, _)| {
         let rest = lower.strip_prefix(word);
-        rest.is_some_and(|rest| rest.starts_with("light") || is_whole(word.len()))
+        rest.is_some_and(|rest| rest.starts_with("light") || is_word_boundary(word.len()))
     });
     let suffix = WORDS.iter().find(|(word, side)| {
         lower.ends_with(word)
-            && is_whole(stem.len() - word.len())
+            && is_word_boundary(stem.len() - word.len())
             && prefix.is_none_or(|(_, prefix_side)| prefix_side == side)
     });
     let start = prefix.map_or(0, |(word, _)| word.len());
     let end = stem.len() - suffix.map_or(0, |(word, _)| word.len());
     match prefix.or(suffix) {
-        Some((_, side)) if start <= end => (trimmed(&stem[start..end]), Some(*side)),
-        // One word is the whole name: it is both prefix and suffix.
+        Some((_, side)) if start <= end => {
+            let name = stem[start..end].trim_matches(['_', '-', '.', ' ']);
+            (name.to_owned(), Some(*side))
+        }
+        // The whole name is one word, which is both prefix and suffix.
         Some((_, side)) => (String::new(), Some(*side)),
         None => (stem.to_owned(), None),
     }
@@ -170,9 +173,9 @@ fn split_side(stem: &str) -> (String, Option<PairSide>) {
 
 /// The image files among the paths of a folder. Warns of images in formats that are not supported.
 fn images(paths: Vec<PathBuf>, folder: &Path) -> Vec<PathBuf> {
-    let names = ImageNames::from_paths(paths);
-    names.warn_of_unread(folder);
-    names.images
+    let found = ImagePaths::from_paths(paths);
+    found.warn_of_unsupported(folder);
+    found.images
 }
 
 fn file_name(path: &Path) -> String {
@@ -229,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_of_other_words_name_no_light() {
+    fn light_words_inside_other_words_are_ignored() {
         let others = ["YELLOW.png", "highway.png", "way.png", "yellow.png"];
         let files = [&["normal1.png", "low1.png"][..], &others].concat();
         let folder = folder(&files);

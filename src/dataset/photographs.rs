@@ -1,41 +1,40 @@
-//! The images at a place without regard to questions about them: [`Photographs`].
+//! Images at a place, without its own questions: [`Photographs`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use super::frames::MissingFiles;
-use super::image_names::{ImageNames, is_image};
-use super::root::{LeadsTo, Root};
+use super::image_paths::{ImagePaths, is_image};
+use super::root::{Location, Root};
 use super::{DataPlace, Dataset, ImageSource, SetArgs, frames, stem};
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 use crate::picture::image_file::format::READ;
 use crate::types::FrameId;
 
-/// The images at a place, and what is to be said about how they were found.
+/// Images at a place, for questions that are asked about every image.
 #[derive(Debug)]
 pub(crate) struct Photographs {
-    /// The images, without questions.
+    /// Images without questions.
     pub(crate) dataset: Dataset,
-    /// Lines for the user: files left aside, and how images are named.
+    /// Messages for the user: ignored questions, and how images are named.
     pub(crate) notes: Vec<String>,
 }
 
 impl Photographs {
-    /// The images at a place. No image is read.
+    /// Lists the images at a place. No image is read.
     ///
-    /// A folder with a list of frames has those of the list. Any other folder has all images in it and in the folders below, each
-    /// named by its path from the folder; what begins with a dot is passed over. A single image is a place of its own. The
-    /// built-in rooms and ready-made sets have the images that they are about.
+    /// - A folder with a `frames.jsonl`: the frames in it.
+    /// - Any other folder: all images in it and in its subfolders, named by their relative paths. Hidden files are skipped.
+    /// - An image file: this image.
+    /// - The built-in rooms and ready-made sets: their images.
     ///
     /// # Errors
     /// If the place cannot be read, or has no image.
-    pub(crate) fn at(place: &DataPlace, set: &SetArgs) -> Result<Self> {
+    pub(crate) fn open(place: &DataPlace, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
             DataPlace::Rooms(rooms) => Dataset::from_rooms(*rooms),
-            DataPlace::Path(path) if path.is_dir() => {
-                return Self::in_folder(path, set);
-            }
+            DataPlace::Path(path) if path.is_dir() => return Self::open_folder(path, set),
             DataPlace::Path(path) if is_image(path) => Dataset::from_images(path, &[])?,
             DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => {
                 let set = Dataset::open(place, None, set)?;
@@ -49,16 +48,18 @@ impl Photographs {
                 });
             }
         };
-        let notes = Vec::new();
-        Ok(Self { dataset, notes })
+        Ok(Self {
+            dataset,
+            notes: Vec::new(),
+        })
     }
 
-    fn in_folder(folder: &Path, set: &SetArgs) -> Result<Self> {
+    fn open_folder(folder: &Path, set: &SetArgs) -> Result<Self> {
         let further = &set.root.data_root;
         let mut notes = Vec::new();
         let own = folder.join(frames::QUESTIONS);
-        let own = own.exists().then_some(own).into_iter();
-        for file in own.chain(frames::other_questions(folder)) {
+        let own = own.exists().then_some(own);
+        for file in own.into_iter().chain(frames::other_question_files(folder)) {
             notes.push(format!(
                 "{} is ignored: the questions are those of --ask",
                 file.display()
@@ -70,23 +71,26 @@ impl Photographs {
         }
         let root = Root::new(folder, further)?;
         let mut scan = Scan::default();
-        scan.add(&root, folder)?;
-        let names = ImageNames::from_paths(scan.files);
+        scan.add_folder(&root, folder)?;
+        let found = ImagePaths::from_paths(scan.files);
         let mut sources = BTreeMap::new();
-        for path in &names.images {
-            let inner = path.strip_prefix(folder).unwrap_or(path);
-            let parts = inner.iter().map(|part| part.to_string_lossy());
-            let id = FrameId(parts.collect::<Vec<_>>().join("/"));
-            sources.insert(id, ImageSource::image(path.clone()));
+        for path in &found.images {
+            let parts: Vec<_> = path
+                .strip_prefix(folder)
+                .unwrap_or(path)
+                .iter()
+                .map(|part| part.to_string_lossy())
+                .collect();
+            sources.insert(FrameId(parts.join("/")), ImageSource::image(path.clone()));
         }
         if sources.is_empty() {
-            let unread = names
-                .unread()
+            let unread = found
+                .unsupported_note()
                 .map_or(String::new(), |unread| format!("; {unread}"));
             let problem = format_args!("no {READ} image in this folder or below{unread}");
             return Err(Error::data(folder.display(), problem));
         }
-        names.warn_of_unread(folder);
+        found.warn_of_unsupported(folder);
         root.warn_of_links_out(&scan.links_out);
         if sources.keys().any(|id| id.0.contains('/')) {
             notes.push(format!(
@@ -102,18 +106,18 @@ impl Photographs {
     }
 }
 
-/// The files in a folder and below.
+/// Files in a folder and its subfolders.
 #[derive(Debug, Default)]
 struct Scan {
     files: Vec<PathBuf>,
-    /// The folders that were looked through, as they really lie: a link to one of them is not followed again.
+    /// Canonical paths of the scanned folders, so that a link to one of them is not followed again.
     seen: BTreeSet<PathBuf>,
-    /// The links that lead out of the folder.
+    /// Links that lead outside the folder.
     links_out: Vec<PathBuf>,
 }
 
 impl Scan {
-    fn add(&mut self, root: &Root, folder: &Path) -> Result<()> {
+    fn add_folder(&mut self, root: &Root, folder: &Path) -> Result<()> {
         let real = folder
             .canonicalize()
             .map_err(|e| Error::file(folder, "read", e))?;
@@ -125,11 +129,11 @@ impl Scan {
             if name.starts_with('.') {
                 continue;
             }
-            match root.leads_to(&path) {
-                LeadsTo::Within if path.is_dir() => self.add(root, &path)?,
-                LeadsTo::Within => self.files.push(path),
-                LeadsTo::Outside => self.links_out.push(path),
-                LeadsTo::Nowhere => {}
+            match root.locate(&path) {
+                Location::Inside if path.is_dir() => self.add_folder(root, &path)?,
+                Location::Inside => self.files.push(path),
+                Location::Outside => self.links_out.push(path),
+                Location::Missing => {}
             }
         }
         Ok(())
@@ -145,7 +149,7 @@ mod tests {
     use super::*;
 
     fn found(path: &Path) -> Result<(Vec<String>, Vec<String>)> {
-        let found = Photographs::at(&DataPlace::Path(path.to_owned()), &SetArgs::default())?;
+        let found = Photographs::open(&DataPlace::Path(path.to_owned()), &SetArgs::default())?;
         let names = found.dataset.frames().map(|id| id.0.clone());
         Ok((names.collect(), found.notes))
     }
@@ -157,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_of_folders_names_images_by_their_paths() {
+    fn images_in_subfolders_are_named_by_path() {
         let folder = tempfile::tempdir().unwrap();
         for name in [
             "b.png",
@@ -181,7 +185,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_stay_in_the_folder_and_end() {
+    fn links_out_and_cycles_are_not_followed() {
         use std::os::unix::fs::symlink;
         let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         save(folder.path(), "in/a.png");
@@ -195,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_without_an_image_is_refused_and_questions_are_left_aside() {
+    fn folder_without_image_is_refused_and_its_questions_ignored() {
         let folder = tempfile::tempdir().unwrap();
         let problem = || found(folder.path()).unwrap_err().to_string();
         assert!(

@@ -1,4 +1,4 @@
-//! The image of a frame before decoding: [`Picture`].
+//! Image of a frame before decoding: [`Picture`].
 
 use crate::error::Result;
 use crate::picture::ImageFile;
@@ -6,17 +6,17 @@ use crate::picture::ReadingRule;
 use crate::rooms::Room;
 use crate::types::{Digest, InputNote, Pixels, Rgb};
 
-/// An image as stored: a file, or a built-in room.
+/// Image that is not decoded yet: a file, or a built-in room.
 #[derive(Debug)]
 pub enum Picture {
-    /// The bytes of a file.
+    /// Bytes of an image file.
     Encoded(ImageFile),
-    /// A built-in room, drawn when its pixels are needed, and the rule by which its light is scaled.
+    /// A built-in room, drawn on demand, and the rule that scales its light.
     Drawn(Room, ReadingRule),
 }
 
 impl Picture {
-    /// The digest of the file and of the rule by which it is read, or of everything that decides the pixels of a room.
+    /// Digest of everything that decides the pixels: the file and its decoding rule, or the settings of a room.
     #[must_use]
     pub fn digest(&self) -> Digest {
         match self {
@@ -32,7 +32,7 @@ impl Picture {
         }
     }
 
-    /// Changes that reading the picture makes besides decoding its codes.
+    /// Changes made to the samples while decoding, such as color conversion.
     #[must_use]
     pub fn note(&self) -> InputNote {
         match self {
@@ -41,10 +41,10 @@ impl Picture {
         }
     }
 
-    /// The width and height in pixels, after a check that the picture can be decoded.
+    /// Checks that the image can be decoded, and returns its width and height in pixels.
     ///
     /// # Errors
-    /// If it cannot; the error names the file.
+    /// If it cannot be decoded; the error names the file.
     pub fn check(&self) -> Result<(u32, u32)> {
         match self {
             Self::Encoded(file) => file.check(),
@@ -52,10 +52,10 @@ impl Picture {
         }
     }
 
-    /// The pixels in the depth in which they are known.
+    /// Decodes the pixels at their full bit depth.
     ///
     /// # Errors
-    /// If the file is broken, or cannot be shown as it is; the error names the file.
+    /// If the file is broken or not supported; the error names the file.
     pub fn pixels(&self) -> Result<Pixels> {
         match self {
             Self::Encoded(file) => file.pixels(),
@@ -66,10 +66,10 @@ impl Picture {
         }
     }
 
-    /// The pixels as 8-bit sRGB, as they are shown undarkened.
+    /// Decodes the clean image as 8-bit sRGB.
     ///
     /// # Errors
-    /// If the file is broken, or cannot be shown as it is; the error names the file.
+    /// If the file is broken or not supported; the error names the file.
     pub fn decode(&self) -> Result<Rgb> {
         match self {
             Self::Encoded(file) => file.decode(),

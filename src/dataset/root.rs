@@ -1,7 +1,7 @@
-//! The folders in which the files that data name may lie: [`Root`].
+//! Folders that a data set may read files from: [`Root`].
 //!
-//! A data set of a stranger must not have files of the user sent to an endpoint. So every path that data name is resolved here, links
-//! followed, and must lie below the folder of the data, or below one that the user names with `--data-root`.
+//! A downloaded data set must not be able to send private files of the user to an endpoint. Every path in the data is therefore
+//! resolved here, following links, and must be below the folder of the data or a folder given with `--data-root`.
 
 use std::path::{self, Component, Path, PathBuf};
 
@@ -10,7 +10,7 @@ use clap::Args;
 use crate::error::{Error, Result};
 use crate::types::{Decides, FrameId, shell_word};
 
-/// The flag for folders beside that of the data.
+/// Flag for further folders with files of the data.
 #[derive(Debug, Clone, Default, Args)]
 pub struct RootArgs {
     /// A further folder in which files that the data name may lie; repeatable; default: the folder of the data alone
@@ -18,77 +18,77 @@ pub struct RootArgs {
     pub data_root: Vec<PathBuf>,
 }
 
-/// Names that are no paths of this machine.
+/// Prefixes of URLs, which are not paths on this machine.
 const SCHEMES: [&str; 6] = ["http:", "https:", "ftp:", "file:", "s3:", "gs:"];
 
-/// Names of devices on Windows, with or without an ending. Other systems have files of these names.
+/// Reserved device names on Windows, with or without an extension. On other systems they are ordinary file names.
 const DEVICES: [&str; 22] = [
     "con", "prn", "aux", "nul", "com1", "com2", "com3", "com4", "com5", "com6", "com7", "com8",
     "com9", "lpt1", "lpt2", "lpt3", "lpt4", "lpt5", "lpt6", "lpt7", "lpt8", "lpt9",
 ];
 
-/// The folder of some data, and the further folders that the user allows.
+/// Folder of a data set, and further folders that the user allows.
 #[derive(Debug, Clone)]
 pub(crate) struct Root {
     folder: PathBuf,
     /// The folder as an absolute path without `.` and `..`.
     absolute: PathBuf,
-    /// The real paths of all folders.
-    real: Vec<PathBuf>,
-    /// The same folders as they are written, absolute.
-    written: Vec<PathBuf>,
+    /// All folders, with links resolved.
+    canonical: Vec<PathBuf>,
+    /// All folders as absolute paths, with links unresolved.
+    unresolved: Vec<PathBuf>,
 }
 
-/// Where a path leads, links followed.
+/// Location of a path relative to the allowed folders, following links.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum LeadsTo {
+pub(crate) enum Location {
     /// Below one of the folders.
-    Within,
-    /// Out of the folders.
+    Inside,
+    /// Outside all folders.
     Outside,
-    /// To nothing that is there.
-    Nowhere,
+    /// The path does not exist.
+    Missing,
 }
 
 impl Root {
-    /// The folder of some data with further folders, all of which must exist.
+    /// Allows the folder of a data set and further folders.
     ///
     /// # Errors
-    /// If one does not.
+    /// If one of the folders does not exist.
     pub(crate) fn new(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         let folder = if folder.as_os_str().is_empty() {
             Path::new(".")
         } else {
             folder
         };
-        let (mut real, mut written) = (Vec::new(), Vec::new());
-        let all = std::iter::once(folder).chain(further.iter().map(PathBuf::as_path));
-        for (number, folder) in all.enumerate() {
+        let (mut canonical, mut unresolved) = (Vec::new(), Vec::new());
+        let folders = std::iter::once(folder).chain(further.iter().map(PathBuf::as_path));
+        for (number, folder) in folders.enumerate() {
             let place = folder.canonicalize().map_err(|e| match number {
                 0 => Error::file(folder, "read", e),
                 _ => Error::usage("--data-root", format_args!("{}: {e}", folder.display())),
             })?;
-            real.push(place);
-            written.push(without_dots(&absolute(folder)));
+            canonical.push(place);
+            unresolved.push(without_dots(&absolute(folder)));
         }
         Ok(Self {
-            absolute: written[0].clone(),
+            absolute: unresolved[0].clone(),
             folder: folder.to_owned(),
-            real,
-            written,
+            canonical,
+            unresolved,
         })
     }
 
-    /// The folder of the data, as it was given.
+    /// Folder of the data, as given.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The name and the path of an image, as data spell it relative to a folder.
+    /// Name and path of an image that the data name by a path relative to `base`.
     ///
-    /// The name of a frame is the normalised path of its image: relative to the folder of the data, with `/`, without `.` and
-    /// without `..` after a folder; of an image outside it, the path as it is spelled, without `.`. So one file is one frame with one
-    /// noise, however the data spell its path.
+    /// The name of a frame is the normalised path of its image, so that one file is one frame (with one noise seed) however its path is
+    /// written. The path is relative to the folder of the data, with `/`, without `.` and without `..` after a folder. Outside this
+    /// folder, it is the path in the data without `.`.
     ///
     /// # Errors
     /// As [`Self::file`].
@@ -99,59 +99,71 @@ impl Root {
             Ok(within) => with_slashes(within),
             Err(_) => with_slashes(&without_dots(Path::new(spelled))),
         };
-        // After a symbolic link to a folder, `..` leads to another place than the text states. Such a path stays as it is.
-        let same = normalized == spelled
+        // After a symbolic link to a folder, `..` leads elsewhere than the text suggests. Keep such a path as it is.
+        let is_same_file = normalized == spelled
             || file.canonicalize().ok() == self.folder.join(&normalized).canonicalize().ok();
-        let name = if same { normalized } else { spelled.to_owned() };
+        let name = if is_same_file {
+            normalized
+        } else {
+            spelled.to_owned()
+        };
         Ok((FrameId(name), file))
     }
 
-    /// The path of a file that data name relative to a folder.
+    /// Path of an existing file that the data name relative to `base`.
     ///
     /// # Errors
-    /// If the name is no path of this machine, leads out of the folders, or no file is there. Whether a file exists outside them is
-    /// not told.
+    /// If the name is not a path, leads outside the folders, or the file does not exist. The error does not reveal whether a file
+    /// outside the folders exists.
     pub(crate) fn file(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
-        let path = self.place(base, spelled)?;
+        let path = self.path(base, spelled)?;
         if !path.is_file() {
             return Err(format!("no such file: {}", path.display()));
         }
         Ok(path)
     }
 
-    /// The path of a file that data name relative to a folder, whether or not it exists.
+    /// Path of a file that the data name relative to `base`. The file need not exist.
     ///
     /// # Errors
-    /// If the name is no path of this machine, or leads out of the folders.
-    pub(crate) fn place(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
+    /// If the name is not a path, or leads outside the folders.
+    pub(crate) fn path(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
         check_name(spelled)?;
         let path = base.join(spelled);
-        let written = without_dots(&absolute(&path));
-        let is_below = |root: &PathBuf| written.starts_with(root);
-        if !self.written.iter().chain(&self.real).any(is_below) {
-            return Err(self.outside(spelled, &written));
+        let unresolved = without_dots(&absolute(&path));
+        let is_below_a_root = self
+            .unresolved
+            .iter()
+            .chain(&self.canonical)
+            .any(|root| unresolved.starts_with(root));
+        if !is_below_a_root {
+            return Err(self.outside_error(spelled, &unresolved));
         }
         match path.canonicalize() {
-            Ok(real) if !self.holds(&real) => Err(self.outside(spelled, &real)),
+            Ok(canonical) if !self.contains(&canonical) => {
+                Err(self.outside_error(spelled, &canonical))
+            }
             _ => Ok(path),
         }
     }
 
-    /// Where a path that was found in the folder leads, links followed.
-    pub(crate) fn leads_to(&self, path: &Path) -> LeadsTo {
+    /// Location of a path, following links.
+    pub(crate) fn locate(&self, path: &Path) -> Location {
         match path.canonicalize() {
-            Ok(real) if self.holds(&real) => LeadsTo::Within,
-            Ok(_) => LeadsTo::Outside,
-            Err(_) => LeadsTo::Nowhere,
+            Ok(canonical) if self.contains(&canonical) => Location::Inside,
+            Ok(_) => Location::Outside,
+            Err(_) => Location::Missing,
         }
     }
 
-    /// Whether a real path lies below one of the folders.
-    fn holds(&self, real: &Path) -> bool {
-        self.real.iter().any(|root| real.starts_with(root))
+    /// True if a canonical path is below one of the folders.
+    fn contains(&self, canonical: &Path) -> bool {
+        self.canonical
+            .iter()
+            .any(|root| canonical.starts_with(root))
     }
 
-    /// Warns of links that lead out of the folders, by the first of them.
+    /// Warns of links that lead outside the folders; the warning names the first.
     pub(crate) fn warn_of_links_out(&self, links: &[PathBuf]) {
         let Some(first) = links.first() else {
             return;
@@ -169,8 +181,9 @@ impl Root {
         );
     }
 
-    fn outside(&self, spelled: &Path, written: &Path) -> String {
-        let parent = written.parent().unwrap_or(written);
+    /// Error for a path in the data that leads to `target` outside the folders.
+    fn outside_error(&self, spelled: &Path, target: &Path) -> String {
+        let parent = target.parent().unwrap_or(target);
         let name = self.absolute.file_name().unwrap_or_default();
         format!(
             "{:?} lies outside {}/, the folder of the data; --data-root {} allows the folder that it names",
@@ -181,7 +194,7 @@ impl Root {
     }
 }
 
-/// Refuses names that are no paths of files.
+/// Checks that a name in the data is a path: not empty, not a URL, not a device.
 fn check_name(spelled: &Path) -> Result<(), String> {
     let text = spelled.to_string_lossy();
     if text.trim().is_empty() {
@@ -212,7 +225,7 @@ fn absolute(path: &Path) -> PathBuf {
     path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
-/// A path without `.`, and without `..` after a folder.
+/// Removes `.`, and `..` after a folder, without following links.
 fn without_dots(path: &Path) -> PathBuf {
     let mut clean = PathBuf::new();
     for part in path.components() {
@@ -227,7 +240,7 @@ fn without_dots(path: &Path) -> PathBuf {
     clean
 }
 
-/// A path with `/` between its parts, on every operating system.
+/// Path as text, with `/` as separator on every operating system.
 fn with_slashes(path: &Path) -> String {
     path.to_string_lossy().replace(path::MAIN_SEPARATOR, "/")
 }
@@ -238,20 +251,20 @@ mod tests {
 
     use super::*;
 
-    /// A folder `set` with an image in a folder and a file beside the set.
-    fn scene() -> tempfile::TempDir {
-        let scene = tempfile::tempdir().unwrap();
-        fs::create_dir_all(scene.path().join("set/fr")).unwrap();
+    /// A folder with the data set `set`, which has an image `fr/a.png`, and `secret.png` outside it.
+    fn test_folder() -> tempfile::TempDir {
+        let outer = tempfile::tempdir().unwrap();
+        fs::create_dir_all(outer.path().join("set/fr")).unwrap();
         for file in ["set/fr/a.png", "secret.png"] {
-            fs::write(scene.path().join(file), "").unwrap();
+            fs::write(outer.path().join(file), "").unwrap();
         }
-        scene
+        outer
     }
 
     #[test]
-    fn one_file_has_one_name_however_it_is_spelled() {
-        let scene = scene();
-        let set = scene.path().join("set");
+    fn one_file_has_one_name() {
+        let outer = test_folder();
+        let set = outer.path().join("set");
         let root = Root::new(&set, &[]).unwrap();
         let inside = set.join("fr/a.png").display().to_string();
         for spelled in [
@@ -269,12 +282,12 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_is_refused_unless_the_user_names_its_folder() {
-        let scene = scene();
-        let set = scene.path().join("set");
+    fn path_outside_is_refused_unless_allowed() {
+        let outer = test_folder();
+        let set = outer.path().join("set");
         let root = Root::new(&set, &[]).unwrap();
-        let secret = scene.path().join("secret.png").display().to_string();
-        let missing = scene.path().join("nothing.png").display().to_string();
+        let secret = outer.path().join("secret.png").display().to_string();
+        let missing = outer.path().join("nothing.png").display().to_string();
         for spelled in [
             "../secret.png",
             "fr/../../secret.png",
@@ -289,13 +302,13 @@ mod tests {
                 "{problem}"
             );
         }
-        let allowed = Root::new(&set, &[scene.path().to_owned()]).unwrap();
+        let allowed = Root::new(&set, &[outer.path().to_owned()]).unwrap();
         assert_eq!(
             allowed.image(&set, "../secret.png").unwrap().0.0,
             "../secret.png"
         );
         assert!(allowed.image(&set, "/etc/passwd").is_err());
-        let problem = Root::new(&set, &[scene.path().join("none")]).unwrap_err();
+        let problem = Root::new(&set, &[outer.path().join("none")]).unwrap_err();
         assert!(
             problem.to_string().starts_with("--data-root: "),
             "{problem}"
@@ -303,9 +316,9 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_no_paths_are_refused() {
-        let scene = scene();
-        let root = Root::new(scene.path(), &[]).unwrap();
+    fn invalid_paths_are_refused() {
+        let outer = test_folder();
+        let root = Root::new(outer.path(), &[]).unwrap();
         for (spelled, says) in [
             ("", "empty"),
             ("a\0b", "zero byte"),
@@ -314,24 +327,24 @@ mod tests {
             ("set/none.png", "no such file"),
             ("set", "no such file"),
         ] {
-            let problem = root.image(scene.path(), spelled).unwrap_err();
+            let problem = root.image(outer.path(), spelled).unwrap_err();
             assert!(problem.contains(says), "{spelled:?}: {problem}");
         }
     }
 
     #[cfg(unix)]
     #[test]
-    fn links_are_followed_before_a_path_is_judged() {
-        let scene = scene();
+    fn links_are_resolved_before_the_check() {
+        let outer = test_folder();
         let (set, link) = (
-            scene.path().join("set"),
+            outer.path().join("set"),
             std::os::unix::fs::symlink::<PathBuf, PathBuf>,
         );
-        link(scene.path().join("secret.png"), set.join("out.png")).unwrap();
+        link(outer.path().join("secret.png"), set.join("out.png")).unwrap();
         link(set.join("fr"), set.join("inner")).unwrap();
-        fs::create_dir_all(scene.path().join("far/deep")).unwrap();
-        link(scene.path().join("far/deep"), set.join("far")).unwrap();
-        fs::write(scene.path().join("far/b.png"), "").unwrap();
+        fs::create_dir_all(outer.path().join("far/deep")).unwrap();
+        link(outer.path().join("far/deep"), set.join("far")).unwrap();
+        fs::write(outer.path().join("far/b.png"), "").unwrap();
         let root = Root::new(&set, &[]).unwrap();
         assert!(
             root.image(&set, "out.png")
@@ -345,8 +358,8 @@ mod tests {
         );
         assert_eq!(root.image(&set, "inner/a.png").unwrap().0.0, "inner/a.png");
         // The folder of the data may itself be reached by a link.
-        link(set.clone(), scene.path().join("alias")).unwrap();
-        let alias = scene.path().join("alias");
+        link(set.clone(), outer.path().join("alias")).unwrap();
+        let alias = outer.path().join("alias");
         assert!(
             Root::new(&alias, &[])
                 .unwrap()

@@ -1,4 +1,4 @@
-//! The flags for sets of photographs: their light, pairs, and classes by folder ([`SceneArgs`]).
+//! Flags for sets of photographs: their light, pairs, and class folders ([`SceneArgs`]).
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use super::{DataPlace, Dataset, SetArgs, frames, label_folders, pair_frames, rea
 use crate::error::{Error, Result};
 use crate::types::{Decides, SetLight};
 
-/// The flags for sets of photographs.
+/// Flags for sets of photographs.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SceneArgs {
@@ -32,12 +32,12 @@ pub(crate) struct SceneArgs {
     pub choices: Option<NonZeroUsize>,
 }
 
-/// The place of pairs: two folders, or one with both.
+/// Value of `--pairs`: two folders, or one that has both.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum PairFolders {
-    /// The folders of the photographs in normal and in low light.
+    /// Folders of the photographs in normal and in low light.
     Two(PathBuf, PathBuf),
-    /// A folder with both.
+    /// A folder with photographs in normal and in low light.
     One(PathBuf),
 }
 
@@ -59,17 +59,17 @@ impl std::str::FromStr for PairFolders {
 }
 
 impl PairFolders {
-    /// The folder that names the data: that of the photographs in normal light, or the one with both.
+    /// Folder that names the data set: the photographs in normal light, or the folder with both.
     fn folder(&self) -> &Path {
         match self {
             Self::Two(folder, _) | Self::One(folder) => folder,
         }
     }
 
-    /// The pairs, by the names of their files.
+    /// Pairs the photographs by their file names.
     ///
     /// # Errors
-    /// If there are none.
+    /// If no pair is found.
     fn open(&self) -> Result<Pairs> {
         match self {
             Self::Two(normal, low) => Pairs::from_folders(normal, low),
@@ -79,7 +79,7 @@ impl PairFolders {
 }
 
 impl SceneArgs {
-    /// The place of the data: that of the pairs if they are named.
+    /// Place of the data: the folder of the pairs if `--pairs` is given, else `data`.
     pub(crate) fn place(&self, data: DataPlace) -> DataPlace {
         match &self.pairs {
             Some(pairs) => DataPlace::Path(pairs.folder().to_owned()),
@@ -87,7 +87,7 @@ impl SceneArgs {
         }
     }
 
-    /// The light in which the photographs at a place were taken: as the flag says, else `dataset.json`, else lit.
+    /// Light in which the photographs at a place were taken: from `--light`, else from `dataset.json`, else lit.
     ///
     /// # Errors
     /// If `dataset.json` cannot be read.
@@ -99,7 +99,7 @@ impl SceneArgs {
         }
     }
 
-    /// The data at a place with their questions, of which `questions` names a file.
+    /// Opens the data at a place, with the questions of a file if one is given.
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
@@ -109,30 +109,31 @@ impl SceneArgs {
         questions: Option<&Path>,
         set: &SetArgs,
     ) -> Result<Dataset> {
-        match self.apart(place)? {
+        match self.pairs_or_classes(place)? {
             None => Dataset::open(place, questions, set),
             Some(dataset) if self.pairs.is_some() => {
                 let Some(file) = questions else {
                     let problem = "pairs of photographs have no questions; --questions FILE names some about the files in normal light";
                     return Err(Error::usage("--pairs", problem));
                 };
-                dataset.with_questions_of(file, ready_made::about_frames(file, set)?, set.bad)
+                let questions = ready_made::questions_about_frames(file, set)?;
+                dataset.with_file_questions(file, questions, set.bad)
             }
             Some(dataset) => {
                 let why = "the folders make the questions of --label-folders";
-                super::refuse(questions, why)?;
+                super::refuse_questions(questions, why)?;
                 Ok(dataset)
             }
         }
     }
 
-    /// The data of pairs without questions, or those of folders of classes; `None` if neither is named.
+    /// Opens the data of `--pairs` (without questions) or `--label-folders`; `None` if neither flag is given.
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
-    pub(crate) fn apart(&self, place: &DataPlace) -> Result<Option<Dataset>> {
+    pub(crate) fn pairs_or_classes(&self, place: &DataPlace) -> Result<Option<Dataset>> {
         if let Some(pairs) = &self.pairs {
-            return pair_frames::dataset(pairs.folder(), pairs.open()?).map(Some);
+            return pair_frames::open(pairs.folder(), pairs.open()?).map(Some);
         }
         let Some(question) = &self.label_folders else {
             return Ok(None);
@@ -141,7 +142,7 @@ impl SceneArgs {
             let problem = "--data must name the folder with a folder for each class";
             return Err(Error::usage("--label-folders", problem));
         };
-        label_folders::dataset(folder, question, self.choices).map(Some)
+        label_folders::open(folder, question, self.choices).map(Some)
     }
 }
 

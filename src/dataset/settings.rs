@@ -1,4 +1,4 @@
-//! The flags for data: [`DataArgs`], [`SelectionArgs`], [`BankArgs`], [`PixelLimit`], [`DecodeArgs`], [`FolderArgs`].
+//! Flags for data: [`DataArgs`], [`SelectionArgs`], [`BankArgs`], [`PixelLimit`], [`DecodeArgs`], [`FolderArgs`].
 
 use std::convert::Infallible;
 use std::fmt;
@@ -14,13 +14,13 @@ use crate::picture::reading_rule::{ColourRule, MOST_PIXELS, ReadingRule, Transfe
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family, shell_word};
 
-/// The flag for the place of the data.
+/// Flags for the place of the data and the reading of ready-made sets.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct DataArgs {
     /// A folder of frames, a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them; a well-known one by its name, as
     /// mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear; repeatable for the files of one set
-    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = place, default_values_t = [DataPlace::default()], add = Decides::Reply)]
+    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = parse_data_place, default_values_t = [DataPlace::default()], add = Decides::Reply)]
     pub data: Vec<DataPlace>,
     /// How a ready-made set is read.
     #[command(flatten)]
@@ -28,7 +28,7 @@ pub(crate) struct DataArgs {
 }
 
 impl DataArgs {
-    /// The place that the flags name together.
+    /// Place of the data, from all `--data` flags together.
     pub(crate) fn place(&self) -> DataPlace {
         match &*self.data {
             [] => DataPlace::default(),
@@ -46,7 +46,7 @@ impl DataArgs {
     }
 }
 
-/// The flags that select questions.
+/// Flags that select questions.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SelectionArgs {
@@ -61,11 +61,11 @@ pub(crate) struct SelectionArgs {
     #[arg(long, value_name = "N", add = Decides::Trials)]
     pub limit: Option<NonZeroUsize>,
     /// Only these question families (or categories of a ready-made set), separated by commas; default: all
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = family, add = Decides::Trials)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_family, add = Decides::Trials)]
     pub families: Vec<Family>,
 }
 
-/// The flags that ask the same questions about every image.
+/// Flags that ask the same questions about every image.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct BankArgs {
@@ -78,7 +78,7 @@ pub(crate) struct BankArgs {
     pub ask_per_image: Option<NonZeroUsize>,
 }
 
-/// The flag for the maximum size of an image.
+/// Flag for the maximum size of an image.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct PixelLimit {
@@ -87,7 +87,7 @@ pub(crate) struct PixelLimit {
     pub max_pixels: NonZeroU64,
 }
 
-/// The flags for the decoding of images.
+/// Flags for the decoding of images.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct DecodeArgs {
@@ -101,11 +101,11 @@ pub(crate) struct DecodeArgs {
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub transfer: Transfer,
     /// Scale linear light by this many EV before everything else, -20 to 20; default: not at all
-    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, add = Decides::Pixels)]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = parse_exposure, add = Decides::Pixels)]
     pub exposure: Option<f32>,
 }
 
-/// The flags for the reading of folders of images.
+/// Flags for reading folders of images.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct FolderArgs {
     /// The decoding of images.
@@ -116,15 +116,16 @@ pub(crate) struct FolderArgs {
     pub root: RootArgs,
 }
 
-/// The number of EV in a text by which light is scaled.
-fn exposure(text: &str) -> Result<f32, String> {
-    let ev = text.parse().ok();
-    let ev = ev.filter(|ev| (-20.0..=20.0).contains(ev));
-    ev.ok_or_else(|| "a number from -20 to 20 expected".to_owned())
+/// Parses the value of `--exposure`, in EV.
+fn parse_exposure(text: &str) -> Result<f32, String> {
+    text.parse()
+        .ok()
+        .filter(|ev| (-20.0..=20.0).contains(ev))
+        .ok_or_else(|| "a number from -20 to 20 expected".to_owned())
 }
 
 impl DecodeArgs {
-    /// The rule by which images are read.
+    /// Rule by which images are decoded.
     pub(crate) fn rule(self) -> ReadingRule {
         ReadingRule {
             most_pixels: self.limit.max_pixels.get(),
@@ -135,9 +136,9 @@ impl DecodeArgs {
     }
 }
 
-/// The place in a text: a path, `rooms`, `rooms:frames=48,seed=7,size=1280x720`, or a well-known set with its path, as `mmvp:FILE`. A
-/// file or folder of the whole name is a path.
-pub(crate) fn place(text: &str) -> Result<DataPlace, String> {
+/// Parses the value of `--data`: a path, `rooms`, `rooms:frames=48,seed=7,size=1280x720`, or a well-known set with its path, such as
+/// `mmvp:FILE`. An existing file or folder with the same name takes precedence, except for `rooms:…`.
+pub(crate) fn parse_data_place(text: &str) -> Result<DataPlace, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {
         Some(rooms) => rooms.parse().map(DataPlace::Rooms),
@@ -148,7 +149,7 @@ pub(crate) fn place(text: &str) -> Result<DataPlace, String> {
                 name: name.to_owned(),
                 path: PathBuf::from(place),
             }),
-            // A letter before a colon is a drive.
+            // A single letter before the colon is a drive on Windows.
             Some((name, place)) if name.len() > 1 && PathBuf::from(place).exists() => Err(format!(
                 "no rules for a set named {name:?}; there are {}; other sets are read by the names of their columns: --data {}",
                 known_sets().join(", "),
@@ -160,7 +161,7 @@ pub(crate) fn place(text: &str) -> Result<DataPlace, String> {
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "the form of a value parser")]
-fn family(name: &str) -> Result<Family, Infallible> {
+fn parse_family(name: &str) -> Result<Family, Infallible> {
     Ok(Family::from(name.trim()))
 }
 
@@ -176,8 +177,11 @@ impl fmt::Display for DataPlace {
             Self::Rooms(rooms) => write!(f, "rooms:{rooms}"),
             Self::Path(path) => path.display().fmt(f),
             Self::Files(paths) => {
-                let paths = paths.iter().map(|path| path.display().to_string());
-                f.write_str(&paths.collect::<Vec<String>>().join(", "))
+                let paths: Vec<String> = paths
+                    .iter()
+                    .map(|path| path.display().to_string())
+                    .collect();
+                f.write_str(&paths.join(", "))
             }
             Self::Known { name, path } => write!(f, "{name}:{}", path.display()),
         }

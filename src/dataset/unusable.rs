@@ -1,4 +1,4 @@
-//! Questions about images that cannot be used, which `--skip bad` leaves out: [`Dataset::without`].
+//! Removal of unusable images and their questions by `--skip bad`: [`Dataset::without_unusable`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,23 +8,23 @@ use crate::error::{Error, Result};
 use crate::types::FrameId;
 
 impl Dataset {
-    /// The images that the questions show, each once; all images of data without questions.
+    /// Images that the questions show, without duplicates; all images if there are no questions.
     pub(crate) fn shown_images(&self) -> Vec<&FrameId> {
         if self.questions.is_empty() {
             return self.sources.keys().collect();
         }
         self.questions
             .iter()
-            .flat_map(|question| self.shown(&question.frame))
+            .flat_map(|question| self.shown_frames(&question.frame))
             .collect::<BTreeSet<&FrameId>>()
             .into_iter()
             .collect()
     }
 
-    /// Decodes an image, and the photographs of its scene in the dark.
+    /// Checks that an image, and the photographs of its scene in the dark, can be decoded.
     ///
     /// # Errors
-    /// If one of them cannot be read; the error names its file.
+    /// If one of them cannot be decoded; the error names its file.
     pub(crate) fn decode_all(&self, frame: &FrameId) -> Result<()> {
         self.picture(frame)?.decode()?;
         for photograph in self.photographs(frame) {
@@ -33,12 +33,11 @@ impl Dataset {
         Ok(())
     }
 
-    /// The same data set without images that cannot be used, and without the questions that show one. The problem of each image is
-    /// given by its frame.
+    /// Removes unusable images and the questions that show them. `unusable` has the problem of each image.
     ///
     /// # Errors
-    /// If more is broken than `skip` allows; broken rows count, too.
-    pub(crate) fn without(
+    /// If more is left out than `skip` allows, including broken rows.
+    pub(crate) fn without_unusable(
         mut self,
         unusable: &BTreeMap<FrameId, String>,
         skip: SkipBad,
@@ -50,31 +49,35 @@ impl Dataset {
             .retain(|frame, _| !unusable.contains_key(frame));
         if self.questions.is_empty() {
             let (bad, all) = (unusable.len(), unusable.len() + self.sources.len());
-            return self.left_out(bad, all, "images", first, skip);
+            return self.record_omission(bad, all, "images", first, skip);
         }
         let problem = format!("{first} (of {} images)", unusable.len());
         let first = if unusable.len() == 1 { first } else { &problem };
-        self.without_strangers(first, skip)
+        self.without_unmatched_questions(first, skip)
     }
 
-    /// The same data set without the questions about images that it does not have. `first` is the problem of the first of them.
+    /// Removes the questions about images that the data set does not have. `first` is the problem of the first one.
     ///
     /// # Errors
-    /// As of [`Self::without`].
-    pub(super) fn without_strangers(mut self, first: &str, skip: SkipBad) -> Result<Self> {
+    /// As [`Self::without_unusable`].
+    pub(super) fn without_unmatched_questions(
+        mut self,
+        first: &str,
+        skip: SkipBad,
+    ) -> Result<Self> {
         let questions = self.take_questions();
         let all = questions.len();
         self.questions = questions
             .into_iter()
-            .filter(|question| self.has(&question.frame))
+            .filter(|question| self.has_frames(&question.frame))
             .collect();
         let bad = all - self.questions.len();
         let rows = self.rows.all.max(all);
-        self.left_out(bad, rows, "questions", first, skip)
+        self.record_omission(bad, rows, "questions", first, skip)
     }
 
-    /// Checks that this much may be left out, and notes it.
-    fn left_out(
+    /// Checks that `bad` of `all` may be left out, and adds a line to the summary.
+    fn record_omission(
         mut self,
         bad: usize,
         all: usize,
@@ -85,7 +88,7 @@ impl Dataset {
         self.rows.bad += bad;
         skip.check(self.rows.bad, all, noun, first)
             .map_err(|problem| Error::data(&self.name, problem))?;
-        self.reading.push(format!(
+        self.summary.push(format!(
             "{LEFT_OUT}{bad} of {all} {noun} (unusable images); the first: {first}"
         ));
         Ok(self)

@@ -1,4 +1,4 @@
-//! The common interface to all kinds of data sets: [`Adapter`].
+//! Common trait of all kinds of data sets: [`Adapter`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -16,7 +16,7 @@ use crate::types::{Decides, DepthKind, Intrinsics, Labels, Rgb, SegmentName, Seg
 /// Flags that describe the maps and the camera of a data set.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Maps")]
-pub(crate) struct StatedArgs {
+pub(crate) struct MapArgs {
     /// The label space of the class maps: nyu40, nyu40-1 (from 0, 255 for void; kind nyu), nyu13, mpcat40, ade150, or a
     /// classes.json; default: that of the kind of data set
     #[arg(long, value_name = "NAME|FILE", add = Decides::Pixels)]
@@ -35,8 +35,10 @@ pub(crate) struct StatedArgs {
 
 /// Parses a field of view in degrees.
 fn degrees(text: &str) -> Result<f64, String> {
-    let degrees = positive(text).ok().filter(|degrees| *degrees < 180.0);
-    degrees.ok_or_else(|| "a number above 0 and below 180 expected".to_owned())
+    positive(text)
+        .ok()
+        .filter(|degrees| *degrees < 180.0)
+        .ok_or_else(|| "a number above 0 and below 180 expected".to_owned())
 }
 
 /// A frame of a data set; its maps are not read yet.
@@ -60,7 +62,7 @@ pub(crate) struct ListedFrame {
 }
 
 impl ListedFrame {
-    /// A frame of which nothing but the image and its other files is known.
+    /// A frame without time, camera and room type.
     pub(super) fn new(scene: &str, frame: String, rgb: PathBuf, index: usize) -> Self {
         Self {
             scene: scene.to_owned(),
@@ -75,20 +77,20 @@ impl ListedFrame {
     }
 }
 
-/// The maps of a frame, in the size of its image.
+/// Maps of a frame, in the size of its image.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct FrameMaps {
     /// Depth in millimetres; 0 for no depth.
     pub depth: Option<Array2<u32>>,
-    /// Numbers of the label space.
+    /// Class numbers of the label space.
     pub semantic: Option<Array2<u16>>,
-    /// Numbers of segments; 0 for no segment.
+    /// Segment numbers; 0 for no segment.
     pub segments: Option<Array2<u32>>,
-    /// Room type, if the maps show it.
+    /// Room type, if it follows from the maps.
     pub room: Option<String>,
 }
 
-/// All that is known of a data set without reading its maps.
+/// Contents of a data set without its maps.
 #[derive(Debug, Default)]
 pub(crate) struct Listing {
     /// The frames, sorted by scene and name.
@@ -101,17 +103,17 @@ pub(crate) struct Listing {
     pub depth_kind: DepthKind,
     /// Kind of segments: instances or parts.
     pub segmentation: Segmentation,
-    /// Words that no table has, with the number of objects that have them.
+    /// Object names without a known class, with the number of their objects.
     pub unlisted: BTreeMap<String, usize>,
     /// Horizontal field of view in degrees, for frames without intrinsics.
     pub hfov: Option<f64>,
-    /// What is recorded about how the data set was rendered.
+    /// Record of how the data set was rendered, from `scenes.json`.
     pub renders: Option<Value>,
-    /// Default camera for images of its size.
+    /// Default camera, for images of its size.
     pub(super) sensor: Option<SizedCamera>,
 }
 
-/// The intrinsics of a camera, and the width and height of its images.
+/// Intrinsics of a camera, with the width and height of its images.
 #[derive(Debug)]
 pub(super) struct SizedCamera {
     pub(super) size: (usize, usize),
@@ -120,10 +122,10 @@ pub(super) struct SizedCamera {
 
 impl Listing {
     /// An empty listing with the labels of mpcat40, for adapters that map names to these classes.
-    pub(super) fn of_mpcat40(stated: &StatedArgs) -> Self {
+    pub(super) fn with_mpcat40(args: &MapArgs) -> Self {
         Self {
             labels: labels::space("mpcat40").unwrap_or_default(),
-            hfov: stated.hfov,
+            hfov: args.hfov,
             ..Self::default()
         }
     }
@@ -131,39 +133,39 @@ impl Listing {
 
 /// An open data set of any kind.
 pub(crate) trait Adapter: fmt::Debug + Sync {
-    /// All that is known of the data set without reading its maps.
+    /// Contents of the data set without its maps.
     fn listing(&self) -> &Listing;
 
-    /// The intrinsics of a frame's camera, in pixels of its image: from the frame, else from --hfov, else the default camera.
+    /// Intrinsics of a frame's camera, in pixels of its image: from the frame, else from `--hfov`, else of the default camera.
     fn camera(&self, frame: &ListedFrame, rgb: &Rgb) -> Option<Intrinsics> {
         let (width, height) = (rgb.width(), rgb.height());
         let Listing { hfov, sensor, .. } = self.listing();
-        let stated = hfov.map(|hfov| pinhole(width, height, hfov));
+        let from_flag = hfov.map(|hfov| pinhole(width, height, hfov));
         let default = sensor
             .as_ref()
             .filter(|sensor| sensor.size == (width, height))
             .map(|sensor| sensor.camera);
-        frame.intrinsics.or(stated).or(default)
+        frame.intrinsics.or(from_flag).or(default)
     }
 
-    /// The folder that the depth of a frame is read from, for data sets that have several depths of a frame; `None` for others.
+    /// Name of the folder with the depth map of a frame, for data sets with several depth maps per frame; `None` for others.
     fn depth_folder(&self, _frame: &ListedFrame) -> Option<&'static str> {
         None
     }
 
-    /// The files that are read besides the images of the frames: maps, and files about scenes or the whole.
-    fn further_files(&self) -> Vec<PathBuf>;
+    /// Files that are read besides the images: maps, and files about scenes or the data set.
+    fn other_files(&self) -> Vec<PathBuf>;
 
     /// Reads the maps of a frame; `rgb` is its image.
     ///
     /// # Errors
-    /// With the file, if it cannot be read or has an unexpected form or size.
-    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps>;
+    /// If a file cannot be read or has an unexpected format or size; the error names it.
+    fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps>;
 }
 
-/// The label space that --labels names: a built-in one or a file. `None` without the flag.
-pub(super) fn labels(stated: &StatedArgs) -> Result<Option<Labels>> {
-    let Some(name) = &stated.labels else {
+/// Label space given with `--labels`, a built-in one or a file; `None` without the flag.
+pub(super) fn labels(args: &MapArgs) -> Result<Option<Labels>> {
+    let Some(name) = &args.labels else {
         return Ok(None);
     };
     if let Some(labels) = labels::space(name) {
@@ -179,7 +181,7 @@ pub(super) fn labels(stated: &StatedArgs) -> Result<Option<Labels>> {
     Err(Error::usage("--labels", problem))
 }
 
-/// The number of each canonical class.
+/// Number of each canonical class.
 pub(super) fn class_numbers(labels: &Labels) -> BTreeMap<String, u16> {
     labels
         .labels
@@ -188,7 +190,7 @@ pub(super) fn class_numbers(labels: &Labels) -> BTreeMap<String, u16> {
         .collect()
 }
 
-/// The camera of an image with a horizontal field of view in degrees, square pixels and the optical axis in the middle.
+/// Pinhole camera with a horizontal field of view in degrees, square pixels and the principal point in the middle of the image.
 fn pinhole(width: usize, height: usize, hfov: f64) -> Intrinsics {
     let focal = width as f64 / 2.0 / libm::tan(hfov.to_radians() / 2.0);
     Intrinsics {

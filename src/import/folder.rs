@@ -1,14 +1,14 @@
 //! Folders of images and maps with the same file names.
 //!
-//! The folders are `rgb`, `depth`, `sem` and `over` (or names of other tools), in the folder itself or in one folder per scene.
+//! The folders are `rgb`, `depth`, `sem` and `over` (or the names of other tools), in the folder itself or in one folder per scene.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, labels};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, labels};
 use super::files::{IMAGES, MAPS, files, first_folder, folders};
 use super::map_files::MapFiles;
-use crate::dataset::image_names::ImageNames;
+use crate::dataset::image_paths::ImagePaths;
 use crate::error::{Error, Result};
 use crate::files::reading::entries;
 use crate::types::{Labels, Rgb};
@@ -35,7 +35,7 @@ const SEGMENTS: [&str; 6] = [
     "segments",
 ];
 
-/// The frames of a folder.
+/// Data set in folders of images and maps.
 #[derive(Debug)]
 pub(super) struct Folder {
     pub(super) listing: Listing,
@@ -43,90 +43,87 @@ pub(super) struct Folder {
     depth_scale: Option<f64>,
     /// Conversion from the numbers of the class maps to those of the label space.
     offset: NumberOffset,
-    /// The files in the folders of images.
-    beside: Vec<PathBuf>,
-    /// The file of the label space, if it lies in the folder.
+    /// All files in the folders of images.
+    image_folder_files: Vec<PathBuf>,
+    /// File of the label space, if it is in the folder.
     labels_file: Option<PathBuf>,
 }
 
-/// Offset of the numbers of class maps from those of the label space.
+/// Offset between the numbers of class maps and of the label space.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NumberOffset {
-    /// The same numbers as in the label space.
+    /// The numbers are equal.
     None,
-    /// Numbers that are one less, with 255 for void.
+    /// The numbers of class maps are one less, with 255 for void.
     One,
 }
 
 impl Folder {
-    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
-        let known = folder.join("classes.json");
-        let labels = match labels(stated)? {
-            Some(labels) => labels,
-            None if known.is_file() => {
-                let labels = crate::labels::read(&known)?;
-                let set = Self::of(folder, stated, labels, NumberOffset::None)?;
-                let labels_file = Some(known);
-                return Ok(Self { labels_file, ..set });
-            }
+    pub(super) fn open(folder: &Path, args: &MapArgs) -> Result<Self> {
+        let own_labels = folder.join("classes.json");
+        let (labels, labels_file) = match labels(args)? {
+            Some(labels) => (labels, None),
+            None if own_labels.is_file() => (crate::labels::read(&own_labels)?, Some(own_labels)),
             None => {
                 let problem = "the label space of the class maps is missing; nyu40, nyu13, mpcat40, ade150 or the path of a classes.json expected";
                 return Err(Error::usage("--labels", problem));
             }
         };
-        Self::of(folder, stated, labels, NumberOffset::None)
+        let set = Self::with_labels(folder, args, labels, NumberOffset::None)?;
+        Ok(Self { labels_file, ..set })
     }
 
-    pub(super) fn of(
+    pub(super) fn with_labels(
         folder: &Path,
-        stated: &StatedArgs,
+        args: &MapArgs,
         labels: Labels,
         offset: NumberOffset,
     ) -> Result<Self> {
         let mut set = Self {
             listing: Listing {
                 labels,
-                depth_kind: stated.depth_kind.unwrap_or_default(),
-                hfov: stated.hfov,
+                depth_kind: args.depth_kind.unwrap_or_default(),
+                hfov: args.hfov,
                 ..Listing::default()
             },
             maps: Vec::new(),
-            depth_scale: stated.depth_scale,
+            depth_scale: args.depth_scale,
             offset,
-            beside: Vec::new(),
+            image_folder_files: Vec::new(),
             labels_file: None,
         };
         if first_folder(folder, &RGB).is_some() {
-            set.add(folder)?;
+            set.add_scene(folder)?;
         } else {
             let nested = folder.join("scenes");
             for scene in folders(if nested.is_dir() { &nested } else { folder })? {
                 if first_folder(&scene, &RGB).is_some() {
-                    set.add(&scene)?;
+                    set.add_scene(&scene)?;
                 }
             }
         }
-        ImageNames::from_paths(std::mem::take(&mut set.beside)).warn_of_unread(folder);
+        ImagePaths::from_paths(std::mem::take(&mut set.image_folder_files))
+            .warn_of_unsupported(folder);
         Ok(set)
     }
 
-    fn add(&mut self, folder: &Path) -> Result<()> {
+    fn add_scene(&mut self, folder: &Path) -> Result<()> {
         let scene = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let scene = scene.file_name().map_or_else(
             || "scene".into(),
             |name| name.to_string_lossy().into_owned(),
         );
-        let in_any = |names: &[&str], endings: &[&str]| match first_folder(folder, names) {
+        let files_in_first = |names: &[&str], endings: &[&str]| match first_folder(folder, names) {
             Some(folder) => files(&folder, endings),
             None => Ok(BTreeMap::new()),
         };
-        let images = in_any(&RGB, &IMAGES)?;
+        let images = files_in_first(&RGB, &IMAGES)?;
         if let Some(folder) = first_folder(folder, &RGB) {
-            self.beside.extend(entries(&folder)?);
+            self.image_folder_files.extend(entries(&folder)?);
         }
-        let mut depths = in_any(&DEPTH, &MAPS)?;
-        let mut classes = in_any(&CLASSES, &MAPS)?;
-        let mut segments = in_any(&SEGMENTS, &MAPS)?;
+        let mut depths = files_in_first(&DEPTH, &MAPS)?;
+        let mut classes = files_in_first(&CLASSES, &MAPS)?;
+        let mut segments = files_in_first(&SEGMENTS, &MAPS)?;
         for (frame, rgb) in images {
             self.maps.push(MapFiles {
                 depth: depths.remove(&frame),
@@ -156,14 +153,14 @@ impl Adapter for Folder {
         &self.listing
     }
 
-    fn further_files(&self) -> Vec<PathBuf> {
+    fn other_files(&self) -> Vec<PathBuf> {
         MapFiles::paths(&self.maps)
             .chain(&self.labels_file)
             .cloned()
             .collect()
     }
 
-    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
+    fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let mut maps = self.maps[frame.index].read(self.depth_scale, rgb)?;
         if let Some(classes) = &mut maps.semantic
             && self.offset == NumberOffset::One

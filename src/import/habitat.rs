@@ -1,53 +1,54 @@
-//! Renders of habitat-sim: one folder per scene, with the names of instances from the scene's data set.
+//! Renders of habitat-sim: one folder per scene, with instance names from the original data set.
 //!
 //! A scene has `<scene>/rgb/<frame>.png`, `depth/<frame>.npy` (metres) or `.png`, and `semantic/<frame>.npy` or 16-bit `.png`
-//! (numbers of instances). Beside them lies `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json`
-//! (Replica). The optional `trajectory.jsonl` has one line per frame: `{"frame", "t", "pose", "intrinsics"}`. The optional
-//! `scenes.json` beside the scenes states how they were rendered (see [`renders`]).
+//! (instance numbers), and `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json` (Replica). The optional
+//! `trajectory.jsonl` has one line per frame: `{"frame", "t", "pose", "intrinsics"}`. The optional `scenes.json` in the folder of
+//! the scenes records how they were rendered (see [`renders`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, class_numbers};
 use super::files::{
-    IMAGES, check_same_size, depth_of, file_name, files, folders, map_paths, segments,
+    IMAGES, check_same_size, file_name, files, folders, map_paths, read_frame_depth, read_segments,
 };
 use super::{hm3d, mp3d, renders, replica};
 use crate::error::{Error, Result};
 use crate::files::reading::{json_lines, text};
 use crate::types::{Intrinsics, Rgb, SegmentName};
 
-/// Minimum share of the named pixels, in percent, that a region needs to give the frame its room type.
+/// Minimum share of the named pixels, in percent, that a region needs to determine the room type of the frame (chosen).
 const MIN_REGION_PERCENT: u64 = 60;
 
-/// An open folder of renders.
+/// Folder of rendered scenes.
 #[derive(Debug)]
 pub(super) struct Habitat {
     listing: Listing,
     /// Paths of the depth and semantic map of each frame.
     maps: Vec<(Option<PathBuf>, PathBuf)>,
-    scenes: BTreeMap<String, SceneFiles>,
+    scenes: BTreeMap<String, SceneInfo>,
+    /// Number of each class.
     numbers: BTreeMap<String, u16>,
     depth_scale: Option<f64>,
-    /// The files about scenes.
-    about: Vec<PathBuf>,
+    /// Files about scenes.
+    scene_files: Vec<PathBuf>,
 }
 
 /// Information from the annotation file of a scene.
 #[derive(Debug, Default)]
-struct SceneFiles {
+struct SceneInfo {
     /// Room type of each region.
     rooms: BTreeMap<i64, &'static str>,
-    /// Offset added to the numbers of instances: 1 if an instance has the number 0, which means no segment here; else 0.
-    shift: u32,
+    /// Offset from instance numbers to segment numbers: 1 if an instance has the number 0, which means no segment here; else 0.
+    offset: u32,
 }
 
 /// Names of the instances of a scene, by number.
 type InstanceNames = BTreeMap<u32, SegmentName>;
 
-/// A line of `trajectory.jsonl`.
+/// Line of `trajectory.jsonl`.
 #[derive(Deserialize)]
 struct TrajectoryStep {
     frame: String,
@@ -57,37 +58,37 @@ struct TrajectoryStep {
 }
 
 impl Habitat {
-    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
+    pub(super) fn open(folder: &Path, args: &MapArgs) -> Result<Self> {
         let listing = Listing {
-            depth_kind: stated.depth_kind.unwrap_or_default(),
-            ..Listing::of_mpcat40(stated)
+            depth_kind: args.depth_kind.unwrap_or_default(),
+            ..Listing::with_mpcat40(args)
         };
         let mut set = Self {
             numbers: class_numbers(&listing.labels),
             listing,
             maps: Vec::new(),
             scenes: BTreeMap::new(),
-            depth_scale: stated.depth_scale,
-            about: vec![folder.join("scenes.json")],
+            depth_scale: args.depth_scale,
+            scene_files: vec![folder.join("scenes.json")],
         };
         for scene in folders(folder)? {
             if scene.join("rgb").is_dir() {
-                set.add(&scene)?;
+                set.add_scene(&scene)?;
             }
         }
-        set.listing.renders = renders::of(folder, &set.scenes.keys().collect())?;
+        set.listing.renders = renders::read(folder, &set.scenes.keys().collect())?;
         Ok(set)
     }
 
-    fn add(&mut self, folder: &Path) -> Result<()> {
+    fn add_scene(&mut self, folder: &Path) -> Result<()> {
         let name = file_name(folder);
-        let (scene, names) = self.scene(folder)?;
+        let (scene, names) = self.read_annotations(folder)?;
         let images = files(&folder.join("rgb"), &IMAGES)?;
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let semantics = files(&folder.join("semantic"), &[".npy", ".png"])?;
         let trajectory = folder.join("trajectory.jsonl");
-        let mut steps = steps(&trajectory)?;
-        self.about.push(trajectory);
+        let mut steps = read_trajectory(&trajectory)?;
+        self.scene_files.push(trajectory);
         for (frame, rgb) in images {
             let Some(semantic) = semantics.get(&frame) else {
                 let problem = format_args!("no semantic map of the frame {frame:?}");
@@ -112,27 +113,27 @@ impl Habitat {
         Ok(())
     }
 
-    /// Reads the file that names the instances of a scene.
-    fn scene(&mut self, folder: &Path) -> Result<(SceneFiles, InstanceNames)> {
+    /// Reads the annotation file of a scene: its room types, and the names of its segments.
+    fn read_annotations(&mut self, folder: &Path) -> Result<(SceneInfo, InstanceNames)> {
         let annotations = files(folder, &[".semantic.txt", ".house", "info_semantic.json"])?;
         let Some(path) = annotations.into_values().next() else {
             let problem = "none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json (Replica) in this folder; one of them must name the instances of the semantic maps";
             return Err(Error::data(folder.display(), problem));
         };
         let content = text(&path)?;
-        self.about.push(path.clone());
+        self.scene_files.push(path.clone());
         let at_line = |(line, problem): (usize, String)| Error::line(&path, line, problem);
-        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let (names, rooms) = if ending == "house" {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let (names, rooms) = if extension == "house" {
             let house = mp3d::parse(&content, &self.listing.labels.expressible).map_err(at_line)?;
             (house.names, house.rooms)
-        } else if ending == "json" {
-            let names = replica::parse(&content, &mut self.listing.unlisted);
-            let names = names.map_err(|problem| Error::data(path.display(), problem))?;
+        } else if extension == "json" {
+            let names = replica::parse(&content, &mut self.listing.unlisted)
+                .map_err(|problem| Error::data(path.display(), problem))?;
             (names, BTreeMap::new())
         } else {
-            let names = hm3d::parse(&content, &mut self.listing.unlisted);
-            (names.map_err(at_line)?, BTreeMap::new())
+            let names = hm3d::parse(&content, &mut self.listing.unlisted).map_err(at_line)?;
+            (names, BTreeMap::new())
         };
         if names.is_empty() {
             return Err(Error::data(
@@ -140,19 +141,24 @@ impl Habitat {
                 "no instance is named in this file",
             ));
         }
-        let shift = u32::from(names.contains_key(&0));
-        let names = names.into_iter().map(|(id, name)| (id + shift, name));
-        Ok((SceneFiles { rooms, shift }, names.collect()))
+        let offset = u32::from(names.contains_key(&0));
+        let names = names
+            .into_iter()
+            .map(|(id, name)| (id + offset, name))
+            .collect();
+        Ok((SceneInfo { rooms, offset }, names))
     }
 }
 
-/// The steps of a trajectory, by frame; empty if the file does not exist.
-fn steps(path: &Path) -> Result<BTreeMap<String, TrajectoryStep>> {
+/// Reads a trajectory, by frame; empty if the file does not exist.
+fn read_trajectory(path: &Path) -> Result<BTreeMap<String, TrajectoryStep>> {
     if !path.exists() {
         return Ok(BTreeMap::new());
     }
-    let steps = json_lines::<TrajectoryStep>(path)?.into_iter();
-    Ok(steps.map(|(_, step)| (step.frame.clone(), step)).collect())
+    Ok(json_lines::<TrajectoryStep>(path)?
+        .into_iter()
+        .map(|(_, step)| (step.frame.clone(), step))
+        .collect())
 }
 
 impl Adapter for Habitat {
@@ -160,40 +166,44 @@ impl Adapter for Habitat {
         &self.listing
     }
 
-    fn further_files(&self) -> Vec<PathBuf> {
-        map_paths(&self.maps).chain(&self.about).cloned().collect()
+    fn other_files(&self) -> Vec<PathBuf> {
+        map_paths(&self.maps)
+            .chain(&self.scene_files)
+            .cloned()
+            .collect()
     }
 
-    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
+    fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let (depth_path, semantic) = &self.maps[frame.index];
         let scene = &self.scenes[&frame.scene];
         let names = &self.listing.names[&frame.scene];
-        let depth = depth_of(depth_path.as_deref(), self.depth_scale, rgb)?;
-        let ids = segments(semantic)?;
-        check_same_size(semantic, &ids, rgb)?;
+        let depth = read_frame_depth(depth_path.as_deref(), self.depth_scale, rgb)?;
+        let mut segments = read_segments(semantic)?;
+        check_same_size(semantic, &segments, rgb)?;
         let (mut regions, mut named) = (BTreeMap::new(), 0_u64);
-        let (mut last, mut found) = (None, (0, None));
-        let mut segments = ids;
+        // Neighbouring pixels mostly have the same instance, so the last one is cached.
+        let (mut last_id, mut class, mut region) = (None, 0, None);
         let classes = segments.mapv(|id| {
-            if last != Some(id) {
-                let name = id.checked_add(scene.shift).and_then(|id| names.get(&id));
-                let class = name.and_then(|name| self.numbers.get(&name.canonical));
-                (last, found) = (
-                    Some(id),
-                    (class.copied().unwrap_or(0), name.and_then(|n| n.region)),
-                );
+            if last_id != Some(id) {
+                let name = id.checked_add(scene.offset).and_then(|id| names.get(&id));
+                last_id = Some(id);
+                class = name
+                    .and_then(|name| self.numbers.get(&name.canonical))
+                    .copied()
+                    .unwrap_or(0);
+                region = name.and_then(|name| name.region);
             }
-            if found.0 != 0 {
+            if class != 0 {
                 named += 1;
-                *regions.entry(found.1).or_insert(0_u64) += 1;
+                *regions.entry(region).or_insert(0_u64) += 1;
             }
-            found.0
+            class
         });
         if named == 0 {
             let problem = "no pixel has the number of an instance that the scene names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json";
             return Err(Error::data(semantic.display(), problem));
         }
-        segments.mapv_inplace(|id| match id.checked_add(scene.shift) {
+        segments.mapv_inplace(|id| match id.checked_add(scene.offset) {
             Some(id) if names.contains_key(&id) => id,
             _ => 0,
         });
@@ -201,8 +211,9 @@ impl Adapter for Habitat {
             .into_iter()
             .max_by_key(|(_, count)| *count)
             .unwrap_or((None, 0));
-        let room = region.and_then(|region| scene.rooms.get(&region));
-        let room = room.filter(|_| pixels * 100 >= named * MIN_REGION_PERCENT);
+        let room = region
+            .and_then(|region| scene.rooms.get(&region))
+            .filter(|_| pixels * 100 >= named * MIN_REGION_PERCENT);
         Ok(FrameMaps {
             depth,
             semantic: Some(classes),

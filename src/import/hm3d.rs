@@ -1,7 +1,7 @@
-//! The segments of an HM3D-Sem scene, `<scene>.semantic.txt`.
+//! Segment names of an HM3D-Sem scene, from `<scene>.semantic.txt`.
 //!
-//! The format is that of habitat-sim (`src/esp/scene/HM3DSemanticScene.cpp`). The first line is `HM3D Semantic Annotations`. Then
-//! there is one line per segment, `id,colour,"name",region`. A name may contain commas; it is all text between the quotes.
+//! The format follows habitat-sim (`src/esp/scene/HM3DSemanticScene.cpp`): the first line is `HM3D Semantic Annotations`, then one
+//! line per segment, `id,colour,"name",region`. A name is all text between the quotes and may contain commas.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,11 @@ use crate::types::SegmentName;
 
 const HEAD: &str = "HM3D Semantic Annotations";
 
-/// The names of segments, by number. Segments with an empty or unknown name are left out.
+/// Parses the names of segments, by number. Segments with an empty or unknown name are left out. Names without a known class are counted
+/// in `unlisted`.
+///
+/// # Errors
+/// If a line is invalid: its number, and the problem.
 pub(super) fn parse(
     text: &str,
     unlisted: &mut BTreeMap<String, usize>,
@@ -21,7 +25,10 @@ pub(super) fn parse(
         _ => return Err((1, format!("{HEAD:?} expected"))),
     }
     let mut names = BTreeMap::new();
-    for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
+    for (number, line) in lines {
+        if line.trim().is_empty() {
+            continue;
+        }
         let wrong = |problem: &str| (number, format!("{problem} in id,colour,\"name\",region"));
         let mut parts = line.splitn(2, '"');
         let head = parts.next().unwrap_or_default();
@@ -29,12 +36,16 @@ pub(super) fn parse(
             .next()
             .and_then(|rest| rest.rsplit_once('"'))
             .ok_or_else(|| wrong("a name between quotes expected"))?;
-        let id = head.split(',').next().unwrap_or_default().trim();
-        let id: u32 = id
+        let id: u32 = head
+            .split(',')
+            .next()
+            .unwrap_or_default()
+            .trim()
             .parse()
             .map_err(|_| wrong("a whole number expected as id"))?;
-        let region = region.trim_start_matches(',').trim();
         let region: i64 = region
+            .trim_start_matches(',')
+            .trim()
             .parse()
             .map_err(|_| wrong("a whole number expected as region"))?;
         let Some(canonical) = class_of(name, name, 1, unlisted) else {
@@ -75,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_lines_are_named() {
+    fn errors_name_the_invalid_line() {
         for (text, line, says) in [
             ("", 1, "HM3D Semantic"),
             ("id,colour\n", 1, "HM3D Semantic"),

@@ -25,6 +25,7 @@ pub(crate) struct KeyFrameArgs {
 }
 
 impl KeyFrameArgs {
+    /// Rule for the choice of frames.
     #[must_use]
     pub(crate) fn selection(&self) -> KeyFrames {
         match (self.every, self.count) {
@@ -35,7 +36,7 @@ impl KeyFrameArgs {
     }
 }
 
-/// The frames of each scene that are imported.
+/// Rule for the choice of frames in each scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum KeyFrames {
     /// All frames of the scene.
@@ -62,8 +63,8 @@ pub(crate) fn choose(
     for scene in frames.chunk_by(|a, b| a.scene == b.scene) {
         let mut timed: Vec<ListedFrame> = scene.to_vec();
         if let Some(fps) = fps.filter(|_| scene.iter().all(|frame| frame.time.is_none())) {
-            for (i, frame) in timed.iter_mut().enumerate() {
-                frame.time = Some(i as f64 / fps);
+            for (number, frame) in timed.iter_mut().enumerate() {
+                frame.time = Some(number as f64 / fps);
             }
         }
         timed.sort_by(|a, b| {
@@ -82,22 +83,24 @@ pub(crate) fn choose(
     Ok(chosen)
 }
 
+/// Chooses `count` frames at even distances.
 fn evenly_spaced(frames: Vec<ListedFrame>, count: usize) -> Vec<ListedFrame> {
     let (last, gaps) = (frames.len() - 1, count.saturating_sub(1));
-    let mut indexes: Vec<usize> = (0..count)
+    let mut indices: Vec<usize> = (0..count)
         .map(|k| match gaps {
             0 => 0,
             gaps => (k as f64 * last as f64 / gaps as f64).round_ties_even() as usize,
         })
         .collect();
-    indexes.dedup();
+    indices.dedup();
     let mut frames: Vec<Option<ListedFrame>> = frames.into_iter().map(Some).collect();
-    indexes
+    indices
         .into_iter()
         .filter_map(|index| frames.get_mut(index)?.take())
         .collect()
 }
 
+/// Chooses the first frame of each interval.
 fn one_per_interval(frames: Vec<ListedFrame>, seconds: f64) -> Result<Vec<ListedFrame>> {
     let untimed = |frame: &ListedFrame| {
         let problem = format_args!(
@@ -144,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn one_frame_for_each_step_of_time() {
+    fn one_frame_is_chosen_per_interval() {
         let times = [100.0, 100.5, 101.9, 102.0, 102.1, 107.0, 107.5, 108.0];
         let frames: Vec<ListedFrame> = (0..)
             .zip(times)
@@ -163,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_rate_gives_frames_a_time() {
+    fn frame_rate_determines_times() {
         let frames: Vec<ListedFrame> = (0..61).map(|i| frame("a", i, None)).collect();
         let chosen = choose(&frames, KeyFrames::Seconds(2.0), Some(10.0)).unwrap();
         assert_eq!(names(&chosen), ["000", "020", "040", "060"]);
@@ -177,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_is_spread_evenly_in_each_scene() {
+    fn count_is_evenly_spread_in_each_scene() {
         let mut frames: Vec<ListedFrame> = (0..10).map(|i| frame("a", i, None)).collect();
         frames.extend((0..2).map(|i| frame("b", i, None)));
         let chosen = choose(&frames, KeyFrames::Count(4), None).unwrap();

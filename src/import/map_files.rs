@@ -1,13 +1,13 @@
-//! The files of the maps of a frame, one file a map: [`MapFiles`].
+//! Map files of a frame: [`MapFiles`].
 
 use std::path::PathBuf;
 
 use super::adapter::FrameMaps;
-use super::files::{check_same_size, classes, depth_of, segments};
+use super::files::{check_same_size, read_classes, read_frame_depth, read_segments};
 use crate::error::Result;
 use crate::types::Rgb;
 
-/// The files of a frame's maps; `None` for a map that the frame lacks.
+/// Paths of the maps that a frame has, one file per map.
 #[derive(Debug)]
 pub(super) struct MapFiles {
     pub(super) depth: Option<PathBuf>,
@@ -16,32 +16,32 @@ pub(super) struct MapFiles {
 }
 
 impl MapFiles {
-    /// The files of some frames.
+    /// Paths of all maps of several frames.
     pub(super) fn paths(all: &[Self]) -> impl Iterator<Item = &PathBuf> {
         all.iter()
             .flat_map(|maps| [&maps.depth, &maps.classes, &maps.segments])
             .flatten()
     }
 
-    /// Reads the maps. `depth_scale` is the metres in one unit of a depth map in PNG.
+    /// Reads the maps. `depth_scale` is metres per unit, for depth in PNG.
     ///
     /// # Errors
-    /// If a file cannot be read, or has another size than the image.
+    /// If a file cannot be read or does not have the size of the image.
     pub(super) fn read(&self, depth_scale: Option<f64>, rgb: &Rgb) -> Result<FrameMaps> {
-        let mut read = FrameMaps {
-            depth: depth_of(self.depth.as_deref(), depth_scale, rgb)?,
+        let mut maps = FrameMaps {
+            depth: read_frame_depth(self.depth.as_deref(), depth_scale, rgb)?,
             ..FrameMaps::default()
         };
         if let Some(path) = &self.classes {
-            let classes = classes(path)?;
+            let classes = read_classes(path)?;
             check_same_size(path, &classes, rgb)?;
-            read.semantic = Some(classes);
+            maps.semantic = Some(classes);
         }
         if let Some(path) = &self.segments {
-            let segments = segments(path)?;
+            let segments = read_segments(path)?;
             check_same_size(path, &segments, rgb)?;
-            read.segments = Some(segments);
+            maps.segments = Some(segments);
         }
-        Ok(read)
+        Ok(maps)
     }
 }

@@ -1,19 +1,18 @@
-//! Adapters: other data sets → frames of the common interface.
+//! Import of other data sets to a folder of frames.
 //!
-//! An [`Adapter`] lists the frames of one kind of data set and reads their maps one frame at a time. Maps have the units of the
-//! interface: millimetres, numbers of a label space, segments from 1. `src/docs/importing.md` shows the layouts.
-//! A recording of a robot has no maps, and is no data set: [`recording`] reads it.
+//! An [`Adapter`] lists the frames of one kind of data set and reads their maps one frame at a time. All adapters use the same units:
+//! depth in millimetres, class numbers of a label space, segment numbers from 1. `src/docs/importing.md` shows the layouts.
+//! Recordings of robots have no maps and no adapter: [`recording`] reads them.
 
 mod adapter;
+mod combined;
 mod files;
 mod folder;
+mod frame_folder;
 mod habitat;
 mod hm3d;
 mod hypersim;
-mod interface;
-mod joined;
 pub(crate) mod keyframes;
-mod left_over;
 mod map_files;
 mod mp3d;
 mod nyu;
@@ -24,6 +23,7 @@ mod replica;
 mod scannet;
 mod sunrgbd;
 mod thor;
+mod unread_files;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -31,10 +31,10 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::types::flags::flag_words;
 
-pub(crate) use adapter::{Adapter, FrameMaps, ListedFrame, StatedArgs};
-pub(crate) use left_over::LeftOver;
+pub(crate) use adapter::{Adapter, FrameMaps, ListedFrame, MapArgs};
+pub(crate) use unread_files::UnreadFiles;
 
-/// The kind of data set in a folder.
+/// Kind of data set in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum DataSetKind {
     /// Renders of habitat-sim: HM3D-Sem, Matterport3D, Replica.
@@ -55,54 +55,56 @@ pub(crate) enum DataSetKind {
 
 flag_words!(DataSetKind);
 
-/// Opens the folders of data sets of one kind as one data set. `further` are folders that paths in a list of frames may lead to.
+/// Opens data sets of one kind in several folders as one data set. Paths in a list of frames may also lead into the folders in
+/// `further`.
 ///
 /// # Errors
-/// As of [`open`], or if the data sets do not fit each other.
+/// As [`open`], or if the data sets cannot be combined.
 pub(crate) fn open_all(
     kind: DataSetKind,
     folders: &[PathBuf],
-    stated: &StatedArgs,
+    args: &MapArgs,
     further: &[PathBuf],
 ) -> Result<Box<dyn Adapter>> {
     let mut parts = Vec::with_capacity(folders.len());
     for folder in folders {
-        parts.push(open(kind, folder, stated, further)?);
+        parts.push(open(kind, folder, args, further)?);
     }
     if parts.len() > 1 {
-        return Ok(Box::new(joined::Joined::new(folders, parts)?));
+        return Ok(Box::new(combined::Combined::new(folders, parts)?));
     }
-    let problem = || Error::usage("--src", "a folder of a data set expected");
-    parts.pop().ok_or_else(problem)
+    parts
+        .pop()
+        .ok_or_else(|| Error::usage("--src", "a folder of a data set expected"))
 }
 
-/// The files in the folders of a data set that it does not read.
+/// Files in the folders of a data set that are not read.
 ///
 /// # Errors
 /// If a folder cannot be read.
-pub(crate) fn left_over(folders: &[PathBuf], adapter: &dyn Adapter) -> Result<LeftOver> {
+pub(crate) fn unread_files(folders: &[PathBuf], adapter: &dyn Adapter) -> Result<UnreadFiles> {
     let read: BTreeSet<PathBuf> = adapter
         .listing()
         .frames
         .iter()
         .map(|frame| frame.rgb.clone())
-        .chain(adapter.further_files())
+        .chain(adapter.other_files())
         .collect();
-    let mut all = LeftOver::default();
+    let mut unread = UnreadFiles::default();
     for folder in folders {
-        all.join(LeftOver::in_folder(folder, &read)?);
+        unread.merge(UnreadFiles::in_folder(folder, &read)?);
     }
-    Ok(all)
+    Ok(unread)
 }
 
-/// Opens the folder of a data set.
+/// Opens a data set.
 ///
 /// # Errors
-/// With the file or folder that is missing or has another layout, or with the flag that is required.
+/// If a file or folder is missing or has another layout, or a required flag is missing; the error names it.
 fn open(
     kind: DataSetKind,
     folder: &Path,
-    stated: &StatedArgs,
+    args: &MapArgs,
     further: &[PathBuf],
 ) -> Result<Box<dyn Adapter>> {
     if !folder.is_dir() {
@@ -112,16 +114,16 @@ fn open(
         ));
     }
     let adapter: Box<dyn Adapter> = match kind {
-        DataSetKind::Habitat => Box::new(habitat::Habitat::open(folder, stated)?),
-        DataSetKind::Scannet => Box::new(scannet::Scannet::open(folder, stated)?),
-        DataSetKind::Nyu => Box::new(nyu::open(folder, stated)?),
+        DataSetKind::Habitat => Box::new(habitat::Habitat::open(folder, args)?),
+        DataSetKind::Scannet => Box::new(scannet::Scannet::open(folder, args)?),
+        DataSetKind::Nyu => Box::new(nyu::open(folder, args)?),
         DataSetKind::Sunrgbd => Box::new(sunrgbd::SunRgbd::open(folder)?),
-        DataSetKind::Thor => Box::new(thor::Thor::open(folder, stated)?),
-        DataSetKind::Hypersim => Box::new(hypersim::Hypersim::open(folder, stated)?),
+        DataSetKind::Thor => Box::new(thor::Thor::open(folder, args)?),
+        DataSetKind::Hypersim => Box::new(hypersim::Hypersim::open(folder, args)?),
         DataSetKind::Folder if folder.join("frames.jsonl").exists() => {
-            Box::new(interface::Interface::open(folder, further)?)
+            Box::new(frame_folder::FrameFolder::open(folder, further)?)
         }
-        DataSetKind::Folder => Box::new(folder::Folder::open(folder, stated)?),
+        DataSetKind::Folder => Box::new(folder::Folder::open(folder, args)?),
     };
     if adapter.listing().frames.is_empty() {
         let problem = format_args!(

@@ -1,14 +1,14 @@
-//! The segments of a Matterport3D scene, `<scene>.house`.
+//! Segment names and room types of a Matterport3D scene, from `<scene>.house`.
 //!
-//! The first word of a line gives its type (Matterport `data_organization.md`): `C` is a category with its class of mpcat40, `O`
-//! an object with its region and category, `R` a region with the letter of its room. `#` stands for a space in a name.
+//! The first word of a line is its type (Matterport `data_organization.md`): `C` is a category with its class in mpcat40, `O` an
+//! object with its region and category, `R` a region with the letter of its room type. In names, `#` represents a space.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::labels::names::{UNKNOWN, overridden};
 use crate::types::SegmentName;
 
-/// The content of a `.house` file that is used.
+/// Used content of a `.house` file.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct House {
     /// Names of segments, by number.
@@ -17,8 +17,8 @@ pub(super) struct House {
     pub(super) rooms: BTreeMap<i64, &'static str>,
 }
 
-/// The room type of a region's letter; `None` if questions do not ask about such rooms.
-fn room(letter: &str) -> Option<&'static str> {
+/// Room type for the letter of a region; `None` for room types that no question asks about.
+fn room_type(letter: &str) -> Option<&'static str> {
     Some(match letter {
         "a" | "t" => "bathroom",
         "b" => "bedroom",
@@ -31,6 +31,10 @@ fn room(letter: &str) -> Option<&'static str> {
     })
 }
 
+/// Parses a `.house` file. Categories with a class that is not in `classes` get the class for unknown objects.
+///
+/// # Errors
+/// If a line is invalid: its number, and the problem.
 pub(super) fn parse(text: &str, classes: &BTreeSet<String>) -> Result<House, (usize, String)> {
     let mut categories: BTreeMap<&str, (String, String)> = BTreeMap::new();
     let mut objects = Vec::new();
@@ -76,7 +80,9 @@ pub(super) fn parse(text: &str, classes: &BTreeSet<String>) -> Result<House, (us
                 let index: i64 = index
                     .parse()
                     .map_err(|_| (number, format!("{index:?} is not the number of a region")))?;
-                house.rooms.extend(room(letter).map(|room| (index, room)));
+                house
+                    .rooms
+                    .extend(room_type(letter).map(|room| (index, room)));
             }
             _ => {}
         }

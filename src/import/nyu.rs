@@ -6,12 +6,12 @@
 
 use std::path::Path;
 
-use super::adapter::{SizedCamera, StatedArgs, labels};
+use super::adapter::{MapArgs, SizedCamera, labels};
 use super::folder::{Folder, NumberOffset};
 use crate::error::Result;
 use crate::types::Intrinsics;
 
-/// The Kinect's colour camera (NYU Depth v2 toolbox, `camera_params.m`).
+/// Colour camera of the Kinect (NYU Depth v2 toolbox, `camera_params.m`).
 const KINECT: SizedCamera = SizedCamera {
     size: (640, 480),
     camera: Intrinsics {
@@ -23,18 +23,18 @@ const KINECT: SizedCamera = SizedCamera {
 };
 
 /// Opens a folder of PNG files.
-pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Folder> {
-    let (name, offset) = match stated.labels.as_deref() {
+pub(super) fn open(folder: &Path, args: &MapArgs) -> Result<Folder> {
+    let (name, offset) = match args.labels.as_deref() {
         None => ("nyu40", NumberOffset::None),
         Some("nyu40-1") => ("nyu40", NumberOffset::One),
         Some(name) => (name, NumberOffset::None),
     };
-    let stated = &StatedArgs {
+    let args = &MapArgs {
         labels: Some(name.to_owned()),
-        ..stated.clone()
+        ..args.clone()
     };
-    let labels = labels(stated)?.unwrap_or_default();
-    let mut set = Folder::of(folder, stated, labels, offset)?;
+    let labels = labels(args)?.unwrap_or_default();
+    let mut set = Folder::with_labels(folder, args, labels, offset)?;
     set.listing.sensor = Some(KINECT);
     Ok(set)
 }

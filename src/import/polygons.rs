@@ -22,8 +22,8 @@ impl<T> Polygon<T> {
     }
 }
 
-/// Draws polygons, the largest first, so that a large object does not hide objects on it or in front of it. A pixel is inside if
-/// its centre is, by the even-odd rule.
+/// Draws polygons, the largest first, so that a large object does not hide objects on it or in front of it. A pixel is inside a polygon
+/// if its centre is, by the even-odd rule.
 pub(super) fn draw<T: Copy + Default>(
     polygons: &[Polygon<T>],
     [width, height]: [usize; 2],
@@ -47,7 +47,7 @@ pub(super) fn draw<T: Copy + Default>(
     map
 }
 
-/// The columns at which the edges of a polygon cross a row, from left to right.
+/// X coordinates where the edges of a polygon cross a row of pixels, from left to right.
 fn crossings(corners: &[(f64, f64)], y: f64) -> Vec<f64> {
     let next = corners.iter().cycle().skip(1);
     let mut crossings: Vec<f64> = corners

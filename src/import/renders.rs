@@ -1,4 +1,4 @@
-//! The record of how the scenes of a data set were rendered: `scenes.json`, which the script `hm3d_frames.py` writes.
+//! Record of how scenes were rendered: `scenes.json`, written by the script `hm3d_frames.py`.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -8,15 +8,15 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::files::reading::text;
 
-/// The value of `schema` in `scenes.json`.
+/// Value of `schema` in `scenes.json`.
 const SCHEMA: &str = "darkqa.renders/1";
 
-/// The record in `scenes.json`, without scenes that are not in the folder (`present` are those that are). `None` if there is no
-/// such file, or another tool wrote it; the latter is said.
+/// Reads `scenes.json`, without scenes that are not in `present`, the scenes of the folder. `None` if the file does not exist, or, with
+/// a warning, if it is from another tool.
 ///
 /// # Errors
-/// If the file is not JSON, or a version of the script wrote it that is not known here.
-pub(super) fn of(folder: &Path, present: &BTreeSet<&String>) -> Result<Option<Value>> {
+/// If the file is not JSON, or is from an unknown version of the script.
+pub(super) fn read(folder: &Path, present: &BTreeSet<&String>) -> Result<Option<Value>> {
     let path = folder.join("scenes.json");
     if !path.is_file() {
         return Ok(None);
@@ -41,49 +41,52 @@ pub(super) fn of(folder: &Path, present: &BTreeSet<&String>) -> Result<Option<Va
         let problem = "a list of scenes expected at the key scenes";
         return Err(Error::data(path.display(), problem));
     };
-    let name = |scene: &Value| scene["scene"].as_str().unwrap_or_default().to_owned();
-    let recorded: BTreeSet<String> = scenes.iter().map(name).collect();
+    let recorded: BTreeSet<String> = scenes.iter().map(scene_name).collect();
     for scene in present.iter().filter(|scene| !recorded.contains(**scene)) {
         tracing::warn!("{}: nothing about the scene {scene}", path.display());
     }
-    scenes.retain(|scene| present.contains(&name(scene)));
+    scenes.retain(|scene| present.contains(&scene_name(scene)));
     for scene in recorded.iter().filter(|scene| !present.contains(scene)) {
         tracing::warn!("{}: the scene {scene} is not in the folder", path.display());
     }
     Ok(Some(record))
 }
 
+fn scene_name(scene: &Value) -> String {
+    scene["scene"].as_str().unwrap_or_default().to_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn read(content: &str) -> Result<Option<Value>> {
+    fn read_text(content: &str) -> Result<Option<Value>> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("scenes.json"), content).unwrap();
-        of(folder.path(), &BTreeSet::from([&"a".to_owned()]))
+        read(folder.path(), &BTreeSet::from([&"a".to_owned()]))
     }
 
     #[test]
-    fn only_the_record_of_the_script_is_taken_and_only_scenes_that_are_there() {
+    fn record_is_limited_to_present_scenes() {
         assert!(matches!(
-            of(Path::new("/nowhere"), &BTreeSet::new()),
+            read(Path::new("/nowhere"), &BTreeSet::new()),
             Ok(None)
         ));
         let record = r#"{"schema": "darkqa.renders/1", "mode": "cover", "scenes": [{"scene": "a"}, {"scene": "b"}]}"#;
-        let carried = read(record).unwrap().unwrap();
-        assert_eq!(carried["mode"], "cover");
-        assert_eq!(carried["scenes"], serde_json::json!([{"scene": "a"}]));
-        assert!(matches!(read(r#"{"scenes": ["kitchen"]}"#), Ok(None)));
+        let found = read_text(record).unwrap().unwrap();
+        assert_eq!(found["mode"], "cover");
+        assert_eq!(found["scenes"], serde_json::json!([{"scene": "a"}]));
+        assert!(matches!(read_text(r#"{"scenes": ["kitchen"]}"#), Ok(None)));
     }
 
     #[test]
-    fn broken_records_are_refused() {
+    fn invalid_records_are_refused() {
         for (content, says) in [
             ("{", "scenes.json"),
             (r#"{"schema": "darkqa.renders/2"}"#, "darkqa.renders/1"),
             (r#"{"schema": "darkqa.renders/1"}"#, "a list of scenes"),
         ] {
-            let problem = read(content).unwrap_err().to_string();
+            let problem = read_text(content).unwrap_err().to_string();
             assert!(problem.contains(says), "{problem}");
         }
     }

@@ -1,4 +1,4 @@
-//! The segments of a Replica scene, `info_semantic.json`.
+//! Segment names of a Replica scene, from `info_semantic.json`.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use serde::Deserialize;
 use crate::labels::names::class_of;
 use crate::types::SegmentName;
 
-/// The keys of the file that are used.
+/// Used fields of the file.
 #[derive(Deserialize)]
 struct SemanticInfo {
     objects: Vec<ReplicaObject>,
@@ -19,14 +19,14 @@ struct ReplicaObject {
     class_name: String,
 }
 
-/// The names of segments, by number; segments without a class are left out.
+/// Parses the names of segments, by number. Segments without a name are left out. Names without a known class are counted in `unlisted`.
 pub(super) fn parse(
     text: &str,
     unlisted: &mut BTreeMap<String, usize>,
 ) -> Result<BTreeMap<u32, SegmentName>, String> {
-    let file: SemanticInfo = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    let info: SemanticInfo = serde_json::from_str(text).map_err(|e| e.to_string())?;
     let mut names = BTreeMap::new();
-    for ReplicaObject { id, class_name } in file.objects {
+    for ReplicaObject { id, class_name } in info.objects {
         let Ok(id) = u32::try_from(id) else {
             continue;
         };

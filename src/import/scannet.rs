@@ -1,19 +1,19 @@
 //! Extracted frames of ScanNet: one folder per scene.
 //!
 //! A scene has `<scene>/color/<n>.jpg`, `depth/<n>.png` (millimetres), `pose/<n>.txt` and one of two kinds of label maps:
-//! `label-filt` and `instance-filt` (ScanNet's numbers, with `scannetv2-labels.combined.tsv` beside the scenes) or, as in
+//! `label-filt` and `instance-filt` (ScanNet's numbers, with `scannetv2-labels.combined.tsv` in the folder of the scenes) or, as in
 //! frames_25k, `label` (NYU40) and `instance` (label · 1000 + number). Depth maps are smaller than images and are resampled
 //! with both cameras; labels are never scaled. A frame whose pose is unknown (`-inf`) is left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use ndarray::Array2;
+use ndarray::{Array2, ShapeError};
 use serde::Deserialize;
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs};
 use super::files::{
-    IMAGES, check_same_size, depth, file_name, files, first_folder, folders, numbers, png,
+    IMAGES, check_same_size, file_name, files, folders, read_depth, read_numbers, read_png,
 };
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, json, text};
@@ -23,20 +23,20 @@ use crate::picture::raw_png::SampleForm;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
 /// File name of the table of ScanNet's label numbers.
-const TABLE: &str = "scannetv2-labels.combined.tsv";
-/// Frames per second of the sensor; a frame's name is its number.
-const RATE: f64 = 30.0;
+const LABEL_TABLE: &str = "scannetv2-labels.combined.tsv";
+/// Frames per second of the sensor. The name of a frame is its number.
+const FRAME_RATE: f64 = 30.0;
 /// Metres per unit of depth.
-const SCALE: f64 = 0.001;
+const DEPTH_SCALE: f64 = 0.001;
 
-/// An open folder of scenes.
+/// Folder of ScanNet scenes.
 #[derive(Debug)]
 pub(super) struct Scannet {
     listing: Listing,
     maps: Vec<ScannetMaps>,
     depth_scale: f64,
-    /// The files about scenes, and the table of labels.
-    about: Vec<PathBuf>,
+    /// Files about scenes, and the table of labels.
+    scene_files: Vec<PathBuf>,
 }
 
 #[derive(Debug)]
@@ -52,82 +52,70 @@ struct ScannetMaps {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Numbering {
     /// The label numbers of ScanNet's table.
-    Own,
+    Scannet,
     /// The label numbers of NYU40.
     Nyu40,
 }
 
 impl Scannet {
-    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
+    pub(super) fn open(folder: &Path, args: &MapArgs) -> Result<Self> {
         let mut set = Self {
             listing: Listing::default(),
             maps: Vec::new(),
-            depth_scale: stated.depth_scale.unwrap_or(SCALE),
-            about: Vec::new(),
+            depth_scale: args.depth_scale.unwrap_or(DEPTH_SCALE),
+            scene_files: Vec::new(),
         };
         let scenes: Vec<PathBuf> = folders(folder)?
             .into_iter()
             .filter(|scene| scene.join("color").is_dir())
             .collect();
-        let own = scenes.iter().any(|scene| scene.join("label-filt").is_dir());
-        let numbering = if own {
-            Numbering::Own
+        let numbering = if scenes.iter().any(|scene| scene.join("label-filt").is_dir()) {
+            Numbering::Scannet
         } else {
             Numbering::Nyu40
         };
         set.listing.labels = match numbering {
-            Numbering::Own => {
-                let path = folder.join(TABLE);
-                let labels = table(&path)?;
-                set.about.push(path);
+            Numbering::Scannet => {
+                let path = folder.join(LABEL_TABLE);
+                let labels = read_label_table(&path)?;
+                set.scene_files.push(path);
                 labels
             }
             Numbering::Nyu40 => space("nyu40").unwrap_or_default(),
         };
         for scene in scenes {
-            set.add(&scene, numbering)?;
+            set.add_scene(&scene, numbering)?;
         }
         Ok(set)
     }
 
-    fn add(&mut self, folder: &Path, numbering: Numbering) -> Result<()> {
+    fn add_scene(&mut self, folder: &Path, numbering: Numbering) -> Result<()> {
         let name = file_name(folder);
         check_overflow(folder, &name)?;
-        let camera = |names: [String; 2]| {
-            let path = names
-                .into_iter()
-                .map(|name| folder.join(name))
-                .find(|path| path.exists());
-            path.as_deref()
-                .map(intrinsics)
-                .transpose()
-                .map(|camera| (path, camera))
-        };
-        let of = |which: &str| {
-            camera([
-                format!("intrinsic/intrinsic_{which}.txt"),
-                format!("intrinsics_{which}.txt"),
-            ])
-        };
-        let ((color_file, color), (depth_file, depth_camera)) = (of("color")?, of("depth")?);
+        let color_file = intrinsics_file(folder, "color");
+        let depth_file = intrinsics_file(folder, "depth");
+        let color_camera = color_file.as_deref().map(read_intrinsics).transpose()?;
+        let depth_camera = depth_file.as_deref().map(read_intrinsics).transpose()?;
         let room_file = folder.join(format!("{name}.txt"));
-        let room = room(&room_file)?;
-        self.about.extend(color_file.into_iter().chain(depth_file));
-        self.about
+        let room = read_room_type(&room_file)?;
+        self.scene_files
+            .extend(color_file.into_iter().chain(depth_file));
+        self.scene_files
             .extend([room_file, folder.join(format!("{name}.aggregation.json"))]);
-        let within = |folders: &[&str]| match first_folder(folder, folders) {
-            Some(folder) => files(&folder, &[".png"]),
-            None => Ok(BTreeMap::new()),
+        let (label_folder, instance_folder) = match numbering {
+            Numbering::Scannet => ("label-filt", "instance-filt"),
+            Numbering::Nyu40 => ("label", "instance"),
         };
-        let (labels, instances) = match numbering {
-            Numbering::Own => (within(&["label-filt"])?, within(&["instance-filt"])?),
-            Numbering::Nyu40 => (within(&["label"])?, within(&["instance"])?),
-        };
-        let depths = within(&["depth"])?;
+        let labels = files(&folder.join(label_folder), &[".png"])?;
+        let instances = files(&folder.join(instance_folder), &[".png"])?;
+        let depths = files(&folder.join("depth"), &[".png"])?;
         let poses = files(&folder.join("pose"), &[".txt"])?;
-        self.about.extend(poses.values().cloned());
+        self.scene_files.extend(poses.values().cloned());
         for (frame, rgb) in files(&folder.join("color"), &IMAGES)? {
-            let pose = poses.get(&frame).map(|path| numbers(path)).transpose()?;
+            let pose = poses
+                .get(&frame)
+                .map(|path| read_numbers(path))
+                .transpose()?;
             if pose
                 .as_ref()
                 .is_some_and(|pose| pose.iter().any(|number| !number.is_finite()))
@@ -149,9 +137,9 @@ impl Scannet {
             });
             self.listing.frames.push(ListedFrame {
                 scene: name.clone(),
-                time: number.map(|number| f64::from(number) / RATE),
+                time: number.map(|number| f64::from(number) / FRAME_RATE),
                 pose,
-                intrinsics: color,
+                intrinsics: color_camera,
                 room: room.clone(),
                 rgb,
                 index: self.maps.len() - 1,
@@ -162,14 +150,14 @@ impl Scannet {
     }
 }
 
-/// The keys of `<scene>.aggregation.json` that are used.
+/// Used fields of `<scene>.aggregation.json`.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Aggregation {
     seg_groups: Vec<serde_json::Value>,
 }
 
-/// Refuses a scene with more than 255 objects if its instance maps have 8 bits, because the numbers overflow to 0.
+/// Refuses a scene with more than 255 objects if its instance maps have 8 bits, because the numbers wrap around.
 fn check_overflow(folder: &Path, scene: &str) -> Result<()> {
     let path = folder.join(format!("{scene}.aggregation.json"));
     if !path.exists() || !folder.join("instance-filt").is_dir() {
@@ -185,8 +173,8 @@ fn check_overflow(folder: &Path, scene: &str) -> Result<()> {
     Ok(())
 }
 
-/// The label space of ScanNet's label numbers.
-fn table(path: &Path) -> Result<Labels> {
+/// Reads the table of ScanNet's label numbers.
+fn read_label_table(path: &Path) -> Result<Labels> {
     let bytes = bytes(path)?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(b'\t')
@@ -232,40 +220,53 @@ fn table(path: &Path) -> Result<Labels> {
         labels.labels.insert(id, label);
     }
     // Annotators used free text, so every class of the table is expressible.
-    let classes = labels.labels.values().map(|label| label.canonical.clone());
-    labels.expressible = classes.collect::<BTreeSet<String>>();
+    labels.expressible = labels
+        .labels
+        .values()
+        .map(|label| label.canonical.clone())
+        .collect::<BTreeSet<String>>();
     Ok(labels)
 }
 
-/// The camera in a file with a 4 × 4 matrix.
-fn intrinsics(path: &Path) -> Result<Intrinsics> {
-    match numbers(path)?[..] {
+/// File with the intrinsics of the `color` or `depth` camera, if it exists.
+fn intrinsics_file(folder: &Path, camera: &str) -> Option<PathBuf> {
+    [
+        format!("intrinsic/intrinsic_{camera}.txt"),
+        format!("intrinsics_{camera}.txt"),
+    ]
+    .into_iter()
+    .map(|name| folder.join(name))
+    .find(|path| path.exists())
+}
+
+/// Reads the intrinsics in a file with a 4 × 4 matrix.
+fn read_intrinsics(path: &Path) -> Result<Intrinsics> {
+    match read_numbers(path)?[..] {
         [fx, _, cx, _, _, fy, cy, ..] => Ok(Intrinsics { fx, fy, cx, cy }),
         _ => Err(Error::data(path.display(), "a 4 × 4 matrix expected")),
     }
 }
 
-/// The room type in the file of a scene, from a line such as `sceneType = Bedroom / Hotel`.
-fn room(path: &Path) -> Result<Option<String>> {
+/// Reads the room type of a scene, from a line such as `sceneType = Bedroom / Hotel`.
+fn read_room_type(path: &Path) -> Result<Option<String>> {
     if !path.exists() {
         return Ok(None);
     }
-    let content = text(path)?;
-    let stated = content
+    Ok(text(path)?
         .lines()
         .filter_map(|line| line.split_once('='))
-        .find(|(key, _)| key.trim() == "sceneType");
-    Ok(stated.map(|(_, room)| {
-        room.split('/')
-            .next()
-            .unwrap_or_default()
-            .trim()
-            .to_lowercase()
-    }))
+        .find(|(key, _)| key.trim() == "sceneType")
+        .map(|(_, room)| {
+            room.split('/')
+                .next()
+                .unwrap_or_default()
+                .trim()
+                .to_lowercase()
+        }))
 }
 
-/// Depth resampled to the pixels of an image: the nearest pixel through both cameras, or by position if a camera is unknown.
-fn resampled(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -> Array2<u32> {
+/// Resamples depth to the pixels of an image: the nearest pixel through both cameras, or by relative position if a camera is unknown.
+fn resample(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -> Array2<u32> {
     let (height, width) = depth.dim();
     let scale = [
         width as f64 / rgb.width() as f64,
@@ -284,13 +285,29 @@ fn resampled(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -
     let rows: Vec<f64> = (0..rgb.height()).map(|y| along(y, 1).round()).collect();
     Array2::from_shape_fn((rgb.height(), rgb.width()), |(y, x)| {
         let (row, column) = (rows[y], columns[x]);
-        let within = row >= 0.0 && column >= 0.0;
+        // Also false for NaN.
+        let is_inside = row >= 0.0 && column >= 0.0;
         depth
             .get((row as usize, column as usize))
             .copied()
-            .filter(|_| within)
+            .filter(|_| is_inside)
             .unwrap_or(0)
     })
+}
+
+/// Numbers the segments: each pair of label and instance gets a number, so that objects with different labels stay separate even if the
+/// 8 bits of their instance numbers overflowed.
+fn number_segments(
+    labels: &Array2<u16>,
+    instances: &Array2<u16>,
+) -> Result<Array2<u32>, ShapeError> {
+    let pairs = || labels.iter().copied().zip(instances.iter().copied());
+    let distinct: BTreeSet<(u16, u16)> = pairs().filter(|(_, instance)| *instance != 0).collect();
+    let numbers: BTreeMap<(u16, u16), u32> = distinct.into_iter().zip(1..).collect();
+    let ids = pairs()
+        .map(|pair| numbers.get(&pair).copied().unwrap_or(0))
+        .collect();
+    Array2::from_shape_vec(labels.dim(), ids)
 }
 
 impl Adapter for Scannet {
@@ -298,63 +315,46 @@ impl Adapter for Scannet {
         &self.listing
     }
 
-    fn further_files(&self) -> Vec<PathBuf> {
-        let maps = self.maps.iter();
-        maps.flat_map(|maps| {
-            maps.depth
-                .iter()
-                .chain([&maps.labels])
-                .chain(&maps.instances)
-        })
-        .chain(&self.about)
-        .cloned()
-        .collect()
+    fn other_files(&self) -> Vec<PathBuf> {
+        self.maps
+            .iter()
+            .flat_map(|maps| {
+                maps.depth
+                    .iter()
+                    .chain([&maps.labels])
+                    .chain(&maps.instances)
+            })
+            .chain(&self.scene_files)
+            .cloned()
+            .collect()
     }
 
-    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
+    fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let maps = &self.maps[frame.index];
-        let labels = png(&maps.labels, &[SampleForm::Grey8, SampleForm::Grey16])?;
+        let labels = read_png(&maps.labels, &[SampleForm::Grey8, SampleForm::Grey16])?;
         check_same_size(&maps.labels, &labels, rgb)?;
         let segments = match &maps.instances {
             Some(path) => {
-                let instances = png(path, &[SampleForm::Grey8, SampleForm::Grey16])?;
+                let instances = read_png(path, &[SampleForm::Grey8, SampleForm::Grey16])?;
                 check_same_size(path, &instances, rgb)?;
-                // Each pair of label and instance gets a number. If 8 bits overflowed, objects with different labels stay
-                // separate.
-                let mut pairs = BTreeMap::new();
-                let both = || {
-                    labels
-                        .iter()
-                        .zip(&instances)
-                        .filter(|(_, instance)| **instance != 0)
-                };
-                for (label, instance) in both() {
-                    pairs.entry((*label, *instance)).or_insert(0);
-                }
-                for (number, id) in (1..).zip(pairs.values_mut()) {
-                    *id = number;
-                }
-                let ids = labels
-                    .iter()
-                    .zip(&instances)
-                    .map(|pair| pairs.get(&(*pair.0, *pair.1)).copied().unwrap_or(0));
-                let ids = Array2::from_shape_vec(labels.dim(), ids.collect());
-                Some(ids.map_err(|e| Error::data(path.display(), e))?)
+                let ids = number_segments(&labels, &instances)
+                    .map_err(|e| Error::data(path.display(), e))?;
+                Some(ids)
             }
             None => None,
         };
         let depth = match &maps.depth {
             Some(path) => {
-                let depth = depth(path, Some(self.depth_scale))?;
-                let same = depth.dim() == (rgb.height(), rgb.width());
+                let depth = read_depth(path, Some(self.depth_scale))?;
+                let has_image_size = depth.dim() == (rgb.height(), rgb.width());
                 let cameras = frame
                     .intrinsics
                     .zip(maps.depth_camera)
                     .map(|(color, depth)| [color, depth]);
-                Some(if same {
+                Some(if has_image_size {
                     depth
                 } else {
-                    resampled(&depth, rgb, cameras)
+                    resample(&depth, rgb, cameras)
                 })
             }
             None => None,
@@ -373,10 +373,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn depth_is_resampled_to_the_pixels_of_the_image() {
+    fn depth_is_resampled_to_image_pixels() {
         let depth = Array2::from_shape_vec((1, 2), vec![7, 9]).unwrap();
         let rgb = Rgb::black(2, 4);
-        let found = resampled(&depth, &rgb, None);
+        let found = resample(&depth, &rgb, None);
         assert_eq!(found.into_raw_vec_and_offset().0, [7, 7, 9, 9, 7, 7, 9, 9]);
         // A colour camera with half the field of view sees the middle of the depth map.
         let deep = Array2::from_shape_vec((1, 5), vec![1, 2, 3, 4, 5]).unwrap();
@@ -386,13 +386,13 @@ mod tests {
             cx,
             cy: 0.0,
         };
-        let found = resampled(
+        let found = resample(
             &deep,
             &Rgb::black(1, 3),
             Some([camera(2.0, 1.0), camera(2.0, 2.0)]),
         );
         assert_eq!(found.into_raw_vec_and_offset().0, [2, 3, 4]);
-        let found = resampled(
+        let found = resample(
             &deep,
             &Rgb::black(1, 3),
             Some([camera(1.0, 1.0), camera(3.0, 2.0)]),

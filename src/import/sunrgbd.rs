@@ -1,9 +1,8 @@
 //! SUN RGB-D as it is distributed: `<sensor>/…/<frame>/image/*.jpg`, `depth_bfx/*.png` or `depth/*.png`, `intrinsics.txt`,
 //! `scene.txt` and `annotation2Dfinal/index.json`.
 //!
-//! A depth file holds millimetres rotated left by three bits (`read3dPoints.m` of its toolbox), clamped at 8 m. Classes and
-//! segments come from the polygons that annotators drew around objects; each object is a segment. If polygons overlap, the
-//! smaller one is in front.
+//! Depth is in millimetres, rotated left by three bits (`read3dPoints.m` of its toolbox), and clamped at 8 m. Classes and segments come
+//! from the polygons that annotators drew around objects; each object is a segment. If polygons overlap, the smaller one is in front.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -13,7 +12,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing};
-use super::files::{IMAGES, check_same_size, file_name, files, folders, numbers, png};
+use super::files::{IMAGES, check_same_size, file_name, files, folders, read_numbers, read_png};
 use super::polygons::{Polygon, draw};
 use crate::error::{Error, Result};
 use crate::files::reading::{json, text};
@@ -22,31 +21,32 @@ use crate::labels::names::class_of;
 use crate::picture::raw_png::SampleForm;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
-/// The folders of depth, in the order in which they are looked for. `depth_bfx` is `depth` with its holes filled, which is what
-/// the toolbox reads (`depthpath` of its `SUNRGBDMeta`).
+/// Depth folders, in order of preference. `depth_bfx` is `depth` with its holes filled, which the toolbox reads (`depthpath` of its
+/// `SUNRGBDMeta`).
 const DEPTHS: [&str; 2] = ["depth_bfx", "depth"];
 
 /// Maximum depth in millimetres; the toolbox clamps at the same value.
 const MAX_DEPTH: u32 = 8_000;
 
-/// An open folder of frames.
+/// Folder of SUN RGB-D frames.
 #[derive(Debug)]
 pub(super) struct SunRgbd {
     listing: Listing,
     files: Vec<SunRgbdFiles>,
+    /// Number of each object name.
     numbers: BTreeMap<String, u16>,
-    /// The files of cameras and rooms.
-    about: Vec<PathBuf>,
+    /// Files of cameras and room types.
+    frame_files: Vec<PathBuf>,
 }
 
 #[derive(Debug)]
 struct SunRgbdFiles {
-    /// The depth file, with the name of its folder.
+    /// Name of the depth folder, and the depth file.
     depth: Option<(&'static str, PathBuf)>,
     annotation: PathBuf,
 }
 
-/// The keys of `index.json` that are used.
+/// Used fields of `index.json`.
 #[derive(Deserialize)]
 struct Index {
     frames: Vec<SunRgbdFrame>,
@@ -77,10 +77,10 @@ impl SunRgbd {
             listing: Listing::default(),
             files: Vec::new(),
             numbers: BTreeMap::new(),
-            about: Vec::new(),
+            frame_files: Vec::new(),
         };
         set.find_frames(folder, &[])?;
-        set.number_words()?;
+        set.number_names()?;
         set.listing
             .frames
             .sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
@@ -91,7 +91,7 @@ impl SunRgbd {
     fn find_frames(&mut self, folder: &Path, parents: &[String]) -> Result<()> {
         let annotation = folder.join("annotation2Dfinal").join("index.json");
         if folder.join("image").is_dir() && annotation.is_file() {
-            return self.add(folder, parents, annotation);
+            return self.add_frame(folder, parents, annotation);
         }
         for inner in folders(folder)? {
             let name = file_name(&inner);
@@ -100,7 +100,7 @@ impl SunRgbd {
         Ok(())
     }
 
-    fn add(&mut self, folder: &Path, parents: &[String], annotation: PathBuf) -> Result<()> {
+    fn add_frame(&mut self, folder: &Path, parents: &[String], annotation: PathBuf) -> Result<()> {
         let Some(rgb) = files(&folder.join("image"), &IMAGES)?.into_values().next() else {
             return Err(Error::data(
                 folder.join("image").display(),
@@ -113,19 +113,17 @@ impl SunRgbd {
             depth = depth.or(first.map(|path| (name, path)));
         }
         let camera = folder.join("intrinsics.txt");
-        let intrinsics = match camera
-            .exists()
-            .then(|| numbers(&camera))
-            .transpose()?
-            .as_deref()
-        {
-            Some(&[fx, _, cx, _, fy, cy, ..]) => Some(Intrinsics { fx, fy, cx, cy }),
-            Some(_) => return Err(Error::data(camera.display(), "nine numbers expected")),
-            None => None,
+        let intrinsics = if camera.exists() {
+            match read_numbers(&camera)?[..] {
+                [fx, _, cx, _, fy, cy, ..] => Some(Intrinsics { fx, fy, cx, cy }),
+                _ => return Err(Error::data(camera.display(), "nine numbers expected")),
+            }
+        } else {
+            None
         };
         let room_file = folder.join("scene.txt");
         let room = room_file.exists().then(|| text(&room_file)).transpose()?;
-        self.about.extend([camera, room_file]);
+        self.frame_files.extend([camera, room_file]);
         let (frame, scene) = parents.split_last().map_or_else(
             || ("frame".to_owned(), String::new()),
             |(frame, scene)| (frame.clone(), scene.join("-")),
@@ -148,16 +146,18 @@ impl SunRgbd {
         Ok(())
     }
 
-    /// Numbers all words of the data set alphabetically, so that the numbers do not depend on the order of files.
-    fn number_words(&mut self) -> Result<()> {
-        let mut words = BTreeMap::new();
+    /// Numbers all object names of the data set alphabetically, so that the numbers do not depend on the order of files.
+    fn number_names(&mut self) -> Result<()> {
+        let mut counts = BTreeMap::new();
         for files in &self.files {
             for object in json::<Index>(&files.annotation)?
                 .objects
                 .into_iter()
                 .flatten()
             {
-                *words.entry(word(&object.name)).or_insert(0_usize) += 1;
+                *counts
+                    .entry(normalize_name(&object.name))
+                    .or_insert(0_usize) += 1;
             }
         }
         let mut labels = Labels {
@@ -165,16 +165,16 @@ impl SunRgbd {
             void: [0].into(),
             ..Labels::default()
         };
-        for (number, (word, count)) in (1..=u16::MAX).zip(words) {
-            let Some(class) = class_of(&word, &word, count, &mut self.listing.unlisted) else {
+        for (number, (name, count)) in (1..=u16::MAX).zip(counts) {
+            let Some(class) = class_of(&name, &name, count, &mut self.listing.unlisted) else {
                 continue;
             };
             let label = Label {
-                name: word.clone(),
+                name: name.clone(),
                 canonical: class.to_owned(),
             };
             labels.labels.insert(number, label);
-            self.numbers.insert(word, number);
+            self.numbers.insert(name, number);
         }
         // Annotators used free text, so every class is expressible.
         labels.expressible = canonical().into_iter().collect::<BTreeSet<String>>();
@@ -183,16 +183,16 @@ impl SunRgbd {
     }
 }
 
-/// The name of an object without the suffix that annotators added to distinguish objects: `chair:1`, `chair 2`.
-fn word(name: &str) -> String {
+/// Name of an object in lower case, without the suffix that annotators added to distinguish objects: `chair:1`, `chair 2`.
+fn normalize_name(name: &str) -> String {
     let name = name.split(':').next().unwrap_or_default().trim();
     name.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '_')
         .trim()
         .to_lowercase()
 }
 
-/// The numbers in a JSON array. A single number is a list of one, because the files contain both.
-fn list(value: &Value) -> Vec<f64> {
+/// Numbers in a JSON array, or a single number, because the files contain both.
+fn number_list(value: &Value) -> Vec<f64> {
     match value {
         Value::Array(list) => list
             .iter()
@@ -208,11 +208,11 @@ impl Adapter for SunRgbd {
     }
 
     fn depth_folder(&self, frame: &ListedFrame) -> Option<&'static str> {
-        let depth = self.files[frame.index].depth.as_ref();
-        depth.map(|(folder, _)| *folder)
+        let (folder, _) = self.files[frame.index].depth.as_ref()?;
+        Some(folder)
     }
 
-    fn further_files(&self) -> Vec<PathBuf> {
+    fn other_files(&self) -> Vec<PathBuf> {
         self.files
             .iter()
             .flat_map(|files| {
@@ -222,16 +222,16 @@ impl Adapter for SunRgbd {
                     .map(|(_, path)| path)
                     .chain([&files.annotation])
             })
-            .chain(&self.about)
+            .chain(&self.frame_files)
             .cloned()
             .collect()
     }
 
-    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
+    fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let files = &self.files[frame.index];
         let depth = match &files.depth {
             Some((_, path)) => {
-                let rotated = png(path, &[SampleForm::Grey16])?;
+                let rotated = read_png(path, &[SampleForm::Grey16])?;
                 check_same_size(path, &rotated, rgb)?;
                 Some(rotated.mapv(|value| u32::from(value.rotate_right(3)).min(MAX_DEPTH)))
             }
@@ -247,8 +247,15 @@ impl Adapter for SunRgbd {
             .into_iter()
             .filter_map(|shape| {
                 let name = &index.objects.get(shape.object)?.as_ref()?.name;
-                let number = self.numbers.get(&word(name)).copied().unwrap_or(0);
-                let corners = list(&shape.x).into_iter().zip(list(&shape.y)).collect();
+                let number = self
+                    .numbers
+                    .get(&normalize_name(name))
+                    .copied()
+                    .unwrap_or(0);
+                let corners = number_list(&shape.x)
+                    .into_iter()
+                    .zip(number_list(&shape.y))
+                    .collect();
                 Some(Polygon {
                     corners,
                     value: (number, shape.object as u32 + 1),

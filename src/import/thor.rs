@@ -8,16 +8,16 @@ use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, StatedArgs, class_numbers};
+use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, class_numbers};
 use super::files::{
-    IMAGES, check_same_size, depth_of, file_name, files, folders, image, map_paths,
+    IMAGES, check_same_size, file_name, files, folders, map_paths, read_frame_depth, read_id_image,
 };
 use crate::error::{Error, Result};
 use crate::files::reading::json;
 use crate::labels::names;
 use crate::types::{Rgb, SegmentName};
 
-/// An open folder of scenes.
+/// Folder of AI2-THOR scenes.
 #[derive(Debug)]
 pub(super) struct Thor {
     listing: Listing,
@@ -25,35 +25,36 @@ pub(super) struct Thor {
     maps: Vec<(Option<PathBuf>, PathBuf)>,
     /// Segment number of each colour, by scene.
     colors: BTreeMap<String, BTreeMap<[u8; 3], u32>>,
+    /// Number of each class.
     numbers: BTreeMap<String, u16>,
     depth_scale: Option<f64>,
-    /// The files of colours.
+    /// Paths of `colors.json`.
     color_files: Vec<PathBuf>,
 }
 
 impl Thor {
-    pub(super) fn open(folder: &Path, stated: &StatedArgs) -> Result<Self> {
-        let listing = Listing::of_mpcat40(stated);
+    pub(super) fn open(folder: &Path, args: &MapArgs) -> Result<Self> {
+        let listing = Listing::with_mpcat40(args);
         let mut set = Self {
             numbers: class_numbers(&listing.labels),
             listing,
             maps: Vec::new(),
             colors: BTreeMap::new(),
-            depth_scale: stated.depth_scale,
+            depth_scale: args.depth_scale,
             color_files: Vec::new(),
         };
         for scene in folders(folder)? {
             if scene.join("instance").is_dir() {
-                set.add(&scene)?;
+                set.add_scene(&scene)?;
             }
         }
         Ok(set)
     }
 
-    fn add(&mut self, folder: &Path) -> Result<()> {
+    fn add_scene(&mut self, folder: &Path) -> Result<()> {
         let name = file_name(folder);
         let color_file = folder.join("colors.json");
-        let (colors, names) = scene(&color_file)?;
+        let SceneColors { colors, names } = SceneColors::read(&color_file)?;
         self.color_files.push(color_file);
         let depths = files(&folder.join("depth"), &[".npy", ".png"])?;
         let instances = files(&folder.join("instance"), &[".png"])?;
@@ -65,7 +66,7 @@ impl Thor {
             self.maps
                 .push((depths.get(&frame).cloned(), instance.clone()));
             self.listing.frames.push(ListedFrame {
-                room: room(&name).map(str::to_owned),
+                room: room_type(&name).map(str::to_owned),
                 ..ListedFrame::new(&name, frame, rgb, self.maps.len() - 1)
             });
         }
@@ -75,41 +76,49 @@ impl Thor {
     }
 }
 
-/// The segment number of each colour, and the name of each segment. Segments are numbered by the ids of their objects.
-#[expect(clippy::type_complexity, reason = "two tables of one file")]
-fn scene(path: &Path) -> Result<(BTreeMap<[u8; 3], u32>, BTreeMap<u32, SegmentName>)> {
-    let file: BTreeMap<String, String> = json(path)?;
-    let mut objects: BTreeMap<&str, Vec<[u8; 3]>> = BTreeMap::new();
-    for (key, object) in &file {
-        let parts: Vec<u8> = key
-            .split(|letter: char| !letter.is_ascii_digit())
-            .filter_map(|part| part.parse().ok())
-            .collect();
-        let color = parts.try_into().map_err(|_| {
-            let problem = format_args!(
-                "{key:?} is not a colour; three numbers expected, as in \"(12, 34, 56)\""
-            );
-            Error::data(path.display(), problem)
-        })?;
-        objects.entry(object).or_default().push(color);
-    }
-    let (mut colors, mut names) = (BTreeMap::new(), BTreeMap::new());
-    for (id, (object, of_object)) in (1..).zip(objects) {
-        let kind = object.split('|').next().unwrap_or_default();
-        let (name, class) = names::thor(kind);
-        let name = SegmentName {
-            name,
-            canonical: class.to_owned(),
-            region: None,
-        };
-        names.insert(id, name);
-        colors.extend(of_object.into_iter().map(|color| (color, id)));
-    }
-    Ok((colors, names))
+/// Content of the `colors.json` of a scene. Segments are numbered in the order of their object ids.
+struct SceneColors {
+    /// Segment number of each colour.
+    colors: BTreeMap<[u8; 3], u32>,
+    /// Name of each segment.
+    names: BTreeMap<u32, SegmentName>,
 }
 
-/// The room type of an iTHOR scene, by the number in its name.
-fn room(scene: &str) -> Option<&'static str> {
+impl SceneColors {
+    fn read(path: &Path) -> Result<Self> {
+        let file: BTreeMap<String, String> = json(path)?;
+        let mut objects: BTreeMap<&str, Vec<[u8; 3]>> = BTreeMap::new();
+        for (key, object) in &file {
+            let parts: Vec<u8> = key
+                .split(|letter: char| !letter.is_ascii_digit())
+                .filter_map(|part| part.parse().ok())
+                .collect();
+            let color = parts.try_into().map_err(|_| {
+                let problem = format_args!(
+                    "{key:?} is not a colour; three numbers expected, as in \"(12, 34, 56)\""
+                );
+                Error::data(path.display(), problem)
+            })?;
+            objects.entry(object).or_default().push(color);
+        }
+        let (mut colors, mut names) = (BTreeMap::new(), BTreeMap::new());
+        for (id, (object, object_colors)) in (1..).zip(objects) {
+            let kind = object.split('|').next().unwrap_or_default();
+            let (name, class) = names::thor(kind);
+            let name = SegmentName {
+                name,
+                canonical: class.to_owned(),
+                region: None,
+            };
+            names.insert(id, name);
+            colors.extend(object_colors.into_iter().map(|color| (color, id)));
+        }
+        Ok(Self { colors, names })
+    }
+}
+
+/// Room type of an iTHOR scene, by the number in its name.
+fn room_type(scene: &str) -> Option<&'static str> {
     let digits: String = scene
         .strip_prefix("FloorPlan")?
         .chars()
@@ -129,24 +138,24 @@ impl Adapter for Thor {
         &self.listing
     }
 
-    fn further_files(&self) -> Vec<PathBuf> {
+    fn other_files(&self) -> Vec<PathBuf> {
         map_paths(&self.maps)
             .chain(&self.color_files)
             .cloned()
             .collect()
     }
 
-    fn read(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
+    fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
         let (depth_path, instance) = &self.maps[frame.index];
-        let segment_of = &self.colors[&frame.scene];
-        let colors = image(instance)?;
+        let segment_by_color = &self.colors[&frame.scene];
+        let colors = read_id_image(instance)?;
         let (pixels, _) = colors.samples().as_chunks::<3>();
         let ids: Vec<u32> = pixels
             .iter()
-            .map(|color| segment_of.get(color).copied().unwrap_or(0))
+            .map(|color| segment_by_color.get(color).copied().unwrap_or(0))
             .collect();
-        let segments = Array2::from_shape_vec((colors.height(), colors.width()), ids);
-        let segments = segments.map_err(|e| Error::data(instance.display(), e))?;
+        let segments = Array2::from_shape_vec((colors.height(), colors.width()), ids)
+            .map_err(|e| Error::data(instance.display(), e))?;
         check_same_size(instance, &segments, rgb)?;
         if segments.iter().all(|id| *id == 0) {
             let problem =
@@ -159,7 +168,7 @@ impl Adapter for Thor {
             .collect();
         let semantic = segments.mapv(|id| numbers.get(&id).copied().unwrap_or(0));
         Ok(FrameMaps {
-            depth: depth_of(depth_path.as_deref(), self.depth_scale, rgb)?,
+            depth: read_frame_depth(depth_path.as_deref(), self.depth_scale, rgb)?,
             semantic: Some(semantic),
             segments: Some(segments),
             room: None,

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
 use crate::dataset::FolderArgs;
-use crate::dataset::frame_folder::{self, FramePaths};
+use crate::dataset::frame_folder::{self, FrameOutput};
 use crate::error::{Error, Result};
 use crate::files::reading::open;
 use crate::images::frames::InputTally;
@@ -26,7 +26,7 @@ use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::keyframes::{KeyFrameArgs, choose};
 use crate::import::{
-    Adapter, DataSetKind, FrameMaps, ListedFrame, StatedArgs, left_over, open_all,
+    Adapter, DataSetKind, FrameMaps, ListedFrame, MapArgs, open_all, unread_files,
 };
 use crate::picture::ImageFile;
 use crate::picture::png;
@@ -96,7 +96,7 @@ struct ImportArgs {
     name: Option<String>,
     /// Facts about the maps that the data set does not state.
     #[command(flatten)]
-    stated: StatedArgs,
+    map_args: MapArgs,
     /// The flags that select key frames.
     #[command(flatten)]
     key_frames: KeyFrameArgs,
@@ -167,7 +167,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
             "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
-    let adapter = open_all(args.kind, src, &args.stated, &args.folders.root.data_root)?;
+    let adapter = open_all(args.kind, src, &args.map_args, &args.folders.root.data_root)?;
     let frames = choose(
         &adapter.listing().frames,
         args.key_frames.selection(),
@@ -204,13 +204,13 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let note = depths(&written)?
         + &without_maps(&written)
         + &depth_folders(&written)
-        + &left_over(src, &*adapter)?.line();
+        + &unread_files(src, &*adapter)?.line();
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
     let listing = adapter.listing();
     for scene in &scenes {
         if let Some(names) = listing.names.get(*scene) {
-            frame_folder::names(out, scene, names)?;
+            frame_folder::write_segment_names(out, scene, names)?;
         }
     }
     let mut info = json!({
@@ -224,7 +224,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
         info["renders"] = renders.clone();
     }
     let lines = written.iter().map(|written| &written.line);
-    frame_folder::finish(out, &listing.labels, &info, lines)?;
+    frame_folder::write_folder_files(out, &listing.labels, &info, lines)?;
     let listed = listing.frames.len();
     let mut output = format!(
         "{}: {} of {}{}{}\n{note}",
@@ -272,7 +272,7 @@ impl ImportedImage {
     fn read(args: &ImportArgs, adapter: &dyn Adapter, frame: &ListedFrame) -> Result<Self> {
         let file = ImageFile::open(&frame.rgb, args.folders.decode.rule())?.never_turned();
         let rgb = file.decode()?;
-        let maps = adapter.read(frame, &rgb)?;
+        let maps = adapter.read_maps(frame, &rgb)?;
         let has_maps = maps.depth.is_some() || maps.semantic.is_some() || maps.segments.is_some();
         if has_maps || file.note() == InputNote::default() {
             return Ok(Self { file, rgb, maps });
@@ -300,19 +300,19 @@ fn write_frame(
     let ImportedImage { file, rgb, maps } = ImportedImage::read(args, adapter, frame)?;
     let note = file.note();
     tally.add(&FrameId(frame.rgb.display().to_string()), &note);
-    let paths = FramePaths {
+    let output = FrameOutput {
         out,
         scene: &frame.scene,
         frame: &frame.frame,
     };
-    let mut line = paths.line((rgb.width(), rgb.height()));
+    let mut line = output.line((rgb.width(), rgb.height()));
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
     // All but plain PNG files are copied as they are, so that they are read here as anywhere else.
     let image = if file.ending() == "png" && note == InputNote::default() {
-        paths.write("rgb", "png", &png(&rgb)?)?
+        output.write("rgb", "png", &png(&rgb)?)?
     } else {
-        paths.write("rgb", file.ending(), file.bytes())?
+        output.write("rgb", file.ending(), file.bytes())?
     };
     line.insert("rgb".to_owned(), json!(image));
     let FrameMaps {
@@ -324,13 +324,13 @@ fn write_frame(
     let median = depth.as_ref().and_then(median);
     let depth_folder = adapter.depth_folder(frame);
     if let Some(depth) = &depth {
-        paths.depth(&mut line, depth, adapter.listing().depth_kind)?;
+        output.write_depth(&mut line, depth, adapter.listing().depth_kind)?;
     }
     if let Some(semantic) = &semantic {
-        paths.semantic(&mut line, semantic)?;
+        output.write_semantic(&mut line, semantic)?;
     }
     if let Some(segments) = &segments {
-        paths.segments(&mut line, segments, adapter.listing().segmentation)?;
+        output.write_segments(&mut line, segments, adapter.listing().segmentation)?;
     }
     // The camera of a data set is that of the image as it is stored.
     let is_stored = note.orientation.is_none();

@@ -8,7 +8,7 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::dataset::frame_folder::{self, FRAMES, FramePaths};
+use crate::dataset::frame_folder::{self, FRAMES, FrameOutput};
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
@@ -65,7 +65,7 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     // The frames of a scene share a file of names, which two threads must not write at once.
     let scenes = frames.iter().map(|frame| (&*frame.scene, &frame.names));
     for (scene, names) in scenes.collect::<BTreeMap<_, _>>() {
-        frame_folder::names(&args.out, scene, names)?;
+        frame_folder::write_segment_names(&args.out, scene, names)?;
     }
     let info = json!({
         "schema": "darkqa.dataset/1",
@@ -75,7 +75,7 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     });
     let labels: Labels = rooms::labels();
     let lines = frames.iter().map(|frame| &frame.line);
-    frame_folder::finish(&args.out, &labels, &info, lines)?;
+    frame_folder::write_folder_files(&args.out, &labels, &info, lines)?;
     Ok(Outcome::wrote(
         &args.out,
         Status::Complete,
@@ -94,27 +94,27 @@ struct WrittenFrame {
 
 fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
     let frame = room.frame()?;
-    let paths = FramePaths {
+    let output = FrameOutput {
         out: &args.out,
         scene: &frame.scene,
         frame: room.view(),
     };
-    let mut line = paths.line((frame.rgb.width(), frame.rgb.height()));
-    let codes = paths.write("rgb", "png", &png(&frame.rgb)?)?;
+    let mut line = output.line((frame.rgb.width(), frame.rgb.height()));
+    let codes = output.write("rgb", "png", &png(&frame.rgb)?)?;
     // The frame is its light; the PNG file beside it is for looking at.
     let image = match room.light() {
-        Some(light) => paths.write("rgb", "exr", &exr(&light)?)?,
+        Some(light) => output.write("rgb", "exr", &exr(&light)?)?,
         None => codes,
     };
     line.insert("rgb".to_owned(), json!(image));
     if let Some(depth) = &frame.depth {
-        paths.depth(&mut line, depth, frame.depth_kind)?;
+        output.write_depth(&mut line, depth, frame.depth_kind)?;
     }
     if let Some(semantic) = &frame.semantic {
-        paths.semantic(&mut line, semantic)?;
+        output.write_semantic(&mut line, semantic)?;
     }
     if let Some(segments) = &frame.segments {
-        paths.segments(&mut line, segments, frame.segmentation)?;
+        output.write_segments(&mut line, segments, frame.segmentation)?;
     }
     line.insert("intrinsics".to_owned(), json!(frame.intrinsics));
     line.insert("pose".to_owned(), json!(room.pose()));

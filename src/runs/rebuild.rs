@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::dataset::{DataArgs, DataPlace, Dataset, Photographs, place};
+use crate::dataset::{DataArgs, DataPlace, Dataset, Photographs, parse_data_place};
 use crate::error::{Error, Result};
 use crate::images::enhancement::enhancers::{self, EnhancerRunArgs, OpenEnhancers};
 use crate::images::frames::{Frames, Source, Walk, WalkFolder, photographs};
@@ -93,8 +93,8 @@ impl ImageRebuilder {
             (FrameFolder::Walks(folder, walk), recipe)
         } else {
             let dataset = if manifest.identity.contains_key(ASK) {
-                Photographs::at(&flags.data.place(), &flags.data.set)?.dataset
-            } else if let Some(dataset) = flags.scene.apart(&flags.data.place())? {
+                Photographs::open(&flags.data.place(), &flags.data.set)?.dataset
+            } else if let Some(dataset) = flags.scene.pairs_or_classes(&flags.data.place())? {
                 dataset
             } else {
                 frames(&flags.data)?
@@ -165,7 +165,7 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
     if let Some(data) = &args.data {
         match &mut flags.walk {
             Some(walk) => walk.folder.clone_from(data),
-            None => flags.data.data = vec![place(&data.to_string_lossy())?],
+            None => flags.data.data = vec![parse_data_place(&data.to_string_lossy())?],
         }
     }
     if !args.llie.is_empty() {

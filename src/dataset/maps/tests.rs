@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// A PNG file of height and width with these packed rows.
+/// A PNG file of this height and width with these packed rows.
 fn png_file((height, width): (u32, u32), color: ColorType, bits: BitDepth, data: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
@@ -69,7 +69,7 @@ fn segments(path: &Path, size: Size) -> Result<Array2<u32>> {
 }
 
 #[test]
-fn depth_is_rounded_half_to_even_and_0_where_there_is_none() {
+fn depth_is_rounded_half_to_even() {
     let png = deep((2, 3), &[0, 1, 3, 5, 7, 65_535]);
     let read = depth("d.png", &png, Some(0.0005), (2, 3)).unwrap();
     assert_eq!(read, array![[0, 0, 2], [2, 4, 32_768]]);
@@ -103,7 +103,7 @@ fn depth_is_rounded_half_to_even_and_0_where_there_is_none() {
 }
 
 #[test]
-fn a_depth_beyond_any_room_is_refused() {
+fn too_large_depth_is_refused() {
     let error = depth("d.png", &deep((1, 1), &[2500]), Some(1.0), (1, 1)).unwrap_err();
     let error = error.to_string();
     assert!(error.contains("d.png: a depth of 2500 m"), "{error}");
@@ -114,7 +114,7 @@ fn a_depth_beyond_any_room_is_refused() {
 }
 
 #[test]
-fn an_impossible_scale_is_refused() {
+fn invalid_depth_scale_is_refused() {
     for (name, scale) in [
         ("d.png", None),
         ("d.png", Some(0.0)),
@@ -129,7 +129,7 @@ fn an_impossible_scale_is_refused() {
 }
 
 #[test]
-fn classes_are_read_in_every_form() {
+fn semantic_maps_are_read_in_every_format() {
     let size = (1, 2);
     let shallow = |color| png_file(size, color, BitDepth::Eight, &[7, 255]);
     for (bytes, expected) in [
@@ -147,7 +147,7 @@ fn classes_are_read_in_every_form() {
 }
 
 #[test]
-fn segments_are_read_in_every_form() {
+fn segment_maps_are_read_in_every_format() {
     let (_folder, path) = temporary_file("o.png", &deep((1, 2), &[0, 65_535]));
     assert_eq!(segments(&path, (1, 2)).unwrap(), array![[0, 65_535]]);
     let ids = [0_i64, 4_294_967_295].map(i64::to_le_bytes).concat();
@@ -165,7 +165,7 @@ fn segments_are_read_in_every_form() {
 }
 
 #[test]
-fn a_map_of_another_size_is_named_with_both_sizes() {
+fn map_size_error_names_both_sizes() {
     let says = "1 × 2 pixels (height × width), but its image has 2 × 1";
     let (_folder, png) = temporary_file("m.png", &deep((1, 2), &[1, 2]));
     let (_folder, npy) = temporary_file("m.npy", &npy_file("|u1", "(1, 2)", &[1, 2]));
@@ -182,7 +182,7 @@ fn a_map_of_another_size_is_named_with_both_sizes() {
 }
 
 #[test]
-fn a_truncated_map_is_named() {
+fn truncated_map_is_an_error() {
     let mut noise = 1_u32;
     let values: Vec<u16> = std::iter::repeat_with(|| {
         noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -198,7 +198,7 @@ fn a_truncated_map_is_named() {
 
 proptest! {
     #[test]
-    fn millimetres_are_the_nearest(depth in -10.0..MOST_DEPTH) {
+    fn millimetres_are_the_nearest(depth in -10.0..MAX_DEPTH_MM) {
         let rounded = f64::from(millimetres(depth, 1.0).unwrap());
         prop_assert!((rounded - depth.max(0.0)).abs() <= 0.5);
     }

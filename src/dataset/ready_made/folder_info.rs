@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::columns::map::Map;
+use super::columns::map::ColumnMap;
 use super::container::Archive;
 use crate::error::{Error, Result};
 use crate::files::reading;
@@ -13,7 +13,7 @@ pub(super) struct FolderInfo {
     /// Name of the data set; empty if none is given.
     pub(super) name: String,
     /// Column mapping; `None` if none is given.
-    pub(super) map: Option<Map>,
+    pub(super) map: Option<ColumnMap>,
 }
 
 impl FolderInfo {
@@ -34,7 +34,7 @@ impl FolderInfo {
             return Ok(Self::default());
         }
         let path = archive.path().join(Self::FILE);
-        let text = archive.text(Self::FILE)?;
+        let text = archive.read_text(Self::FILE)?;
         let info: serde_json::Value =
             serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
         if info.get("light").is_some_and(|light| light != "lit") {
@@ -49,7 +49,7 @@ impl FolderInfo {
     fn read(path: &Path, info: &serde_json::Value) -> Result<Self> {
         let field = |key: &str| info.get(key).and_then(serde_json::Value::as_str);
         let map = field("map")
-            .map(str::parse::<Map>)
+            .map(str::parse::<ColumnMap>)
             .transpose()
             .map_err(|problem| Error::data(path.display(), format_args!("map: {problem}")))?;
         Ok(Self {

@@ -1,33 +1,34 @@
-//! Questions that a set scores together: [`GroupRule`], [`Groups`].
+//! Groups of questions that a set scores together: [`GroupRule`], [`Groups`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::cells::{Cell, Row, Table};
-use super::choices::is_own;
-use super::columns::map::Map;
+use super::choices::is_native_format;
+use super::columns::map::ColumnMap;
 use super::columns::names::Role;
-use super::columns::{Column, column};
+use super::columns::{Column, find_column};
 use super::summary::count;
 use crate::types::{Question, StrictGroup};
 
-/// How the group of a row follows from its cells.
+/// Rule that makes the name of a row's group from its cells.
 #[derive(Debug)]
 pub(super) struct GroupRule {
-    /// The column or template as the user or the preset says it.
+    /// Column or template, as written by the user or the preset.
     text: String,
-    parts: Vec<Part>,
-    /// The column that holds the number of questions in the group, in files that a run wrote.
+    parts: Vec<NamePart>,
+    /// Column with the number of questions in the group, in files written by a run.
     size: Option<Column>,
 }
 
-/// A part of the name of a group.
+/// Part of the name of a group.
 #[derive(Debug)]
-enum Part {
-    /// The same in every row.
-    Words(String),
-    /// A cell.
+enum NamePart {
+    /// Literal text, the same in every row.
+    Literal(String),
+    /// Text of a cell.
     Cell(Column),
-    /// The numbers of a column in runs of one length, from a first number: `{Index:2 from 1}` takes 1 and 2, 3 and 4 together.
+    /// Index of a run of `length` consecutive numbers in a column, counted from `first`: `{Index:2 from 1}` groups 1 with 2, and 3
+    /// with 4.
     Run {
         column: Column,
         length: u64,
@@ -35,42 +36,42 @@ enum Part {
     },
 }
 
-/// The columns by which files of this program name groups.
-const OWN: [&str; 2] = ["group", "group_size"];
+/// Columns for the name and the size of groups in files of this program.
+const NATIVE_COLUMNS: [&str; 2] = ["group", "group_size"];
 
 impl GroupRule {
-    /// The rule of a map; without one, that of a file of this program; `None` if questions have no groups.
+    /// Rule in the map, else the rule for files of this program; `None` if questions have no groups.
     ///
     /// # Errors
-    /// If the map names a column that is not there, or a template cannot be read.
-    pub(super) fn from_map(table: &Table, map: &Map) -> Result<Option<Self>, String> {
-        let [name, size] = OWN;
-        let own = |name| table.find(name).and_then(|_| column(table, name).ok());
-        let is_own = || own(name).is_some() && (own(size).is_some() || is_own(table));
+    /// If the map names a column that does not exist, or the template is invalid.
+    pub(super) fn from_map(table: &Table, map: &ColumnMap) -> Result<Option<Self>, String> {
+        let [name, size] = NATIVE_COLUMNS;
+        let size = table.find(size).map(|index| Column::new(index, size));
+        let is_native = table.find(name).is_some() && (size.is_some() || is_native_format(table));
         let text = match map.entry(Role::Group).map(|entry| &*entry.columns) {
             Some([text]) => text.clone(),
-            None if is_own() => name.to_owned(),
+            None if is_native => name.to_owned(),
             _ => return Ok(None),
         };
         let parts = if text.contains('{') {
-            parts(table, &text)?
+            parse_template(table, &text)?
         } else {
-            vec![Part::Cell(column(table, &text)?)]
+            vec![NamePart::Cell(find_column(table, &text)?)]
         };
-        let size = own(size).filter(|_| text == name);
+        let size = size.filter(|_| text == name);
         Ok(Some(Self { text, parts, size }))
     }
 
-    /// The name of the group of a row; `None` if a cell is absent, or no number where one is needed.
+    /// Name of the group of a row; `None` if a cell is absent, or is not a number where one is needed.
     fn name(&self, row: &Row) -> Option<String> {
         self.parts.iter().map(|part| part.text(row)).collect()
     }
 }
 
-impl Part {
+impl NamePart {
     fn text(&self, row: &Row) -> Option<String> {
         match self {
-            Self::Words(words) => Some(words.clone()),
+            Self::Literal(text) => Some(text.clone()),
             Self::Cell(column) => match column.cell(row) {
                 Cell::File(facts) => Some(facts.digest.to_string()[..12].to_owned()),
                 _ => column.text(row).map(|text| text.trim().to_owned()),
@@ -87,30 +88,30 @@ impl Part {
     }
 }
 
-/// The parts of a template.
-fn parts(table: &Table, template: &str) -> Result<Vec<Part>, String> {
+/// Parses a template of group names.
+fn parse_template(table: &Table, template: &str) -> Result<Vec<NamePart>, String> {
     let mut parts = Vec::new();
     let mut rest = template;
-    while let Some((words, after)) = rest.split_once('{') {
+    while let Some((literal, after)) = rest.split_once('{') {
         let (field, after) = after
             .split_once('}')
             .ok_or_else(|| format!("group={template}: '}}' is missing"))?;
-        if !words.is_empty() {
-            parts.push(Part::Words(words.to_owned()));
+        if !literal.is_empty() {
+            parts.push(NamePart::Literal(literal.to_owned()));
         }
-        parts.push(part(table, field)?);
+        parts.push(parse_field(table, field)?);
         rest = after;
     }
     if !rest.is_empty() {
-        parts.push(Part::Words(rest.to_owned()));
+        parts.push(NamePart::Literal(rest.to_owned()));
     }
     Ok(parts)
 }
 
-/// Parses the braces of a template: a column, or a column and how many of its numbers are one group.
-fn part(table: &Table, field: &str) -> Result<Part, String> {
-    let Some((name, run)) = run_of(field).filter(|_| table.find(field).is_none()) else {
-        return column(table, field).map(Part::Cell);
+/// Parses a field in braces: a column, or a column with the length of a run of numbers. A column with the whole name takes precedence.
+fn parse_field(table: &Table, field: &str) -> Result<NamePart, String> {
+    let Some((name, run)) = split_run(field).filter(|_| table.find(field).is_none()) else {
+        return find_column(table, field).map(NamePart::Cell);
     };
     let wrong = || {
         format!(
@@ -123,56 +124,64 @@ fn part(table: &Table, field: &str) -> Result<Part, String> {
     if length == 0 {
         return Err(wrong());
     }
-    Ok(Part::Run {
-        column: column(table, name)?,
+    Ok(NamePart::Run {
+        column: find_column(table, name)?,
         length,
         first,
     })
 }
 
-/// The column in the braces of a template, and what follows its colon.
-fn run_of(field: &str) -> Option<(&str, &str)> {
+/// Splits a field in braces at its last colon: the column and the run of numbers.
+fn split_run(field: &str) -> Option<(&str, &str)> {
     field.rsplit_once(':')
 }
 
-/// The columns that a template names.
-pub(super) fn columns(template: &str) -> Vec<&str> {
+/// Columns that a template names.
+pub(super) fn template_columns(template: &str) -> Vec<&str> {
     template
         .split('{')
         .skip(1)
         .filter_map(|part| part.split('}').next())
-        .map(|field| run_of(field).map_or(field, |(name, _)| name))
+        .map(|field| split_run(field).map_or(field, |(name, _)| name))
         .collect()
 }
 
-/// The groups of the rows of a set.
+/// Groups of the rows of a set.
 #[derive(Debug, Default)]
 pub(super) struct Groups {
     /// The rule as text; empty if there are no groups.
     rule: String,
-    /// The name by row.
+    /// Name of the group by row.
     names: Vec<Option<String>>,
+    /// Number of questions by name.
     sizes: HashMap<String, usize>,
 }
 
 impl Groups {
-    /// The groups by a rule. Rows that cannot be asked count as members, so that it is known what a group lacks; copies do not.
-    pub(super) fn new(table: &Table, rule: &GroupRule, is_copy: impl Fn(usize) -> bool) -> Self {
+    /// Groups the rows. Rows that cannot be asked count as members, so that incomplete groups are detected. Rotated copies of a question
+    /// do not count.
+    pub(super) fn new(
+        table: &Table,
+        rule: &GroupRule,
+        is_rotation: impl Fn(usize) -> bool,
+    ) -> Self {
         let mut groups = Self {
             rule: rule.text.clone(),
             ..Self::default()
         };
-        for (at, row) in table.rows.iter().enumerate() {
+        for (index, row) in table.rows.iter().enumerate() {
             let name = rule.name(row).filter(|name| !name.is_empty());
-            if let Some(name) = name.clone().filter(|_| !is_copy(at)) {
-                *groups.sizes.entry(name).or_default() += 1;
+            if let Some(name) = &name
+                && !is_rotation(index)
+            {
+                *groups.sizes.entry(name.clone()).or_default() += 1;
             }
             groups.names.push(name);
         }
         let Some(size) = &rule.size else {
             return groups;
         };
-        // A file of a run may hold a part of a group.
+        // A file of a run may have only some questions of a group.
         for (row, name) in table.rows.iter().zip(&groups.names) {
             let stated = size.text(row).and_then(|text| text.trim().parse().ok());
             if let (Some(name), Some(stated)) = (name, stated) {
@@ -183,7 +192,7 @@ impl Groups {
         groups
     }
 
-    /// The group of a row; `None` if it has none.
+    /// Group of a row; `None` if it has none.
     pub(super) fn group(&self, row: usize) -> Option<StrictGroup> {
         let name = self.names.get(row)?.clone()?;
         let size = self.sizes.get(&name).copied().unwrap_or(1);
@@ -191,7 +200,7 @@ impl Groups {
     }
 
     /// Describes the groups of these questions; `None` without groups.
-    pub(super) fn said(&self, questions: &[Question]) -> Option<String> {
+    pub(super) fn describe(&self, questions: &[Question]) -> Option<String> {
         if self.rule.is_empty() {
             return None;
         }
@@ -210,35 +219,41 @@ impl Groups {
             _ => String::new(),
         };
         let single = groups.keys().filter(|group| group.size == 1).count();
-        let across = groups.values().filter(|members| frames(members) > 1);
-        let parts = groups
+        let across_images = groups
+            .values()
+            .filter(|members| count_frames(members) > 1)
+            .count();
+        let incomplete = groups
             .iter()
-            .filter(|(group, members)| members.len() < group.size);
-        let without = questions.iter().filter(|question| question.group.is_none());
-        let facts = [
+            .filter(|(group, members)| members.len() < group.size)
+            .count();
+        let ungrouped = questions
+            .iter()
+            .filter(|question| question.group.is_none())
+            .count();
+        let facts: String = [
             (if sizes.len() > 1 { single } else { 0 }, "of one question"),
-            (across.count(), "about several images"),
+            (across_images, "about several images"),
             (
-                parts.count(),
+                incomplete,
                 "with questions that are left out, never complete",
             ),
             (
                 self.sizes.len().saturating_sub(groups.len()),
                 "more of which every question is left out",
             ),
-        ];
-        let facts = facts
-            .into_iter()
-            .filter(|(number, _)| *number > 0)
-            .map(|(number, what)| format!(", {number} {what}"));
-        let without = match without.count() {
+        ]
+        .into_iter()
+        .filter(|(number, _)| *number > 0)
+        .map(|(number, what)| format!(", {number} {what}"))
+        .collect();
+        let without = match ungrouped {
             0 => String::new(),
             number => format!(
                 "; {} without a group",
                 count(number, "question", "questions")
             ),
         };
-        let facts: String = facts.collect();
         Some(format!(
             "group = {}: {number}{of}{facts}{without}",
             self.rule
@@ -246,8 +261,8 @@ impl Groups {
     }
 }
 
-/// The number of frames that questions are about.
-fn frames(questions: &[&Question]) -> usize {
+/// Number of different frames that questions are about.
+fn count_frames(questions: &[&Question]) -> usize {
     questions
         .iter()
         .map(|question| &question.frame)

@@ -1,10 +1,10 @@
 //! Conversion of a data set's rows to questions, without their correct answers: [`items`].
 
-use super::cells::{Cell, Row, Table, Turns, list};
-use super::choices::{AllOffered, Lettered, Offered, Options, in_question};
-use super::columns::map::flag;
-use super::columns::names::{Role, without_endings};
-use super::columns::{Asked, Column, InQuestion, Roles};
+use super::cells::{Cell, ConversationPaths, Row, Table, parse_list};
+use super::choices::{LetteredOptions, OptionInterner, OptionList, Options, find_in_question};
+use super::columns::map::map_flag;
+use super::columns::names::{Role, split_instructions};
+use super::columns::{Column, OptionsInQuestion, QuestionSource, Roles};
 use super::omissions::{OmissionReason, Omissions};
 use super::pictures::{ImageForm, ImageMarks};
 use super::settings::{SetArgs, SeveralImages};
@@ -25,7 +25,7 @@ pub(super) struct Item {
     /// The question with its options, if they were found in its text.
     pub(super) whole: Option<String>,
     /// The options; `None` if neither a column nor the question has options.
-    pub(super) options: Option<Arc<Offered>>,
+    pub(super) options: Option<Arc<OptionList>>,
 }
 
 impl Item {
@@ -53,7 +53,7 @@ impl InstructionCutter<'_> {
         let Some(counts) = &mut self.0 else {
             return text.to_owned();
         };
-        let (rest, instructions) = without_endings(text);
+        let (rest, instructions) = split_instructions(text);
         for instruction in instructions {
             *counts.entry(instruction).or_default() += 1;
         }
@@ -61,29 +61,29 @@ impl InstructionCutter<'_> {
     }
 }
 
-/// Converts the rows to questions. Counts rows without a usable question in `left_out` and the instructions cut in `cut`.
+/// Converts the rows to questions. Counts rows without a usable question in `omissions` and the instructions cut in `cut`.
 ///
 /// # Errors
 /// If two columns have different options. The message contains the row and the two flags to choose from.
 pub(super) fn items(
     table: &Table,
     roles: &Roles,
-    kind: ImageForm,
+    form: ImageForm,
     args: &SetArgs,
-    left_out: &mut Omissions,
+    omissions: &mut Omissions,
     cut: &mut InstructionCounts,
 ) -> Result<Vec<Item>, String> {
     let mut cutter = InstructionCutter((!args.keep_instructions).then_some(cut));
-    let (mut items, mut offered) = (Vec::new(), AllOffered::default());
+    let (mut items, mut interner) = (Vec::new(), OptionInterner::default());
     for (index, row) in table.rows.iter().enumerate() {
-        let image_count = kind.in_row(row, roles).len();
-        let why = match (image_count, args.multi_image) {
+        let image_count = form.in_row(row, roles).len();
+        let reason = match (image_count, args.multi_image) {
             (0, _) => Some(OmissionReason::NoImage),
             (1, _) | (_, Some(SeveralImages::Send)) => None,
             (_, Some(SeveralImages::Skip) | None) => Some(OmissionReason::SeveralImages),
         };
-        if let Some(why) = why {
-            left_out.add(why, || format!("{image_count} images"));
+        if let Some(reason) = reason {
+            omissions.add(reason, || format!("{image_count} images"));
             continue;
         }
         match question_parts(row, roles, ImageMarks::new(image_count), &mut cutter) {
@@ -95,10 +95,10 @@ pub(super) fn items(
                 row: index,
                 text,
                 whole,
-                options: options.map(|options| offered.once(options)),
+                options: options.map(|options| interner.intern(options)),
             }),
             Err(PartsError::Row(problem)) => {
-                left_out.add(OmissionReason::Bad, || {
+                omissions.add(OmissionReason::Bad, || {
                     format!("{}: {problem}", table.place(index))
                 });
             }
@@ -114,7 +114,7 @@ pub(super) fn items(
 struct QuestionParts {
     text: String,
     whole: Option<String>,
-    options: Option<Offered>,
+    options: Option<OptionList>,
 }
 
 /// Error message for a row without [`QuestionParts`].
@@ -143,23 +143,25 @@ fn question_parts(
                 .map_err(PartsError::Row)?;
             (cutter.cut(&text), None, Some(options))
         }
-        Options::None if roles.in_question == InQuestion::None => (cutter.cut(&text), None, None),
+        Options::None if roles.in_question == OptionsInQuestion::None => {
+            (cutter.cut(&text), None, None)
+        }
         Options::None => {
             let text = cutter.cut(&text);
-            match in_question(&text) {
-                Lettered::Found { question, options } => {
-                    let options = Offered::lettered(&options);
+            match find_in_question(&text) {
+                LetteredOptions::Found { question, options } => {
+                    let options = OptionList::from_question(&options);
                     (cutter.cut(&question), Some(text), Some(options))
                 }
-                Lettered::None => (text, None, None),
-                Lettered::Unclear(problem) => return Err(PartsError::Row(problem)),
+                LetteredOptions::None => (text, None, None),
+                LetteredOptions::Unclear(problem) => return Err(PartsError::Row(problem)),
             }
         }
         Options::Differ([one, other]) => {
             return Err(PartsError::Set(format!(
                 "the options of {one:?} and {other:?} differ; {} or {} says which are meant",
-                flag(Role::Options, &one, None),
-                flag(Role::Options, &other, None)
+                map_flag(Role::Options, &one, None),
+                map_flag(Role::Options, &other, None)
             )));
         }
         Options::Unread(problem) => return Err(PartsError::Row(problem)),
@@ -201,8 +203,8 @@ fn hint_and_question(
     marks: &mut ImageMarks,
 ) -> Result<[String; 2], String> {
     let text = match &roles.question {
-        Asked::InImage => Asked::IN_IMAGE.to_owned(),
-        Asked::Column(column) => {
+        QuestionSource::Image => QuestionSource::IN_IMAGE_TEXT.to_owned(),
+        QuestionSource::Column(column) => {
             // A text with a JSON list or object, such as a conversation, is not a question.
             column
                 .text(row)
@@ -226,16 +228,16 @@ fn no_question_text(column: &Column, row: &Row) -> String {
         return format!("the question is empty (column {name:?})");
     }
     let conversation_hint =
-        Turns::from_cell(&column.name, cell).map_or_else(String::new, |turns| {
+        ConversationPaths::from_cell(&column.name, cell).map_or_else(String::new, |paths| {
             format!(
                 "; {} reads its text",
-                flag(Role::Question, &turns.question, None)
+                map_flag(Role::Question, &paths.question, None)
             )
         });
     let kind = cell.parsed().map_or(cell.kind(), |parsed| parsed.kind());
     format!(
         "the column {name:?} of the question holds a {kind}, not a text: {}{conversation_hint}",
-        cell.shown(60)
+        cell.excerpt(60)
     )
 }
 
@@ -254,13 +256,13 @@ impl AnswerCell {
         let cell = column.cell(row);
         let items = match cell {
             Cell::List(cells) => cells.iter().map(Cell::text).collect(),
-            Cell::Text(text) => list(text),
+            Cell::Text(text) => parse_list(text),
             _ => None,
         };
         match (items.as_deref(), cell.text()) {
             (Some([only]), _) => Self::One(only.clone()),
             (Some([]), _) | (None, None) => Self::Absent,
-            (Some(_), _) => Self::Several(cell.shown(60)),
+            (Some(_), _) => Self::Several(cell.excerpt(60)),
             (None, Some(text)) if text.trim().eq_ignore_ascii_case("nan") => Self::Absent,
             (None, Some(text)) => Self::One(text.trim().to_owned()),
         }

@@ -1,14 +1,14 @@
-//! Ready-made sets of multiple-choice questions about images, in any of the forms in which they are published.
+//! Reader of published sets of multiple-choice questions about images.
 //!
-//! 1. The files are found and opened (`container/`): TSV, CSV, JSON, JSON lines and Parquet; alone, in shards, or in a folder with or
-//!    without the card of a hub.
-//! 2. The columns are told by their names, or by the user (`columns/`).
-//! 3. Each row (`cells/`) has its images (`pictures/`), its text and its options (`items.rs`, `choices/`).
-//! 4. The answers of all rows are read in one way (`choices/`). Where two ways fit and differ, nothing is guessed.
-//! 5. Rows that cannot be asked stop the reading, unless the user leaves them out (`omissions/`).
-//! 6. Questions get ids and frames (`pictures/`), and the inferred mapping is printed (`summary.rs`).
+//! 1. Find and open the files (`container/`): TSV, CSV, JSON, JSON lines and Parquet; a single file, shards, or a folder with or
+//!    without the dataset card of a hub.
+//! 2. Assign roles to the columns, by their names or by `--map` (`columns/`).
+//! 3. Find the images (`pictures/`), text and options (`items.rs`, `choices/`) of each row (`cells/`).
+//! 4. Choose one format for the answers of all rows (`choices/`). If two formats fit and disagree, stop instead of guessing.
+//! 5. Stop at rows that cannot be asked, unless the user leaves them out (`omissions/`).
+//! 6. Give ids and frames to the questions (`pictures/`), and print the inferred mapping (`summary.rs`).
 //!
-//! No code is for one set alone; what well-known sets need beyond these rules stands in `sets.toml`.
+//! The code is not specific to any set; further rules for well-known sets are presets in `sets.toml`.
 
 mod cells;
 mod choices;
@@ -27,14 +27,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::family::{checked, other};
+use super::family::{check_family, unnamed};
 use super::image_source::ImageSource;
 use super::root::Root;
 use crate::error::{Error, Result};
 use crate::types::{Family, FrameId, Question};
 
 pub(super) use choices::one_line;
-pub(super) use container::{Archive, holds_files};
+pub(super) use container::{Archive, is_set_folder};
 pub(crate) use omissions::SkipBad;
 pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
@@ -42,35 +42,34 @@ pub use settings::SetArgs;
 pub(super) use summary::LEFT_OUT;
 
 use cells::Table;
-use choices::{Answered, is_own, truths};
-use columns::map::{CellFormat, Map};
+use choices::{ParsedQuestion, find_truths, is_native_format};
+use columns::map::{CellFormat, ColumnMap};
 use columns::names::Role;
-use columns::{FamilyOf, Roles};
+use columns::{FamilySource, Roles};
 use container::{FoundFiles, Joined, SetFile};
 use folder_info::FolderInfo;
 use groups::{GroupRule, Groups};
 use items::{InstructionCounts, items};
-use omissions::{OmissionReason, Omissions, leave_out};
+use omissions::{OmissionReason, Omissions, omit_contradictions};
 use pictures::{Frames, Ids, ImageForm, Scenes};
 use summary::Summary;
 
-/// The set at a place: a file, a pattern of files, a folder, or several files.
+/// Opens a set: a file, a pattern of files, a folder, or several files. `stem` is its name unless `dataset.json` has one.
 ///
 /// # Errors
-/// If it cannot be read without guessing. The error shows the columns, the inferred mapping, and a flag that repairs it.
+/// If the set cannot be read without guessing. The error shows the columns, the inferred mapping, and a flag to fix it.
 pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<ReadySet> {
     let place = places.first().map_or(Path::new(""), PathBuf::as_path);
-    let preset = preset::named(args.preset.as_deref());
-    let args = &preset.map_or_else(|| args.clone(), |preset| preset.beneath(args));
-    let found = container::find(places, args)?;
+    let preset = args.preset.as_deref().and_then(preset::find);
+    let args = &preset.map_or_else(|| args.clone(), |preset| preset.complete(args));
     let FoundFiles {
         files,
         folder,
         further: allowed,
         archive,
-        notes,
+        mut notes,
         joined,
-    } = found;
+    } = container::find_files(places, args)?;
     let info = match &archive {
         Some(archive) => FolderInfo::in_archive(archive)?,
         None => FolderInfo::in_folder(&folder)?,
@@ -79,19 +78,24 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     further.extend(allowed);
     let root = Root::new(&folder, &further)?;
     let files: Vec<Arc<SetFile>> = files.into_iter().map(Arc::new).collect();
-    let mut table = rows(&files, joined, args)?;
+    let mut table = read_files(&files, joined, args)?;
     table.parse_cells(info.map.iter().chain(&args.map));
-    let (group, no_group) = preset.map_or((None, None), |preset| preset.group(&table));
-    let frame = frame_map(&table).filter(|_| is_own(&table) && table.find("image").is_none());
-    let map = Map::joined(frame.iter().chain(&group).chain(&info.map).chain(&args.map));
-    let wrong = |table: &Table, problem: String| {
-        let hint = preset::recognised(&table.columns, args.preset.as_deref());
-        let hint = hint.map_or_else(String::new, |hint| format!("\n {hint}"));
-        Error::data(place.display(), format_args!("{problem}{hint}"))
+    let hint = match args.preset {
+        Some(_) => None,
+        None => preset::recognition_hint(&table.columns),
     };
-    let (roles, set) = read(&table, &map, args, preset, ImageForm::Files)
-        .map_err(|problem| wrong(&table, problem))?;
-    table.forget(&roles.read_once());
+    let (group, missing_group) = preset.map_or((None, None), |preset| preset.group(&table));
+    let frame =
+        frame_map(&table).filter(|_| is_native_format(&table) && table.find("image").is_none());
+    let map = ColumnMap::merge(frame.iter().chain(&group).chain(&info.map).chain(&args.map));
+    let (roles, set) =
+        parse_rows(&table, &map, args, preset, ImageForm::Files).map_err(|problem| {
+            let hint = hint
+                .as_ref()
+                .map_or_else(String::new, |hint| format!("\n {hint}"));
+            Error::data(place.display(), format_args!("{problem}{hint}"))
+        })?;
+    table.clear_columns(&roles.columns_to_clear());
     let name = match &*info.name {
         "" => stem.to_owned(),
         name => name.to_owned(),
@@ -105,12 +109,10 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         ImageForm::Files,
         args.multi_image,
     );
-    let mut notes = notes;
-    notes.append(&mut table.notes.clone());
+    notes.extend_from_slice(&table.notes);
     notes.extend(preset.map(preset::Preset::source));
-    notes.extend(no_group.filter(|_| map.entry(Role::Group).is_none()));
-    let hint = preset::recognised(&table.columns, args.preset.as_deref());
-    let opened = Opened {
+    notes.extend(missing_group.filter(|_| map.entry(Role::Group).is_none()));
+    let context = SetContext {
         place,
         name: &name,
         table: &table,
@@ -118,29 +120,29 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         args,
     };
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
-    let asked = finish(&opened, set, (frames, scenes), notes, hint)?;
+    let contents = assemble(&context, set, frames, scenes, notes, hint)?;
     Ok(ReadySet {
-        rows: asked.rows,
-        reading: asked.reading,
-        form: if is_own(&table) {
-            Form::Own
+        rows: contents.rows,
+        summary: contents.summary,
+        format: if is_native_format(&table) {
+            SetFormat::Native
         } else {
-            Form::Foreign
+            SetFormat::Foreign
         },
         title: info.name,
         name,
-        sources: asked.sources,
-        series: asked.series,
-        scenes: asked.scenes,
-        questions: asked.questions,
+        sources: contents.sources,
+        series: contents.series,
+        scenes: contents.scenes,
+        questions: contents.questions,
     })
 }
 
-/// The rows of all files.
+/// Reads the rows of all files.
 ///
 /// # Errors
-/// If a file cannot be read, or files of one table differ in their columns.
-fn rows(files: &[Arc<SetFile>], joined: Joined, args: &SetArgs) -> Result<Table> {
+/// If a file cannot be read, or files of one table have different columns.
+fn read_files(files: &[Arc<SetFile>], joined: Joined, args: &SetArgs) -> Result<Table> {
     let mut table = Table::default();
     let mut header: Option<BTreeSet<String>> = None;
     for file in files {
@@ -166,70 +168,69 @@ fn rows(files: &[Arc<SetFile>], joined: Joined, args: &SetArgs) -> Result<Table>
     Ok(table)
 }
 
-/// A set that was read.
+/// A ready-made set.
 pub(super) struct ReadySet {
-    /// The name in `dataset.json`, else that of the file or folder.
+    /// Name in `dataset.json`, else of the file or folder.
     pub(super) name: String,
-    /// The name in `dataset.json`; empty if there is none.
+    /// Name in `dataset.json`; empty if there is none.
     pub(super) title: String,
     pub(super) sources: BTreeMap<FrameId, ImageSource>,
-    /// The images of each question that shows several, by the name of its frame.
+    /// Images of each question with several, by the name that stands for all of them.
     pub(super) series: Series,
     pub(super) scenes: SceneNames,
     pub(super) questions: Vec<Question>,
-    /// The inferred column mapping, one line per column.
-    pub(super) reading: Vec<String>,
-    pub(super) form: Form,
+    /// How the set was read, one fact per line.
+    pub(super) summary: Vec<String>,
+    pub(super) format: SetFormat,
     pub(super) rows: RowCounts,
 }
 
-/// The numbers of rows of a set.
+/// Numbers of rows of a set.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct RowCounts {
     pub(super) all: usize,
-    /// Broken rows, which are left out.
+    /// Broken rows that were left out.
     pub(super) bad: usize,
 }
 
-/// Whose form a set has.
+/// Origin of the column layout of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
-    /// This program's, in which nothing has to be found out.
-    Own,
-    /// Another tool's file.
+pub(super) enum SetFormat {
+    /// This program's own layout. Nothing is inferred.
+    Native,
+    /// Layout of another tool, with inferred columns.
     Foreign,
 }
 
-/// The questions of a file about frames of other data.
-pub(super) struct ReadQuestions {
+/// Questions of a file about frames of other data.
+pub(super) struct FileQuestions {
     pub(super) questions: Vec<Question>,
-    /// The scenes that the file gives to the frames.
+    /// Scenes that the file assigns to the frames.
     pub(super) scenes: SceneNames,
-    /// The inferred column mapping, one line per column.
-    pub(super) reading: Vec<String>,
-    pub(super) form: Form,
+    /// How the file was read, one fact per line.
+    pub(super) summary: Vec<String>,
+    pub(super) format: SetFormat,
     pub(super) rows: RowCounts,
 }
 
 /// Maps the column `frame` to the image, if it exists.
-fn frame_map(table: &Table) -> Option<Map> {
-    let frame = table.find("frame");
-    frame.and_then(|_| "image=frame".parse().ok())
+fn frame_map(table: &Table) -> Option<ColumnMap> {
+    table.find("frame").and_then(|_| "image=frame".parse().ok())
 }
 
-/// The questions of a file about frames of other data.
+/// Reads a file of questions about frames of other data.
 ///
 /// # Errors
 /// As [`open`].
-pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions> {
+pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<FileQuestions> {
     let mut table = Table::default();
     SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
-    let own = frame_map(&table);
+    let frame = frame_map(&table);
     let folder = file.parent().unwrap_or(Path::new(""));
     let info = FolderInfo::in_folder(folder)?;
     table.parse_cells(info.map.iter().chain(&args.map));
-    let map = Map::joined(own.iter().chain(&info.map).chain(&args.map));
-    let (roles, set) = read(&table, &map, args, None, ImageForm::Frames)
+    let map = ColumnMap::merge(frame.iter().chain(&info.map).chain(&args.map));
+    let (roles, set) = parse_rows(&table, &map, args, None, ImageForm::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
     let root = Root::new(folder, &[])?;
     let frames = Frames::new(
@@ -242,7 +243,7 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
         args.multi_image,
     );
     let name = file.display().to_string();
-    let opened = Opened {
+    let context = SetContext {
         place: file,
         name: &name,
         table: &table,
@@ -251,35 +252,35 @@ pub(super) fn about_frames(file: &Path, args: &SetArgs) -> Result<ReadQuestions>
     };
     let notes = table.notes.clone();
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
-    let asked = finish(&opened, set, (frames, scenes), notes, None)?;
-    let mut reading = asked.reading;
-    let form = if is_own(&table) && info.map.is_none() {
-        reading.retain(|line| line.starts_with(LEFT_OUT));
-        Form::Own
+    let contents = assemble(&context, set, frames, scenes, notes, None)?;
+    let mut summary = contents.summary;
+    let format = if is_native_format(&table) && info.map.is_none() {
+        summary.retain(|line| line.starts_with(LEFT_OUT));
+        SetFormat::Native
     } else {
-        Form::Foreign
+        SetFormat::Foreign
     };
-    Ok(ReadQuestions {
-        questions: asked.questions,
-        scenes: asked.scenes,
-        reading,
-        form,
-        rows: asked.rows,
+    Ok(FileQuestions {
+        questions: contents.questions,
+        scenes: contents.scenes,
+        summary,
+        format,
+        rows: contents.rows,
     })
 }
 
-/// The questions of a set, the sources of their frames, and the inferred mapping.
-struct Finished {
+/// Questions of a set, the sources of their frames, and how they were read.
+struct SetContents {
     questions: Vec<Question>,
     sources: BTreeMap<FrameId, ImageSource>,
     series: Series,
     scenes: SceneNames,
-    reading: Vec<String>,
+    summary: Vec<String>,
     rows: RowCounts,
 }
 
-/// A set that is being read.
-struct Opened<'a> {
+/// Table of a set, its columns and the settings to read it.
+struct SetContext<'a> {
     place: &'a Path,
     name: &'a str,
     table: &'a Table,
@@ -287,163 +288,189 @@ struct Opened<'a> {
     args: &'a SetArgs,
 }
 
-/// Step 6. `notes` stand before the note about ids, and `hint` behind it.
-fn finish(
-    opened: &Opened<'_>,
-    mut set: ReadSet,
-    (mut frames, mut scenes): (Frames<'_>, Scenes<'_>),
+/// Gives ids, frames and scenes to the questions, and summarizes the set (step 6). The summary lists `notes` before the note about ids,
+/// and `hint` after it.
+fn assemble(
+    context: &SetContext<'_>,
+    mut set: ParsedSet,
+    mut frames: Frames<'_>,
+    mut scenes: Scenes<'_>,
     mut notes: Vec<String>,
     hint: Option<String>,
-) -> Result<Finished> {
-    leave_out_unusable(opened, &mut set, &frames)?;
-    let mut ids = frames.ids(&set.answered).map_err(with_skip)?;
-    if !ids.contradictory().is_empty() {
-        let pairs = ids.contradictory();
-        leave_out(
-            opened.table,
-            opened.args,
-            &mut set.answered,
-            &mut set.left,
-            pairs,
+) -> Result<SetContents> {
+    omit_unusable_images(context, &mut set, &frames)?;
+    let mut ids = frames.ids(&set.questions).map_err(with_skip_hint)?;
+    if !ids.contradictions().is_empty() {
+        omit_contradictions(
+            context.table,
+            context.args,
+            &mut set.questions,
+            &mut set.omissions,
+            ids.contradictions(),
         )
-        .map_err(|problem| Error::data(opened.place.display(), problem))?;
-        ids = frames.ids(&set.answered).map_err(with_skip)?;
+        .map_err(|problem| Error::data(context.place.display(), problem))?;
+        ids = frames.ids(&set.questions).map_err(with_skip_hint)?;
     }
-    let family = FamilyOf::from_table(opened.table, &opened.roles.families, &set.answered);
-    let groups = (&family, &set.groups);
-    let questions = questions(
-        opened,
-        groups,
-        set.answered,
+    let families = FamilySource::choose(context.table, &context.roles.families, &set.questions);
+    let questions = build_questions(
+        context,
+        &families,
+        &set.groups,
+        set.questions,
         &ids,
-        (&mut frames, &mut scenes),
+        &mut frames,
+        &mut scenes,
     )?;
     let (sources, series) = frames.take_sources();
     notes.extend(scenes.note());
     notes.extend(ids.note());
     notes.extend(hint);
     let summary = Summary {
-        name: opened.name,
-        table: opened.table,
-        roles: opened.roles,
-        family: &family,
-        answers: &set.said,
-        ids: ids.name(),
-        cut: &set.cut,
-        left: &set.left,
-        groups: set.groups.said(&questions),
+        name: context.name,
+        table: context.table,
+        roles: context.roles,
+        families: &families,
+        answers: &set.answer_columns,
+        ids: ids.source(),
+        cut_instructions: &set.cut_instructions,
+        omissions: &set.omissions,
+        groups: set.groups.describe(&questions),
         sources: &sources,
         series: &series,
         questions: &questions,
         notes,
-    };
-    let reading = summary.lines();
+    }
+    .lines();
     let rows = RowCounts {
-        all: opened.table.rows.len(),
-        bad: set.left.bad().map_or(0, |(count, _)| count),
+        all: context.table.rows.len(),
+        bad: set.omissions.bad().map_or(0, |(count, _)| count),
     };
-    Ok(Finished {
+    Ok(SetContents {
         rows,
         questions,
         sources,
         series,
         scenes: scenes.take(),
-        reading,
+        summary,
     })
 }
 
-/// Leaves out the rows with an image that is not there or is none, with `--skip bad`; without it such an image is named when it is read.
-/// Images that are there and cannot be decoded are left out later ([`Dataset::without`](crate::dataset::Dataset::without)).
-fn leave_out_unusable(opened: &Opened<'_>, set: &mut ReadSet, frames: &Frames<'_>) -> Result<()> {
-    if opened.args.bad.is_none() {
+/// With `--skip bad`, leaves out rows whose image is missing or is not an image. Without it, such an image is an error when it is read.
+/// Images that cannot be decoded are left out later
+/// ([`Dataset::without_unusable`](crate::dataset::Dataset::without_unusable)).
+fn omit_unusable_images(
+    context: &SetContext<'_>,
+    set: &mut ParsedSet,
+    frames: &Frames<'_>,
+) -> Result<()> {
+    if context.args.bad.is_none() {
         return Ok(());
     }
-    let ReadSet { answered, left, .. } = set;
-    answered.retain(|question| match frames.problem(question.row) {
+    let ParsedSet {
+        questions,
+        omissions,
+        ..
+    } = set;
+    questions.retain(|question| match frames.problem(question.row) {
         None => true,
         Some(problem) => {
-            left.add(OmissionReason::Bad, || problem.to_string());
+            omissions.add(OmissionReason::Bad, || problem.to_string());
             false
         }
     });
-    let checked = left.check(opened.table.rows.len(), opened.args);
-    checked.map_err(|problem| Error::data(opened.place.display(), problem))
+    omissions
+        .check(context.table.rows.len(), context.args)
+        .map_err(|problem| Error::data(context.place.display(), problem))
 }
 
-/// The rows of a set with their truths.
-struct ReadSet {
-    answered: Vec<Answered>,
-    said: Vec<String>,
-    cut: InstructionCounts,
-    left: Omissions,
+/// Questions of a set with their true options.
+struct ParsedSet {
+    questions: Vec<ParsedQuestion>,
+    /// Columns and formats of the answers, for the summary.
+    answer_columns: Vec<String>,
+    cut_instructions: InstructionCounts,
+    omissions: Omissions,
     groups: Groups,
 }
 
-/// Steps 2 to 5: from rows to questions with truths.
-fn read(
+/// Parses the rows to questions with their true options (steps 2 to 5).
+fn parse_rows(
     table: &Table,
-    map: &Map,
+    map: &ColumnMap,
     args: &SetArgs,
     preset: Option<&preset::Preset>,
-    kind: ImageForm,
-) -> Result<(Roles, ReadSet), String> {
+    form: ImageForm,
+) -> Result<(Roles, ParsedSet), String> {
     if table.rows.is_empty() {
         return Err("no questions in it".to_owned());
     }
     let roles = Roles::new(table, map)?;
     let rule = GroupRule::from_map(table, map)?;
-    let (mut left, mut cut) = (Omissions::default(), InstructionCounts::new());
-    let mut kept = items(table, &roles, kind, args, &mut left, &mut cut)?;
-    let is_copy = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
-    for item in kept.extract_if(.., |item| is_copy(item.row)) {
-        left.add(OmissionReason::Rotation, || table.place(item.row));
+    let (mut omissions, mut cut_instructions) = (Omissions::default(), InstructionCounts::new());
+    let mut items = items(
+        table,
+        &roles,
+        form,
+        args,
+        &mut omissions,
+        &mut cut_instructions,
+    )?;
+    let is_rotation = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
+    for item in items.extract_if(.., |item| is_rotation(item.row)) {
+        omissions.add(OmissionReason::Rotation, || table.place(item.row));
     }
-    if kept.is_empty() {
-        left.check(table.rows.len(), args)
-            .map_err(|problem| image_hint(table, &roles, problem))?;
+    if items.is_empty() {
+        omissions
+            .check(table.rows.len(), args)
+            .map_err(|problem| with_image_hint(table, &roles, problem))?;
         return Err("no row is left to ask".to_owned());
     }
-    let how = map
+    let format = map
         .entry(Role::Answer)
-        .map_or(&CellFormat::ByRule, |entry| &entry.how);
-    let truths = truths(table, &roles, how, kept, &mut left)?;
-    left.check(table.rows.len(), args)
-        .map_err(|problem| image_hint(table, &roles, problem))?;
-    if truths.answered.is_empty() {
+        .map_or(&CellFormat::Inferred, |entry| &entry.format);
+    let truths = find_truths(table, &roles, format, items, &mut omissions)?;
+    omissions
+        .check(table.rows.len(), args)
+        .map_err(|problem| with_image_hint(table, &roles, problem))?;
+    if truths.questions.is_empty() {
         return Err("no row is left to ask".to_owned());
     }
-    let set = ReadSet {
-        groups: rule.map_or_else(Groups::default, |rule| Groups::new(table, &rule, is_copy)),
-        answered: truths.answered,
-        said: truths.said,
-        cut,
-        left,
+    let set = ParsedSet {
+        groups: rule.map_or_else(Groups::default, |rule| {
+            Groups::new(table, &rule, is_rotation)
+        }),
+        questions: truths.questions,
+        answer_columns: truths.columns,
+        cut_instructions,
+        omissions,
     };
     Ok((roles, set))
 }
 
-/// Adds the columns and a `--map` for images to a problem, if no row has any.
-fn image_hint(table: &Table, roles: &Roles, problem: String) -> String {
-    let are_there = table
+/// Adds the columns and an example of `--map image=…` to a problem, if no row has an image.
+fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
+    let has_images = table
         .rows
         .iter()
         .any(|row| !pictures::images(row, roles).is_empty());
-    if are_there {
+    if has_images {
         return problem;
     }
-    let key = roles.ids.first().map(|column| column.name.as_str());
-    let key = key
+    let key = roles
+        .ids
+        .first()
+        .map(|column| column.name.as_str())
         .or(table.columns.first().map(String::as_str))
         .unwrap_or("id");
     format!(
         "{problem}\n its columns:\n{}\n if files hold the images, say how they are named, e.g. {}",
-        columns::shown(table),
-        columns::map::flag(Role::Image, &format!("images/{{{key}}}.jpg"), None)
+        columns::describe_columns(table),
+        columns::map::map_flag(Role::Image, &format!("images/{{{key}}}.jpg"), None)
     )
 }
 
-/// The error of an image that is not there, with the flag that leaves its row out.
-fn with_skip(error: Error) -> Error {
+/// Adds the flag that leaves the row out to the error for a missing image.
+fn with_skip_hint(error: Error) -> Error {
     const FLAG: &str = "--skip bad";
     match error {
         Error::Data { place, problem } if !problem.contains(FLAG) => Error::data(
@@ -454,30 +481,33 @@ fn with_skip(error: Error) -> Error {
     }
 }
 
-/// The questions. The sources of their frames are kept in `frames`, and their scenes in `scenes`.
-fn questions(
-    opened: &Opened<'_>,
-    (families, groups): (&FamilyOf, &Groups),
-    answered: Vec<Answered>,
+/// Builds the questions. Collects the sources of their frames in `frames` and their scenes in `scenes`.
+fn build_questions(
+    context: &SetContext<'_>,
+    families: &FamilySource,
+    groups: &Groups,
+    parsed: Vec<ParsedQuestion>,
     ids: &Ids,
-    (frames, scenes): (&mut Frames<'_>, &mut Scenes<'_>),
+    frames: &mut Frames<'_>,
+    scenes: &mut Scenes<'_>,
 ) -> Result<Vec<Question>> {
-    let (table, evidence) = (opened.table, opened.roles.evidence.as_ref());
-    let mut questions = Vec::with_capacity(answered.len());
-    for (at, answered) in answered.into_iter().enumerate() {
-        let row = answered.row;
-        let frame = frames.frame(&answered).map_err(with_skip)?;
+    let (table, evidence) = (context.table, context.roles.evidence.as_ref());
+    let mut questions = Vec::with_capacity(parsed.len());
+    for (index, question) in parsed.into_iter().enumerate() {
+        let row = question.row;
+        let frame = frames.frame(&question).map_err(with_skip_hint)?;
         scenes.add(table, row, &frame)?;
         let cells = &table.rows[row];
-        let family = families.text(table, cells);
-        let family = family.unwrap_or_else(|| other().name().to_owned());
-        let family = checked(Family::from(family.as_str())).map_err(|e| e.at(table.place(row)))?;
+        let family = match families.family(table, cells) {
+            Some(name) => Family::from(name.as_str()),
+            None => unnamed(),
+        };
         questions.push(Question {
-            id: ids.id(at),
+            id: ids.id(index),
             frame,
-            family,
-            text: answered.text,
-            choices: answered.choices,
+            family: check_family(family).map_err(|e| e.at(table.place(row)))?,
+            text: question.text,
+            choices: question.choices,
             group: groups.group(row),
             evidence: evidence.map_or(serde_json::Value::Null, |column| column.cell(cells).into()),
         });

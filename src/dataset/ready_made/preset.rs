@@ -6,24 +6,25 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::cells::Table;
-use super::columns::map::Map;
-use super::columns::names::plain;
-use super::groups::columns;
+use super::columns::map::ColumnMap;
+use super::columns::names::normalize;
+use super::groups::template_columns;
 use super::settings::{LeaveOut, SetArgs, SeveralImages};
 
-/// The file of presets.
+/// Presets in TOML.
 const SETS: &str = include_str!("sets.toml");
 
-/// The rules of one set.
+/// Rules to read a well-known set.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Preset {
     pub(super) title: String,
     pub(super) cite: String,
+    /// Normalized names of columns by which the set is recognized; empty if it is not.
     recognise: Vec<String>,
     map: Option<String>,
     config: Option<String>,
-    /// Templates of groups, of which the first whose columns are there counts.
+    /// Templates of groups. The first one whose columns exist is used.
     #[serde(default)]
     group: Vec<String>,
     #[serde(default)]
@@ -31,7 +32,7 @@ pub(super) struct Preset {
     rotations: Option<Rotations>,
 }
 
-/// A kind of rows that is left out.
+/// Kind of rows to leave out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Skip {
@@ -41,43 +42,39 @@ enum Skip {
     Several,
 }
 
-/// Rows that repeat a question with its options in another order.
+/// Column that marks copies of a question with its options in another order: its number is above `above`.
 #[derive(Debug, Deserialize)]
 struct Rotations {
     column: String,
     above: u64,
 }
 
-/// The presets by name. A test holds that the file can be read.
+/// Presets by name. A test checks that the file can be parsed.
 static PRESETS: LazyLock<BTreeMap<String, Preset>> =
     LazyLock::new(|| toml::from_str(SETS).unwrap_or_default());
 
-/// Whether there are rules for a set of this name.
+/// True if a preset has this name.
 pub(in crate::dataset) fn is_known(name: &str) -> bool {
     PRESETS.contains_key(name)
 }
 
-/// The names of all presets.
+/// Names of all presets.
 pub(in crate::dataset) fn names() -> Vec<&'static str> {
     PRESETS.keys().map(String::as_str).collect()
 }
 
-/// The preset of a name; `None` without one.
-pub(super) fn named(name: Option<&str>) -> Option<&'static Preset> {
-    PRESETS.get(name?)
+/// The preset with this name.
+pub(super) fn find(name: &str) -> Option<&'static Preset> {
+    PRESETS.get(name)
 }
 
-/// The sentence for a set whose columns are those of a preset that was not named.
-pub(super) fn recognised(columns: &[String], named: Option<&str>) -> Option<String> {
-    if named.is_some() {
-        return None;
-    }
-    let columns: Vec<String> = columns.iter().map(|column| plain(column)).collect();
-    let mut presets = PRESETS
-        .iter()
-        .filter(|(_, preset)| !preset.recognise.is_empty());
-    let (name, preset) =
-        presets.find(|(_, preset)| preset.recognise.iter().all(|name| columns.contains(name)))?;
+/// Suggests the preset of a set that has these columns; `None` if no preset has them.
+pub(super) fn recognition_hint(columns: &[String]) -> Option<String> {
+    let columns: Vec<String> = columns.iter().map(|column| normalize(column)).collect();
+    let (name, preset) = PRESETS.iter().find(|(_, preset)| {
+        let names = &preset.recognise;
+        !names.is_empty() && names.iter().all(|name| columns.contains(name))
+    })?;
     Some(format!(
         "it looks like {}: --data {name}:FILE reads it by its rules",
         preset.title
@@ -85,59 +82,61 @@ pub(super) fn recognised(columns: &[String], named: Option<&str>) -> Option<Stri
 }
 
 impl Preset {
-    /// The set and its paper, for messages.
+    /// Title and paper of the set, for messages.
     pub(super) fn source(&self) -> String {
         format!("read by the rules of {}: {}", self.title, self.cite)
     }
 
-    /// The flags of the user, with those of the preset where the user gives none.
-    pub(super) fn beneath(&self, args: &SetArgs) -> SetArgs {
+    /// Fills in the flags that the user does not give.
+    pub(super) fn complete(&self, args: &SetArgs) -> SetArgs {
         let mut args = args.clone();
-        let map = self.map.as_deref().and_then(|map| map.parse::<Map>().ok());
+        let map = self.map.as_deref().and_then(|map| map.parse().ok());
         args.map.splice(0..0, map);
         args.preset_config.clone_from(&self.config);
         let skip = |kind, flag: Option<LeaveOut>| {
             flag.or(self.skip.contains(&kind).then_some(LeaveOut::Skip))
         };
-        let skips_several = self.skip.contains(&Skip::MultiImage);
-        let several = skips_several.then_some(SeveralImages::Skip);
-        args.multi_image = args.multi_image.or(several);
+        if args.multi_image.is_none() && self.skip.contains(&Skip::MultiImage) {
+            args.multi_image = Some(SeveralImages::Skip);
+        }
         args.no_image = skip(Skip::NoImage, args.no_image);
         args.open = skip(Skip::Open, args.open);
         args.several = skip(Skip::Several, args.several);
         args
     }
 
-    /// The groups of the set's own strict score as a map, and what is said if its columns are not there.
-    pub(super) fn group(&self, table: &Table) -> (Option<Map>, Option<String>) {
-        let is_there = |template: &&String| {
-            columns(template)
-                .iter()
-                .all(|name| table.find(name).is_some())
-        };
-        let map = self.group.iter().find(is_there);
-        let map = map.and_then(|template| format!("group={template}").parse().ok());
-        let none = map.is_none() && !self.group.is_empty();
-        let said = none.then(|| {
+    /// Map of the groups for the strict score of the set, or a note if their columns do not exist.
+    pub(super) fn group(&self, table: &Table) -> (Option<ColumnMap>, Option<String>) {
+        let map: Option<ColumnMap> = self
+            .group
+            .iter()
+            .find(|template| {
+                template_columns(template)
+                    .iter()
+                    .all(|name| table.find(name).is_some())
+            })
+            .and_then(|template| format!("group={template}").parse().ok());
+        let is_missing = map.is_none() && !self.group.is_empty();
+        let note = is_missing.then(|| {
             format!(
                 "no groups: {} scores questions together by {}, which are not among its columns; --map group=COLUMN names another",
                 self.title,
                 self.group.join(" or ")
             )
         });
-        (map, said)
+        (map, note)
     }
 
-    /// Whether a row repeats a question with its options in another order.
+    /// True if a row is a copy of a question with its options in another order.
     pub(super) fn is_rotation(&self, table: &Table, row: usize) -> bool {
         let Some(rotations) = &self.rotations else {
             return false;
         };
-        let cell = table
+        table
             .find(&rotations.column)
-            .and_then(|column| table.rows[row].cell(column).text());
-        let number = cell.and_then(|text| text.trim().parse::<u64>().ok());
-        number.is_some_and(|number| number > rotations.above)
+            .and_then(|column| table.rows[row].cell(column).text())
+            .and_then(|text| text.trim().parse::<u64>().ok())
+            .is_some_and(|number| number > rotations.above)
     }
 }
 
@@ -146,7 +145,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_preset_can_be_used() {
+    fn presets_are_valid() {
         let presets: BTreeMap<String, Preset> = toml::from_str(SETS).unwrap();
         assert!(presets.len() >= 7);
         for (name, preset) in &presets {
@@ -158,42 +157,41 @@ mod tests {
                 preset
                     .map
                     .as_ref()
-                    .is_none_or(|map| map.parse::<Map>().is_ok()),
+                    .is_none_or(|map| map.parse::<ColumnMap>().is_ok()),
                 "{name}"
             );
             assert!(
                 preset
                     .recognise
                     .iter()
-                    .all(|column| plain(column) == *column),
+                    .all(|column| normalize(column) == *column),
                 "{name}"
             );
         }
     }
 
     #[test]
-    fn a_set_is_recognised_and_never_switched() {
+    fn set_is_recognized_by_its_columns() {
         let columns = ["Index", "Question", "Options", "Correct Answer"].map(str::to_owned);
         assert!(
-            recognised(&columns, None)
+            recognition_hint(&columns)
                 .unwrap()
                 .contains("--data mmvp:FILE")
         );
-        assert_eq!(recognised(&columns, Some("mmvp")), None);
-        assert_eq!(recognised(&columns[..3], None), None);
+        assert_eq!(recognition_hint(&columns[..3]), None);
         assert!(is_known("mmvp") && !is_known("mmbnech"));
         assert!(names().contains(&"mmbench"));
     }
 
     #[test]
-    fn the_user_wins_over_a_preset() {
-        let preset = named(Some("mmvp")).unwrap();
+    fn user_flags_take_precedence() {
+        let preset = find("mmvp").unwrap();
         let args = SetArgs {
             map: vec!["image=other/{Index}.png".parse().unwrap()],
             ..SetArgs::default()
         };
-        let both = preset.beneath(&args);
-        let joined = Map::joined(&both.map);
+        let both = preset.complete(&args);
+        let joined = ColumnMap::merge(&both.map);
         assert_eq!(joined.entries[0].columns, ["other/{Index}.png"]);
     }
 }

@@ -1,20 +1,20 @@
-//! The flags for ready-made sets: [`SetArgs`].
+//! Flags for ready-made sets: [`SetArgs`].
 
 use clap::{Args, ValueEnum};
 
-use super::columns::map::Map;
+use super::columns::map::ColumnMap;
 use super::omissions::SkipBad;
 use crate::dataset::root::RootArgs;
 use crate::types::Decides;
 
-/// The flags for how a ready-made set is read.
+/// Flags for reading a ready-made set.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Ready-made sets")]
 pub struct SetArgs {
     /// Which column of a ready-made set is which, as question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1;
     /// default: by their names
     #[arg(long, value_name = "ROLE=COLUMN,…", add = Decides::Reply)]
-    pub map: Vec<Map>,
+    pub map: Vec<ColumnMap>,
     /// The well-known set that `--data NAME:FILE` names.
     #[arg(skip)]
     pub preset: Option<String>,

@@ -1,75 +1,77 @@
-//! The inferred mapping of a set, for the user: [`Summary`].
+//! Summary of how a set was read, for the user: [`Summary`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::cells::Table;
-use super::columns::{Asked, FamilyOf, Images, Roles};
+use super::columns::{FamilySource, ImageColumns, QuestionSource, Roles};
 use super::items::InstructionCounts;
 use super::omissions::{OmissionReason, Omissions};
 use super::pictures::Series;
 use crate::dataset::image_source::ImageSource;
 use crate::types::{FrameId, Question};
 
-/// The facts of a set that was read, for messages and the manifest.
+/// Facts about a set, for messages and the manifest.
 pub(super) struct Summary<'a> {
     pub(super) name: &'a str,
     pub(super) table: &'a Table,
     pub(super) roles: &'a Roles,
-    pub(super) family: &'a FamilyOf,
+    pub(super) families: &'a FamilySource,
+    /// Columns and formats of the answers.
     pub(super) answers: &'a [String],
-    pub(super) ids: String,
-    pub(super) cut: &'a InstructionCounts,
-    pub(super) left: &'a Omissions,
-    /// A description of the groups of questions; `None` without groups.
+    /// Source of the ids.
+    pub(super) ids: &'a str,
+    pub(super) cut_instructions: &'a InstructionCounts,
+    pub(super) omissions: &'a Omissions,
+    /// Description of the groups of questions; `None` without groups.
     pub(super) groups: Option<String>,
-    /// The images of the set; none if the questions are about frames of other data.
+    /// Images of the set; empty if the questions are about frames of other data.
     pub(super) sources: &'a BTreeMap<FrameId, ImageSource>,
-    /// The images of questions that show several.
+    /// Images of each question with several.
     pub(super) series: &'a Series,
     pub(super) questions: &'a [Question],
-    /// Further facts, one a line.
+    /// Further facts, one per line.
     pub(super) notes: Vec<String>,
 }
 
-/// The start of a line about rows that are left out.
+/// Start of a line about rows that are left out.
 pub(in crate::dataset) const LEFT_OUT: &str = "left out: ";
 
-/// The number of families from which on tables are hard to read.
+/// Maximum number of families without a warning that tables are hard to read (chosen).
 const MANY_FAMILIES: usize = 60;
 
 impl Summary<'_> {
-    /// One fact a line.
+    /// The facts, one per line.
     pub(super) fn lines(&self) -> Vec<String> {
         let families: BTreeSet<&str> = self
             .questions
             .iter()
             .map(|question| question.family.name())
             .collect();
-        let by = self.family.said();
         let mut lines = vec![
             format!(
-                "{}: {} on {} in {} ({by})",
+                "{}: {} on {} in {} ({})",
                 self.name,
                 count(self.questions.len(), "question", "questions"),
                 count(self.images(), "image", "images"),
-                count(families.len(), "family", "families")
+                count(families.len(), "family", "families"),
+                self.families.description()
             ),
             self.columns(),
         ];
-        lines.extend(self.several());
+        lines.extend(self.multi_image_questions());
         lines.extend(self.groups.clone());
-        for (why, number) in self.left.counts() {
-            let first = match (why, self.left.bad()) {
+        for (reason, number) in self.omissions.counts() {
+            let first = match (reason, self.omissions.bad()) {
                 (OmissionReason::Bad, Some((_, first))) => format!("; the first: {first}"),
                 _ => String::new(),
             };
             lines.push(format!(
                 "{LEFT_OUT}{number} of {} rows ({}){first}",
                 self.table.rows.len(),
-                why.name()
+                reason.name()
             ));
         }
-        for (ending, number) in self.cut {
+        for (ending, number) in self.cut_instructions {
             lines.push(format!("cut from the question: {ending:?} {number} times"));
         }
         if families.len() > MANY_FAMILIES {
@@ -82,16 +84,21 @@ impl Summary<'_> {
         lines
     }
 
+    /// Number of images.
     fn images(&self) -> usize {
-        if self.sources.is_empty() {
-            let frames = self.questions.iter().map(|question| &question.frame);
-            return frames.collect::<BTreeSet<_>>().len();
+        if !self.sources.is_empty() {
+            return self.sources.len();
         }
-        self.sources.len()
+        let frames: BTreeSet<_> = self
+            .questions
+            .iter()
+            .map(|question| &question.frame)
+            .collect();
+        frames.len()
     }
 
-    /// How many questions show several images; `None` if all show one.
-    fn several(&self) -> Option<String> {
+    /// Number of questions with several images, and of their images; `None` if all questions have one image.
+    fn multi_image_questions(&self) -> Option<String> {
         let counts: Vec<usize> = self
             .questions
             .iter()
@@ -112,29 +119,36 @@ impl Summary<'_> {
         ))
     }
 
-    /// Which column was taken for what.
+    /// Column of each role.
     fn columns(&self) -> String {
         let roles = self.roles;
         let image = match &roles.images {
-            Images::First(columns) => columns
+            ImageColumns::First(columns) => columns
                 .first()
                 .map_or("none", |column| &column.name)
                 .to_owned(),
-            Images::All(columns) => {
+            ImageColumns::All(columns) => {
                 let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
                 names.join(", ")
             }
-            Images::Template(template) => template.text().to_owned(),
+            ImageColumns::Template(template) => template.text().to_owned(),
         };
         let mut parts = vec![
             match roles.question.column() {
                 Some(column) => format!("question = {}", column.name),
-                None => format!("question = in the image (asked as {:?})", Asked::IN_IMAGE),
+                None => format!(
+                    "question = in the image (asked as {:?})",
+                    QuestionSource::IN_IMAGE_TEXT
+                ),
             },
             format!("image = {image} ({})", self.formats()),
         ];
-        let cells: Vec<&str> = roles.cells.iter().map(|cell| cell.name.as_str()).collect();
-        match (&*cells, &*roles.options) {
+        let cells: Vec<&str> = roles
+            .option_cells
+            .iter()
+            .map(|column| column.name.as_str())
+            .collect();
+        match (&*cells, &*roles.option_lists) {
             ([], []) => {}
             ([], [column, ..]) => parts.push(format!("options = {}", column.name)),
             (cells, _) => parts.push(format!("options = {}", cells.join(" "))),
@@ -147,7 +161,7 @@ impl Summary<'_> {
         parts.join(", ")
     }
 
-    /// How many images are of which format, as `PNG 3, files 2`.
+    /// Number of images by format, such as `PNG 3, files 2`.
     fn formats(&self) -> String {
         if self.sources.is_empty() {
             return "names of frames".to_owned();
@@ -168,7 +182,7 @@ impl Summary<'_> {
     }
 }
 
-/// A number with its noun.
+/// A number with its noun in the singular or plural.
 pub(super) fn count(number: usize, one: &str, many: &str) -> String {
     format!("{number} {}", if number == 1 { one } else { many })
 }

@@ -170,7 +170,7 @@ impl Source {
     pub(crate) fn from_questions(dataset: &Dataset, name: &FrameId) -> Result<Self> {
         let mut frames: Vec<SourceFrame> = Vec::new();
         let mut order = Vec::new();
-        for id in dataset.shown(name) {
+        for id in dataset.shown_frames(name) {
             let known = frames.iter().position(|frame| frame.id == *id);
             if known.is_none() {
                 frames.push(SourceFrame::inspect(dataset, id)?);

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::dataset::Picture;
-use crate::dataset::openeqa::{sampled, walk};
+use crate::dataset::openeqa::{sample_indices, walk_frames};
 use crate::error::Result;
 use crate::images::frames::source::{Frames, Source, SourceFrame};
 use crate::images::progress::Progress;
@@ -124,8 +124,8 @@ impl WalkFolder {
     /// # Errors
     /// If the folder of the walk is missing or has no frame, or if a sampled frame is broken.
     pub(crate) fn source(&self, name: &str, settings: &Walk) -> Result<Source> {
-        let paths = walk(&self.folder, name)?;
-        let sample = sampled(paths.len(), settings.frames.get());
+        let paths = walk_frames(&self.folder, name)?;
+        let sample = sample_indices(paths.len(), settings.frames.get());
         // A frame that is sampled twice is read once: `order` refers to it by its position.
         let mut positions = BTreeMap::new();
         for index in &sample {

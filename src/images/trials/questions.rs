@@ -71,7 +71,7 @@ fn usable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -> Resul
         })
         .collect();
     drop(bar);
-    dataset.without(&unusable, skip)
+    dataset.without_unusable(&unusable, skip)
 }
 
 /// The opened data, with the questions that they have themselves. No image is read.
@@ -147,12 +147,12 @@ impl QuestionBank {
         rule: ReadingRule,
         progress: &Progress,
     ) -> Result<Dataset> {
-        let found = Photographs::at(place, set)?;
+        let found = Photographs::open(place, set)?;
         for note in &found.notes {
             progress.note(note);
         }
         let dataset = usable(found.dataset.with_rule(rule), set.bad, progress)?;
-        let questions = self.bank.about(dataset.frames(), self.per_image);
+        let questions = self.bank.questions_about(dataset.frames(), self.per_image);
         let images = dataset.frames().count();
         progress.note(&format!(
             "--ask {}: {} about {} without answers ({} each); each model is compared with its own answers at L0, and is asked without images, too",

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::encoding::Encoding;
 use super::fields::FieldReader;
-use super::image_message::skip_sequence;
+use super::image_message::skip_sequence_number;
 use super::protobuf::fields;
 use crate::types::Intrinsics;
 
@@ -59,7 +59,7 @@ impl CameraInfo {
         encoding: Encoding,
         mut reader: FieldReader<'_>,
     ) -> Result<Self, String> {
-        skip_sequence(schema, encoding, &mut reader)?;
+        skip_sequence_number(schema, encoding, &mut reader)?;
         let _stamp = reader.time()?;
         let _frame_id = reader.text()?;
         let [first, second] = [reader.u32()?, reader.u32()?].map(|side| side as usize);

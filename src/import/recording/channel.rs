@@ -1,34 +1,34 @@
-//! A topic of a recording with the form of its messages: [`Channel`].
+//! Topic of a recording with the type of its messages: [`Channel`].
 
 use super::encoding::Encoding;
 use super::exposure::ExposureFields;
 
-/// A topic as one channel of a recording has it.
+/// Channel of a recording.
 #[derive(Debug, Clone)]
 pub(crate) struct Channel {
     pub(crate) topic: String,
-    /// Name of the message type, as `sensor_msgs/Image` or `foxglove.RawImage`: without `msg/`.
+    /// Name of the message type without `msg/`, such as `sensor_msgs/Image` or `foxglove.RawImage`.
     pub(crate) schema: String,
-    pub(crate) content: Content,
+    pub(crate) content: ChannelContent,
 }
 
-/// The use of a channel's messages.
+/// Kind of a channel's messages.
 #[derive(Debug, Clone)]
-pub(crate) enum Content {
+pub(crate) enum ChannelContent {
     /// Images.
     Image(Encoding),
     /// Intrinsics of a camera.
     Camera(Encoding),
     /// Exposure times or gains of a camera.
     Exposure(ExposureFields),
-    /// Images that are not read, and the reason.
-    Unread(String),
+    /// Images that cannot be read, with the reason.
+    Unsupported(String),
     /// Anything else.
     Other,
 }
 
 impl Channel {
-    /// The channel of a topic. `definition` is the text of the schema.
+    /// The channel of a topic. `definition` is the text of the message definition.
     pub(super) fn new(topic: String, schema: &str, serialization: &str, definition: &[u8]) -> Self {
         let schema = schema
             .replace("/msg/", "/")
@@ -44,26 +44,26 @@ impl Channel {
                 | "foxglove_msgs/RawImage"
                 | "foxglove_msgs/CompressedImage",
                 Some(encoding),
-            ) => Content::Image(encoding),
+            ) => ChannelContent::Image(encoding),
             (
                 "sensor_msgs/CameraInfo"
                 | "foxglove.CameraCalibration"
                 | "foxglove_msgs/CameraCalibration",
                 Some(encoding),
-            ) => Content::Camera(encoding),
-            (schema, None) if schema.ends_with("Image") => Content::Unread(format!(
+            ) => ChannelContent::Camera(encoding),
+            (schema, None) if schema.ends_with("Image") => ChannelContent::Unsupported(format!(
                 "serialization {serialization:?}; cdr, ros1, protobuf or json expected"
             )),
             (schema, _)
                 if schema.ends_with("CompressedVideo") || schema.ends_with("FFMPEGPacket") =>
             {
-                Content::Unread("video; decode it into images first".to_owned())
+                ChannelContent::Unsupported("video; decode it into images first".to_owned())
             }
             (_, Some(encoding)) => match ExposureFields::from_definition(definition, encoding) {
-                Some(fields) => Content::Exposure(fields),
-                None => Content::Other,
+                Some(fields) => ChannelContent::Exposure(fields),
+                None => ChannelContent::Other,
             },
-            _ => Content::Other,
+            _ => ChannelContent::Other,
         };
         Self {
             topic,
@@ -73,10 +73,9 @@ impl Channel {
     }
 }
 
-/// The name under which the topics of one camera are: `/front` of `/front/image_raw`, `/front/image_raw/compressed` and
-/// `/front/camera_info`.
-pub(crate) fn camera_of(topic: &str) -> &str {
-    let parent = |topic: &str| topic.rfind('/').unwrap_or(0);
+/// Common prefix of the topics of one camera: `/front` for `/front/image_raw`, `/front/image_raw/compressed` and `/front/camera_info`.
+pub(crate) fn camera_name(topic: &str) -> &str {
+    let parent_length = |topic: &str| topic.rfind('/').unwrap_or(0);
     let transports = [
         "/compressed",
         "/compressedDepth",
@@ -87,9 +86,9 @@ pub(crate) fn camera_of(topic: &str) -> &str {
     let base = transports
         .iter()
         .find_map(|transport| topic.strip_suffix(transport))
-        .filter(|base| base[parent(base)..].contains("image"))
+        .filter(|base| base[parent_length(base)..].contains("image"))
         .unwrap_or(topic);
-    &base[..parent(base)]
+    &base[..parent_length(base)]
 }
 
 #[cfg(test)]
@@ -104,14 +103,14 @@ mod tests {
             "/a/front/camera_info",
             "/a/front/compressed",
         ] {
-            assert_eq!(camera_of(topic), "/a/front", "{topic}");
+            assert_eq!(camera_name(topic), "/a/front", "{topic}");
         }
-        assert_eq!(camera_of("/image"), "");
-        assert_eq!(camera_of("image"), "");
+        assert_eq!(camera_name("/image"), "");
+        assert_eq!(camera_name("image"), "");
     }
 
     #[test]
-    fn names_of_types_differ_by_their_writers() {
+    fn all_spellings_of_type_names_are_known() {
         let content = |schema: &str, serialization: &str| {
             Channel::new("/t".to_owned(), schema, serialization, b"").content
         };
@@ -122,21 +121,21 @@ mod tests {
             "foxglove::RawImage",
         ] {
             assert!(
-                matches!(content(schema, "cdr"), Content::Image(Encoding::Cdr)),
+                matches!(content(schema, "cdr"), ChannelContent::Image(Encoding::Cdr)),
                 "{schema}"
             );
         }
         assert!(matches!(
             content("foxglove.RawImage", "flatbuffer"),
-            Content::Unread(_)
+            ChannelContent::Unsupported(_)
         ));
         assert!(matches!(
             content("foxglove.CompressedVideo", "protobuf"),
-            Content::Unread(_)
+            ChannelContent::Unsupported(_)
         ));
         assert!(matches!(
             content("std_msgs/msg/String", "cdr"),
-            Content::Other
+            ChannelContent::Other
         ));
     }
 }

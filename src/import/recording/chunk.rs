@@ -1,39 +1,39 @@
-//! The content of a chunk, decompressed while it is read: [`Chunk`].
+//! Chunk of an MCAP file, decompressed while it is read: [`Chunk`].
 
 use std::io::{self, BufReader, Read, Seek, Take};
 
 use lz4_flex::frame::FrameDecoder;
 use zstd::stream::read::Decoder;
 
-/// How many times as long as its compressed bytes the content of a chunk may be, beyond [`ALWAYS_ALLOWED`] (chosen). Repeated black
-/// frames of a raw image reach some thousands.
-const LARGEST_RATIO: u64 = 10_000;
+/// Maximum compression ratio of a chunk, beyond [`ALWAYS_ALLOWED`] (chosen). Repeated black raw images reach some thousands.
+const MAX_RATIO: u64 = 10_000;
 
-/// Bytes of content that are allowed whatever the ratio (chosen).
+/// Number of content bytes that are allowed at any ratio (chosen).
 const ALWAYS_ALLOWED: u64 = 64 << 20;
 
-/// The facts in front of the records of a chunk.
+/// Header of a chunk.
 #[derive(Debug)]
 pub(super) struct ChunkHeader {
-    /// The least and the greatest log time of its messages, in nanoseconds.
+    /// First and last log time of its messages, in nanoseconds.
     pub(super) times: [u64; 2],
-    /// Bytes of the records after decompression.
+    /// Length of the records after decompression, in bytes.
     pub(super) length: u64,
     /// CRC-32 of the records after decompression; 0 for none.
     pub(super) crc: u32,
-    /// The name of the compression; empty for none.
+    /// Name of the compression; empty for none.
     pub(super) compression: String,
-    /// Bytes of the records as they are stored.
-    pub(super) stored: u64,
+    /// Length of the records in the file, in bytes.
+    pub(super) stored_length: u64,
 }
 
 /// An open chunk.
 pub(super) struct Chunk<R: Read> {
     pub(super) times: [u64; 2],
     content: Content<R>,
-    /// Bytes of content that are not read yet.
-    pub(super) left: u64,
-    digest: crc32fast::Hasher,
+    /// Number of content bytes that are not read yet.
+    pub(super) remaining: u64,
+    hasher: crc32fast::Hasher,
+    /// Expected CRC-32; 0 for none.
     crc: u32,
 }
 
@@ -44,23 +44,23 @@ enum Content<R: Read> {
 }
 
 impl<R: Read> Chunk<R> {
-    /// Opens the chunk whose records begin at the place of `file`. The error has the file back.
+    /// Opens the chunk whose records begin at the position of `file`. The error returns the file.
     pub(super) fn open(
         header: &ChunkHeader,
         file: BufReader<R>,
     ) -> Result<Self, (BufReader<R>, String)> {
         let allowed = header
-            .stored
-            .saturating_mul(LARGEST_RATIO)
+            .stored_length
+            .saturating_mul(MAX_RATIO)
             .saturating_add(ALWAYS_ALLOWED);
         if header.length > allowed {
             let problem = format!(
                 "{} bytes from {} compressed ones are not believable",
-                header.length, header.stored
+                header.length, header.stored_length
             );
             return Err((file, problem));
         }
-        let stored = file.take(header.stored);
+        let stored = file.take(header.stored_length);
         let content = match &*header.compression {
             "" => Content::Plain(stored),
             "zstd" => match Decoder::try_with_buffer(stored) {
@@ -76,20 +76,20 @@ impl<R: Read> Chunk<R> {
         Ok(Self {
             times: header.times,
             content,
-            left: header.length,
-            digest: crc32fast::Hasher::new(),
+            remaining: header.length,
+            hasher: crc32fast::Hasher::new(),
             crc: header.crc,
         })
     }
 }
 
 impl<R: Read + Seek> Chunk<R> {
-    /// Whether the digest of the content that was read is that of the chunk.
+    /// True if the CRC-32 of the content that was read is correct, or the chunk has none.
     pub(super) fn is_intact(&self) -> bool {
-        self.crc == 0 || self.crc == self.digest.clone().finalize()
+        self.crc == 0 || self.crc == self.hasher.clone().finalize()
     }
 
-    /// The file, at the end of the chunk's records.
+    /// Returns the file, at the end of the chunk's records.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -108,18 +108,18 @@ impl<R: Read + Seek> Chunk<R> {
 
 impl<R: Read> Read for Chunk<R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let most = usize::try_from(self.left)
+        let length = usize::try_from(self.remaining)
             .unwrap_or(usize::MAX)
             .min(bytes.len());
-        let bytes = &mut bytes[..most];
+        let bytes = &mut bytes[..length];
         let count = match &mut self.content {
             Content::Plain(stored) => stored.read(bytes),
             Content::Zstd(decoder) => decoder.read(bytes),
             Content::Lz4(decoder) => decoder.read(bytes),
         }?;
-        self.left -= count as u64;
+        self.remaining -= count as u64;
         if self.crc != 0 {
-            self.digest.update(&bytes[..count]);
+            self.hasher.update(&bytes[..count]);
         }
         Ok(count)
     }

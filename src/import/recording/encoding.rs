@@ -1,6 +1,6 @@
-//! The serializations of messages that are read: [`Encoding`].
+//! Supported serializations of messages: [`Encoding`].
 
-/// The serialization of messages.
+/// Serialization of messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Encoding {
     Cdr,
@@ -10,7 +10,7 @@ pub(crate) enum Encoding {
 }
 
 impl Encoding {
-    /// The serialization that a channel names; `None` if it is not read.
+    /// Serialization with this name in a channel; `None` if it is not supported.
     pub(super) fn from_name(name: &str) -> Option<Self> {
         match name {
             "cdr" => Some(Self::Cdr),

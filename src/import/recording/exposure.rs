@@ -1,7 +1,7 @@
 //! Exposure times and gains in messages of any type: [`Exposure`].
 //!
-//! Camera drivers have no common message for them. So every flat message of ROS counts that begins with a header and has a field whose
-//! name speaks of exposure or gain, and messages with JSON in a field `json_data`, as those of RealSense cameras.
+//! Camera drivers have no common message for exposure. Two kinds of ROS messages are therefore read: flat messages that begin with a
+//! header and have a field with “exposure” or “gain” in its name, and messages with JSON in a field `json_data`, as of RealSense cameras.
 
 use serde_json::{Map, Value, json};
 
@@ -9,40 +9,44 @@ use super::Nanoseconds;
 use super::encoding::Encoding;
 use super::fields::FieldReader;
 
-/// The largest definition that is searched, in bytes (chosen).
-const LONGEST_DEFINITION: usize = 64 << 10;
+/// Maximum length of a definition that is searched, in bytes (chosen).
+const MAX_DEFINITION_BYTES: usize = 64 << 10;
 
-/// Values about the exposure of one image, by their names, in the units of the driver.
+/// Exposure of one image.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Exposure {
     /// Time of the image.
     pub(crate) stamp: Nanoseconds,
+    /// Values by field name, in the units of the driver.
     pub(crate) values: Map<String, Value>,
 }
 
-/// The fields of a message after its header, in their order.
+/// Fields of a message after its header, in order.
 #[derive(Debug, Clone)]
 pub(crate) struct ExposureFields {
     encoding: Encoding,
     fields: Vec<(Primitive, String)>,
 }
 
-/// A type of a field.
+/// Type of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Primitive {
+    /// Unsigned integer of this number of bytes.
     Unsigned(usize),
+    /// Signed integer of this number of bytes.
     Signed(usize),
+    /// Float of this number of bytes.
     Float(usize),
     Text,
 }
 
-/// A definition if it may speak of exposure; else empty, so that others take no memory.
-pub(super) fn kept_definition(definition: &[u8]) -> Vec<u8> {
+/// Returns a definition if it may have fields about exposure, else an empty one to save memory.
+pub(super) fn relevant_definition(definition: &[u8]) -> Vec<u8> {
     let text = definition.to_ascii_lowercase();
-    let has = |word: &[u8]| text.windows(word.len()).any(|part| part == word);
-    let is_kept = definition.len() <= LONGEST_DEFINITION
-        && (has(b"exposure") || has(b"gain") || has(b"json_data"));
-    if is_kept {
+    let contains = |word: &[u8]| text.windows(word.len()).any(|part| part == word);
+    let is_relevant = definition.len() <= MAX_DEFINITION_BYTES
+        && (contains(b"exposure") || contains(b"gain") || contains(b"json_data"));
+    if is_relevant {
         definition.to_vec()
     } else {
         Vec::new()
@@ -50,13 +54,13 @@ pub(super) fn kept_definition(definition: &[u8]) -> Vec<u8> {
 }
 
 impl ExposureFields {
-    /// The fields of a message by its definition in the language of ROS; `None` if it has no header or nothing about exposure.
+    /// Parses a ROS message definition; `None` if the message has no header or nothing about exposure.
     pub(super) fn from_definition(definition: &[u8], encoding: Encoding) -> Option<Self> {
         if !matches!(encoding, Encoding::Cdr | Encoding::Ros1) {
             return None;
         }
         let text = std::str::from_utf8(definition).ok()?;
-        // Further types follow after a line of equals signs.
+        // The definitions of nested types follow after a line of equals signs.
         let own = text.split("\n===").next()?;
         let mut lines = own
             .lines()
@@ -70,19 +74,19 @@ impl ExposureFields {
         let fields: Vec<(Primitive, String)> = lines
             .map_while(|(kind, rest)| {
                 let name = rest.split_whitespace().next()?;
-                Some((Primitive::named(kind)?, name.to_owned()))
+                Some((Primitive::from_name(kind)?, name.to_owned()))
             })
             .collect();
-        let speaks = fields
+        let has_exposure = fields
             .iter()
             .any(|(_, name)| is_about_exposure(name) || name == "json_data");
-        speaks.then_some(Self { encoding, fields })
+        has_exposure.then_some(Self { encoding, fields })
     }
 
-    /// Reads a message; `None` if it states nothing about exposure.
+    /// Parses a message; `None` if it has no values about exposure.
     ///
     /// # Errors
-    /// If it is shorter than its fields.
+    /// If the message is shorter than its fields.
     pub(crate) fn parse(&self, bytes: &[u8]) -> Result<Option<Exposure>, String> {
         let mut reader = match self.encoding {
             Encoding::Ros1 => FieldReader::unaligned(bytes),
@@ -122,7 +126,7 @@ fn is_about_exposure(name: &str) -> bool {
 }
 
 impl Primitive {
-    fn named(kind: &str) -> Option<Self> {
+    fn from_name(kind: &str) -> Option<Self> {
         Some(match kind {
             "bool" | "byte" | "char" | "uint8" => Self::Unsigned(1),
             "uint16" => Self::Unsigned(2),
@@ -149,7 +153,7 @@ impl Primitive {
             Self::Signed(2) => json!(reader.u16()?.cast_signed()),
             Self::Signed(4) => json!(reader.u32()?.cast_signed()),
             Self::Signed(_) => json!(reader.u64()?.cast_signed()),
-            // The shortest decimal that is this number.
+            // Through the shortest decimal, so that 2.1 does not become 2.0999999046325684.
             Self::Float(4) => reader
                 .f32()?
                 .to_string()
@@ -168,10 +172,10 @@ mod tests {
     const HEADER: [u8; 17] = [0, 1, 0, 0, 5, 0, 0, 0, 7, 0, 0, 0, 1, 0, 0, 0, 0];
 
     #[test]
-    fn fields_about_exposure_are_read_by_their_definition() {
+    fn exposure_fields_are_found_by_definition() {
         let definition = b"std_msgs/Header header\nuint64 camera_time # ns\nuint32 exposure_time\nfloat32 gain\n===\nMSG: x";
         let fields = ExposureFields::from_definition(definition, Encoding::Cdr).unwrap();
-        // The number of 8 bytes is aligned to 16 after the encapsulation.
+        // The 8-byte number is aligned to 16 after the CDR header.
         let message = [
             &HEADER[..],
             &[0; 3],
@@ -190,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn json_of_a_driver_is_read() {
+    fn json_data_is_read() {
         let definition = b"std_msgs/Header header\nstring json_data";
         let fields = ExposureFields::from_definition(definition, Encoding::Cdr).unwrap();
         let text = b"{\"actual_exposure\":156,\"temperature\":40}\0";
@@ -209,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn other_messages_are_no_exposures() {
+    fn other_messages_have_no_exposure() {
         for definition in [
             "float32 gain",
             "std_msgs/Header header\nfloat32 speed",

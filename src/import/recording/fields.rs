@@ -1,48 +1,52 @@
-//! Fields of serialized messages in the order of their definition: [`FieldReader`].
+//! Reader of the fields of a serialized message, in the order of its definition: [`FieldReader`].
 //!
-//! CDR is that of OMG DDSI-RTPS 2.3, section 10, with the alignment of XCDR1, or of XCDR2 (DDS-XTypes 1.3, section 7.4.3); ROS 1
-//! and the records of MCAP have neither alignment nor a choice of byte order.
+//! CDR follows OMG DDSI-RTPS 2.3, section 10, with the alignment of XCDR1 or XCDR2 (DDS-XTypes 1.3, section 7.4.3). ROS 1 and the records
+//! of MCAP are little-endian and have no alignment.
 
 use super::Nanoseconds;
 
-/// A reader of fields.
+/// Reader of fields.
 #[derive(Debug, Clone)]
 pub(super) struct FieldReader<'a> {
     bytes: &'a [u8],
-    at: usize,
-    form: Form,
+    /// Offset of the next byte.
+    offset: usize,
+    rules: SerializationRules,
 }
 
-/// The rules of a serialization.
+/// Rules of a serialization.
 #[derive(Debug, Clone, Copy)]
-struct Form {
+struct SerializationRules {
     is_big_endian: bool,
-    /// The greatest alignment of a number in bytes; 1 for none.
-    alignment: usize,
-    /// Whether texts end with a byte 0 that their length counts.
+    /// Maximum alignment of a number, in bytes; 1 for none.
+    max_alignment: usize,
+    /// True if texts end with a zero byte, which is part of their length.
     has_terminator: bool,
 }
 
 impl<'a> FieldReader<'a> {
-    /// A reader of fields without alignment, low byte first: messages of ROS 1 and records of MCAP.
+    /// Reader of little-endian fields without alignment: messages of ROS 1 and records of MCAP.
     pub(super) fn unaligned(bytes: &'a [u8]) -> Self {
-        let form = Form {
-            is_big_endian: false,
-            alignment: 1,
-            has_terminator: false,
-        };
-        Self { bytes, at: 0, form }
+        Self {
+            bytes,
+            offset: 0,
+            rules: SerializationRules {
+                is_big_endian: false,
+                max_alignment: 1,
+                has_terminator: false,
+            },
+        }
     }
 
-    /// A reader of a CDR message, which begins with its four bytes of encapsulation.
+    /// Reader of a CDR message, which begins with a header of four bytes.
     ///
     /// # Errors
-    /// If it is not plain CDR.
+    /// If the message is not plain CDR.
     pub(super) fn cdr(message: &'a [u8]) -> Result<Self, String> {
         let Some((&[zero, kind, _, _], bytes)) = message.split_first_chunk() else {
             return Err(ends_early());
         };
-        let (is_big_endian, alignment) = match (zero, kind) {
+        let (is_big_endian, max_alignment) = match (zero, kind) {
             (0, 0) => (true, 8),
             (0, 1) => (false, 8),
             (0, 6) => (true, 4),
@@ -53,32 +57,40 @@ impl<'a> FieldReader<'a> {
                 ));
             }
         };
-        let form = Form {
-            is_big_endian,
-            alignment,
-            has_terminator: true,
-        };
-        Ok(Self { bytes, at: 0, form })
+        Ok(Self {
+            bytes,
+            offset: 0,
+            rules: SerializationRules {
+                is_big_endian,
+                max_alignment,
+                has_terminator: true,
+            },
+        })
     }
 
-    /// The next bytes.
+    /// Reads this number of bytes.
     pub(super) fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
-        let end = self.at.checked_add(count);
-        let taken = end
-            .and_then(|end| self.bytes.get(self.at..end))
+        let taken = self
+            .offset
+            .checked_add(count)
+            .and_then(|end| self.bytes.get(self.offset..end))
             .ok_or_else(ends_early)?;
-        self.at += count;
+        self.offset += count;
         Ok(taken)
     }
 
+    /// Skips the padding before a number of this size.
     fn align(&mut self, size: usize) {
-        self.at = self.at.next_multiple_of(size.min(self.form.alignment));
+        self.offset = self
+            .offset
+            .next_multiple_of(size.min(self.rules.max_alignment));
     }
 
+    /// Reads the bytes of a number as little-endian.
     fn number<const N: usize>(&mut self) -> Result<[u8; N], String> {
         self.align(N);
         let mut bytes: [u8; N] = self.take(N)?.try_into().map_err(|_| ends_early())?;
-        if self.form.is_big_endian {
+        if self.rules.is_big_endian {
             bytes.reverse();
         }
         Ok(bytes)
@@ -108,36 +120,36 @@ impl<'a> FieldReader<'a> {
         self.number().map(f64::from_le_bytes)
     }
 
-    /// A sequence of bytes.
+    /// Reads a sequence of bytes.
     pub(super) fn bytes(&mut self) -> Result<&'a [u8], String> {
         let count = self.u32()?;
         self.take(count as usize)
     }
 
-    /// A text; bytes that are not UTF-8 are replaced.
+    /// Reads a text. Bytes that are not UTF-8 are replaced.
     pub(super) fn text(&mut self) -> Result<String, String> {
         let mut bytes = self.bytes()?;
-        if self.form.has_terminator {
+        if self.rules.has_terminator {
             bytes = bytes.strip_suffix(&[0]).unwrap_or(bytes);
         }
         Ok(String::from_utf8_lossy(bytes).into_owned())
     }
 
-    /// A sequence of numbers of 8 bytes.
+    /// Reads a sequence of 8-byte floats.
     pub(super) fn doubles(&mut self) -> Result<Vec<f64>, String> {
         let count = self.u32()?;
-        // A count that the message cannot hold ends with the first missing number.
+        // If the count is too large, the first missing number ends the loop.
         (0..count).map(|_| self.f64()).collect()
     }
 
-    /// A time in seconds and nanoseconds. Seconds are signed in ROS 2 and unsigned in ROS 1, which differ from 2038 on.
+    /// Reads a time in seconds and nanoseconds. Seconds are signed in ROS 2 and unsigned in ROS 1; the two differ only after 2038.
     pub(super) fn time(&mut self) -> Result<Nanoseconds, String> {
         let (seconds, rest) = (self.u32()?, self.u32()?);
         Ok(i64::from(seconds.cast_signed()) * 1_000_000_000 + i64::from(rest))
     }
 }
 
-/// The problem of a message that is shorter than its fields.
+/// Error message for a message that is shorter than its fields.
 pub(super) fn ends_early() -> String {
     "the message ends before its last field".to_owned()
 }
@@ -147,7 +159,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_aligned_as_the_representation_says() {
+    fn numbers_are_aligned_by_the_representation() {
         // A byte, then a double at 8 in XCDR1 and at 4 in XCDR2.
         let mut first = vec![0, 1, 0, 0, 7, 0, 0, 0, 0, 0, 0, 0];
         first.extend(2.5_f64.to_le_bytes());
@@ -160,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_end_with_a_zero_in_cdr_alone() {
+    fn only_cdr_texts_end_with_zero() {
         let text = [0, 0, 0, 0, 0, 0, 0, 3, b'a', b'b', 0];
         assert_eq!(FieldReader::cdr(&text).unwrap().text().unwrap(), "ab");
         let text = [2, 0, 0, 0, b'a', b'b'];
@@ -183,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn times_may_be_negative_and_late() {
+    fn negative_and_late_times_are_read() {
         let time = |seconds: i32, rest: u32| {
             let bytes = [seconds.to_le_bytes(), rest.to_le_bytes()].concat();
             FieldReader::unaligned(&bytes).time().unwrap()

@@ -1,4 +1,4 @@
-//! A message with an image: [`ImageMessage`].
+//! Message with an image: [`ImageMessage`].
 
 use std::borrow::Cow;
 
@@ -13,34 +13,34 @@ use super::protobuf::fields;
 use crate::picture::raw_image::RawImage;
 use crate::types::text::excerpt;
 
-/// An image with the facts of its message.
+/// Image of a message with its metadata.
 #[derive(Debug)]
 pub(crate) struct ImageMessage<'a> {
-    /// Time at which it was taken; `None` if the message has 0.
+    /// Time of the image; `None` if the message has 0.
     pub(crate) stamp: Option<Nanoseconds>,
-    /// Name of the frame of reference of the camera.
+    /// Name of the coordinate frame of the camera.
     pub(crate) frame_id: String,
     pub(crate) image: MessageImage<'a>,
 }
 
-/// The image of a message.
+/// Image data of a message.
 #[derive(Debug)]
 pub(crate) enum MessageImage<'a> {
     /// Rows of samples.
     Raw(RawImage<'a>),
     /// A JPEG or PNG file.
     File {
-        /// The format as the message states it.
+        /// Format given in the message.
         format: String,
         bytes: Cow<'a, [u8]>,
     },
 }
 
 impl<'a> ImageMessage<'a> {
-    /// Reads a message of a type that [`Content::Image`](super::Content) stands for.
+    /// Parses a message of a type with images ([`ChannelContent::Image`](super::ChannelContent)).
     ///
     /// # Errors
-    /// If it is not a message of this type, or its image is compressed depth.
+    /// If it is not a message of this type, or has depth or a color mosaic in an image file.
     pub(crate) fn parse(schema: &str, encoding: Encoding, bytes: &'a [u8]) -> Result<Self, String> {
         let message = match encoding {
             Encoding::Cdr => Self::from_fields(schema, encoding, FieldReader::cdr(bytes)?),
@@ -59,7 +59,7 @@ impl<'a> ImageMessage<'a> {
         encoding: Encoding,
         mut reader: FieldReader<'a>,
     ) -> Result<Self, String> {
-        skip_sequence(schema, encoding, &mut reader)?;
+        skip_sequence_number(schema, encoding, &mut reader)?;
         let (stamp, frame_id) = (reader.time()?, reader.text()?);
         let image = match schema {
             "sensor_msgs/Image" => {
@@ -101,7 +101,7 @@ impl<'a> ImageMessage<'a> {
         })
     }
 
-    /// The field numbers are those of `foxglove/RawImage.proto` and `foxglove/CompressedImage.proto`.
+    /// Parses a protobuf message, with the field numbers of `foxglove/RawImage.proto` and `foxglove/CompressedImage.proto`.
     fn from_protobuf(schema: &str, bytes: &'a [u8]) -> Result<Self, String> {
         let is_raw = schema.ends_with("RawImage");
         let (mut stamp, mut frame_id, mut format) = (0, String::new(), String::new());
@@ -174,8 +174,8 @@ impl<'a> ImageMessage<'a> {
     }
 }
 
-/// Refuses a file whose format states samples that are no colours: `compressed_image_transport` writes `bayer_rggb8; png compressed ` for
-/// a mosaic that it did not convert, and `16UC1; png compressed ` for depth.
+/// Refuses a format without colour samples: `compressed_image_transport` writes `bayer_rggb8; png compressed ` for a mosaic that it did not
+/// convert, and `16UC1; png compressed ` for depth.
 fn check_format(format: &str) -> Result<(), String> {
     let (source, target) = format.split_once(';').unwrap_or((format, ""));
     let kind = match source.trim() {
@@ -223,8 +223,8 @@ struct JsonTime {
     nsec: i64,
 }
 
-/// The header of ROS 1 begins with a number that ROS 2 dropped; messages of Foxglove have no header.
-pub(super) fn skip_sequence(
+/// Skips the sequence number at the start of a ROS 1 header. ROS 2 dropped it, and messages of Foxglove have no header.
+pub(super) fn skip_sequence_number(
     schema: &str,
     encoding: Encoding,
     reader: &mut FieldReader<'_>,
@@ -235,13 +235,13 @@ pub(super) fn skip_sequence(
     Ok(())
 }
 
-/// The stamp at the start of a message; `None` if it must be read as a whole.
+/// Time stamp at the start of a message; `None` if the whole message must be read.
 pub(crate) fn stamp(schema: &str, encoding: Encoding, start: &[u8]) -> Option<Nanoseconds> {
     match encoding {
         Encoding::Cdr => FieldReader::cdr(start).ok()?.time().ok(),
         Encoding::Ros1 => {
             let mut reader = FieldReader::unaligned(start);
-            skip_sequence(schema, encoding, &mut reader).ok()?;
+            skip_sequence_number(schema, encoding, &mut reader).ok()?;
             reader.time().ok()
         }
         Encoding::Protobuf => match fields(start).next()?.ok()? {

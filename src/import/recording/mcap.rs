@@ -1,7 +1,7 @@
-//! A reader of MCAP files: [`McapReader`].
+//! Reader of MCAP files: [`McapReader`].
 //!
-//! It reads a file from start to end, record by record (<https://mcap.dev/spec>), because a file whose recorder was killed has no index.
-//! Bodies of messages are read only on demand, and one at a time, so that memory does not depend on the size of files and chunks.
+//! A file is read from start to end, record by record (<https://mcap.dev/spec>), because it has no index if its recorder was killed.
+//! Message bodies are read on demand and one at a time, so memory does not depend on the size of files and chunks.
 
 use std::collections::HashMap;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
@@ -11,39 +11,43 @@ use std::sync::Arc;
 use super::Nanoseconds;
 use super::channel::Channel;
 use super::chunk::{Chunk, ChunkHeader};
-use super::exposure::kept_definition;
+use super::exposure::relevant_definition;
 use super::fields::FieldReader;
 
 const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 
-/// The largest message that is read, in bytes (chosen): 4K in colour with 16 bits has 50 MB. Memory is bounded by it.
-pub(crate) const LARGEST_MESSAGE: u64 = 64 << 20;
+/// Maximum length of a message, in bytes (chosen), to limit memory. A 4K image in colour with 16 bits has 50 MB.
+pub(crate) const MAX_MESSAGE_BYTES: u64 = 64 << 20;
 
-/// The largest record of a schema or channel that is read, in bytes (chosen); definitions of messages have some kilobytes.
-const LARGEST_DEFINITION: u64 = 1 << 20;
+/// Maximum length of a schema or channel record, in bytes (chosen). Message definitions have some kilobytes.
+const MAX_DEFINITION_BYTES: u64 = 1 << 20;
 
-/// The longest name of a topic, type or serialization in bytes (chosen), and the most channels and schemas: more are not read.
-const LONGEST_NAME: usize = 1024;
-const MOST_CHANNELS: usize = 10_000;
+/// Maximum length of the name of a topic, type or serialization, in bytes (chosen).
+const MAX_NAME_BYTES: usize = 1024;
 
-/// Bytes that are read from a file at once (chosen).
-const BUFFER: usize = 256 << 10;
+/// Maximum number of channels and of schemas (chosen). Further ones are ignored.
+const MAX_CHANNELS: usize = 10_000;
 
-/// Bytes of opcode and length in front of a record, and of the numbers in front of a message's body and of a chunk's name.
+/// Size of the read buffer, in bytes (chosen).
+const BUFFER_BYTES: usize = 256 << 10;
+
+/// Length of the opcode and length before a record, in bytes.
 const RECORD_HEAD: u64 = 9;
+/// Length of the numbers before the body of a message, in bytes.
 const MESSAGE_HEAD: u64 = 22;
+/// Length of the numbers before the compression name of a chunk, in bytes.
 const CHUNK_HEAD: u64 = 28;
 
-/// The first bytes of a zstd frame (RFC 8878). No message begins with them: the first byte of CDR is 0.
+/// First bytes of a zstd frame (RFC 8878). No CDR message begins with them, because its first byte is 0.
 const ZSTD_MAGIC: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 
-/// The problem of a bag in SQLite, with the remedy.
+/// Error message for a bag in SQLite, with the remedy.
 pub(crate) const SQLITE_BAG: &str = "a bag of ROS 2 in SQLite; convert it: rosbags-convert --src FOLDER --dst NEW --dst-storage mcap";
 
-/// The problem of a file that is compressed as a whole, with the remedy.
+/// Error message for a file that is compressed as a whole, with the remedy.
 pub(crate) const COMPRESSED_FILE: &str = "compressed as a whole; unpack it first: zstd -d FILE";
 
-/// Opcodes of the records that are read.
+/// Opcodes of records.
 mod opcode {
     pub(super) const SCHEMA: u8 = 3;
     pub(super) const CHANNEL: u8 = 4;
@@ -52,50 +56,51 @@ mod opcode {
     pub(super) const DATA_END: u8 = 15;
 }
 
-/// The next thing in a recording.
+/// Event while reading a recording.
 #[derive(Debug)]
 pub(crate) enum Event {
-    /// A message, whose body may be read next.
+    /// A message. Its body may be read next.
     Message(Message),
-    /// All messages since the last chunk are intact.
+    /// End of a chunk. Its messages are intact.
     ChunkRead,
-    /// The messages since the last chunk may be wrong; the rest of the chunk was skipped.
+    /// The messages of this chunk may be wrong; the rest of the chunk was skipped.
     ChunkDamaged {
-        /// Log times of the chunk.
+        /// First and last log time of the chunk.
         times: [Nanoseconds; 2],
         problem: String,
     },
-    /// The file ends before its end record, or has something else where a record is expected. Nothing follows.
+    /// The file ends early, or has invalid data instead of a record. No further events follow.
     Cut(String),
 }
 
-/// A message without its body.
+/// Message without its body.
 #[derive(Debug, Clone)]
 pub(crate) struct Message {
     pub(crate) channel: Arc<Channel>,
-    /// Time at which it was recorded.
+    /// Time when it was recorded.
     pub(crate) log_time: Nanoseconds,
-    /// Bytes of the body.
+    /// Length of the body, in bytes.
     pub(crate) length: u64,
-    /// Whether it is in a chunk, whose checksum is compared when the chunk ends.
+    /// True if it is in a chunk, whose checksum is checked at the end of the chunk.
     pub(crate) is_in_chunk: bool,
 }
 
-/// A recording that is being read.
+/// Reader of a recording.
 pub(crate) struct McapReader<R: Read> {
     source: Source<R>,
-    /// Bytes of the file.
+    /// Length of the file, in bytes.
     length: u64,
-    /// Place in the file of the record after the current one.
+    /// Offset in the file of the record after the current one.
     next_record: u64,
-    /// Bytes of the current record that are not read.
+    /// Number of bytes of the current record that are not read yet.
     unread: u64,
     schemas: HashMap<u16, Schema>,
     channels: HashMap<u16, Arc<Channel>>,
-    /// Messages whose channel is not described.
-    pub(crate) without_channel: u64,
+    /// Number of messages without a channel record.
+    pub(crate) messages_without_channel: u64,
+    /// Body of the current record, as far as it is read.
     body: Vec<u8>,
-    /// The problem of a body that could not be read.
+    /// Error of a body that could not be read.
     broken: Option<String>,
 }
 
@@ -111,11 +116,11 @@ struct Schema {
     definition: Vec<u8>,
 }
 
-/// A problem while reading.
+/// Error while reading.
 enum Fault {
-    /// The bytes end, or are not as expected.
+    /// The data end early or are invalid.
     Broken(String),
-    /// The chunk cannot be opened; the file is at its records.
+    /// The chunk cannot be opened. The file is positioned at its records.
     UnreadableChunk { times: [u64; 2], problem: String },
 }
 
@@ -140,17 +145,16 @@ impl<R: Read + Seek> McapReader<R> {
     /// # Errors
     /// If it is not an MCAP file.
     pub(crate) fn open(mut file: R) -> Result<Self, String> {
-        let length = file.seek(SeekFrom::End(0));
-        let length = length
+        let length = file
+            .seek(SeekFrom::End(0))
             .and_then(|length| file.rewind().map(|()| length))
             .map_err(|e| e.to_string())?;
-        let mut file = BufReader::with_capacity(BUFFER, file);
+        let mut file = BufReader::with_capacity(BUFFER_BYTES, file);
         if length == 0 {
             return Err("the file is empty, as a recorder leaves it that is killed".to_owned());
         }
         let mut magic = [0; MAGIC.len()];
-        let read = file.read_exact(&mut magic);
-        if read.is_err() || magic != MAGIC {
+        if file.read_exact(&mut magic).is_err() || magic != MAGIC {
             return Err(not_mcap(&magic));
         }
         Ok(Self {
@@ -160,13 +164,13 @@ impl<R: Read + Seek> McapReader<R> {
             unread: 0,
             schemas: HashMap::new(),
             channels: HashMap::new(),
-            without_channel: 0,
+            messages_without_channel: 0,
             body: Vec::new(),
             broken: None,
         })
     }
 
-    /// The next event; `None` at the end.
+    /// Reads the next event; `None` at the end.
     pub(crate) fn next(&mut self) -> Option<Event> {
         loop {
             if matches!(self.source, Source::Ended) {
@@ -180,38 +184,39 @@ impl<R: Read + Seek> McapReader<R> {
         }
     }
 
-    /// Bytes of the file up to the end of the current record.
+    /// Offset in the file of the end of the current record.
     pub(crate) fn position(&self) -> u64 {
         self.next_record.min(self.length)
     }
 
-    /// The body of the message of the last event, unpacked if its recorder compressed each message alone; `None` if it cannot be read:
-    /// then the next event gives the reason.
+    /// Reads the body of the message of the last event, and decompresses it if the recorder compressed each message. `None` if it cannot be
+    /// read; the next event then has the reason.
     pub(crate) fn body(&mut self) -> Option<&[u8]> {
         self.read_body(self.unread)?;
         if self.body.starts_with(&ZSTD_MAGIC)
-            && let Some(body) = unpacked(&self.body)
+            && let Some(body) = decompress_message(&self.body)
         {
             self.body = body;
         }
         Some(&self.body)
     }
 
-    /// The first bytes of the body, at least `least` if it has as many; `None` as of [`Self::body`], which has them again.
-    pub(crate) fn start_of_body(&mut self, least: u64) -> Option<&[u8]> {
-        self.read_body(self.unread.min(least))?;
+    /// Reads the start of the body, at least `min` bytes if the body is that long; `None` as for [`Self::body`], which may still be called
+    /// for the whole body.
+    pub(crate) fn start_of_body(&mut self, min: u64) -> Option<&[u8]> {
+        self.read_body(self.unread.min(min))?;
         if self.body.starts_with(&ZSTD_MAGIC) {
             return self.body();
         }
         Some(&self.body)
     }
 
-    /// The body that was read, taken out.
+    /// Takes out the body that was read.
     pub(crate) fn take_body(&mut self) -> Vec<u8> {
         mem::take(&mut self.body)
     }
 
-    /// Appends bytes of the current record to the body, and returns all of it.
+    /// Appends bytes of the current record to the body, and returns the body.
     fn read_body(&mut self, count: u64) -> Option<&[u8]> {
         let Self {
             source,
@@ -219,7 +224,7 @@ impl<R: Read + Seek> McapReader<R> {
             unread,
             ..
         } = self;
-        body.reserve_exact(count.min(LARGEST_MESSAGE) as usize);
+        body.reserve_exact(count.min(MAX_MESSAGE_BYTES) as usize);
         let read = match source {
             Source::File(file) => file.take(count).read_to_end(body),
             Source::Chunk(chunk) => chunk.take(count).read_to_end(body),
@@ -236,7 +241,7 @@ impl<R: Read + Seek> McapReader<R> {
         self.broken.is_none().then_some(&*self.body)
     }
 
-    /// Reads to the end of the current record, and the start of the next one.
+    /// Skips the rest of the current record, and reads the start of the next one.
     fn step(&mut self) -> Result<Option<Event>, Fault> {
         if let Some(problem) = self.broken.take() {
             return Err(problem.into());
@@ -244,23 +249,23 @@ impl<R: Read + Seek> McapReader<R> {
         self.skip_rest()?;
         self.body.clear();
         match mem::replace(&mut self.source, Source::Ended) {
-            Source::Chunk(chunk) if chunk.left == 0 => return self.end_chunk(chunk),
+            Source::Chunk(chunk) if chunk.remaining == 0 => return self.end_chunk(chunk),
             source => self.source = source,
         }
-        let (opcode, length) = self.record_head()?;
+        let (opcode, length) = self.read_record_head()?;
         match opcode {
-            opcode::MESSAGE => return self.message(length),
+            opcode::MESSAGE => return self.read_message(length),
             opcode::SCHEMA => {
-                if let Some(record) = self.definition(length)? {
-                    self.schema(&record)?;
+                if let Some(record) = self.read_definition(length)? {
+                    self.add_schema(&record)?;
                 }
             }
             opcode::CHANNEL => {
-                if let Some(record) = self.definition(length)? {
-                    self.channel(&record)?;
+                if let Some(record) = self.read_definition(length)? {
+                    self.add_channel(&record)?;
                 }
             }
-            opcode::CHUNK if matches!(self.source, Source::File(_)) => self.chunk(length)?,
+            opcode::CHUNK if matches!(self.source, Source::File(_)) => self.open_chunk(length)?,
             opcode::DATA_END if matches!(self.source, Source::File(_)) => {
                 self.source = Source::Ended;
             }
@@ -269,7 +274,7 @@ impl<R: Read + Seek> McapReader<R> {
         Ok(None)
     }
 
-    /// The event for a fault, after which reading goes on behind the damaged chunk or ends.
+    /// Converts a fault to an event. Reading continues after a damaged chunk; otherwise it ends.
     fn recover(&mut self, fault: Fault) -> Event {
         self.unread = 0;
         let is_whole = self.next_record <= self.length;
@@ -315,14 +320,14 @@ impl<R: Read + Seek> McapReader<R> {
         Ok(())
     }
 
-    /// The opcode and length of the next record.
-    fn record_head(&mut self) -> Result<(u8, u64), Fault> {
+    /// Reads the opcode and length of the next record.
+    fn read_record_head(&mut self) -> Result<(u8, u64), Fault> {
         let mut head = [0; RECORD_HEAD as usize];
         self.read_exact(&mut head)?;
         let [opcode, length @ ..] = head;
         let length = u64::from_le_bytes(length);
         match &self.source {
-            Source::Chunk(chunk) if length > chunk.left => {
+            Source::Chunk(chunk) if length > chunk.remaining => {
                 return Err(
                     format!("a record of {length} bytes runs past the end of the chunk").into(),
                 );
@@ -346,7 +351,8 @@ impl<R: Read + Seek> McapReader<R> {
         }
     }
 
-    fn message(&mut self, length: u64) -> Result<Option<Event>, Fault> {
+    /// Reads the start of a message; `None` if its channel is unknown.
+    fn read_message(&mut self, length: u64) -> Result<Option<Event>, Fault> {
         let body = length.checked_sub(MESSAGE_HEAD).ok_or_else(too_short)?;
         let mut head = [0; MESSAGE_HEAD as usize];
         self.read_exact(&mut head)?;
@@ -357,7 +363,7 @@ impl<R: Read + Seek> McapReader<R> {
             return Err(ends_too_early().into());
         }
         let Some(channel) = self.channels.get(&id) else {
-            self.without_channel += 1;
+            self.messages_without_channel += 1;
             return Ok(None);
         };
         Ok(Some(Event::Message(Message {
@@ -368,34 +374,34 @@ impl<R: Read + Seek> McapReader<R> {
         })))
     }
 
-    /// The bytes of a schema or channel; `None` if it is too large, or too many are known.
-    fn definition(&mut self, length: u64) -> Result<Option<Vec<u8>>, Fault> {
+    /// Reads a schema or channel record; `None` if it is too long, or there are too many.
+    fn read_definition(&mut self, length: u64) -> Result<Option<Vec<u8>>, Fault> {
         self.unread = length;
         let known = self.channels.len().max(self.schemas.len());
-        if length > LARGEST_DEFINITION || known > MOST_CHANNELS {
+        if length > MAX_DEFINITION_BYTES || known > MAX_CHANNELS {
             return Ok(None);
         }
         self.read_body(length).ok_or_else(ends_too_early)?;
         Ok(Some(mem::take(&mut self.body)))
     }
 
-    fn schema(&mut self, record: &[u8]) -> Result<(), Fault> {
+    fn add_schema(&mut self, record: &[u8]) -> Result<(), Fault> {
         let mut fields = FieldReader::unaligned(record);
         let (id, name) = (fields.u16()?, fields.text()?);
         let _encoding = fields.text()?;
         let definition = fields.bytes()?;
-        if name.len() <= LONGEST_NAME {
-            let definition = kept_definition(definition);
+        if name.len() <= MAX_NAME_BYTES {
+            let definition = relevant_definition(definition);
             self.schemas.insert(id, Schema { name, definition });
         }
         Ok(())
     }
 
-    fn channel(&mut self, record: &[u8]) -> Result<(), Fault> {
+    fn add_channel(&mut self, record: &[u8]) -> Result<(), Fault> {
         let mut fields = FieldReader::unaligned(record);
         let (id, schema) = (fields.u16()?, fields.u16()?);
         let (topic, serialization) = (fields.text()?, fields.text()?);
-        if topic.len().max(serialization.len()) > LONGEST_NAME {
+        if topic.len().max(serialization.len()) > MAX_NAME_BYTES {
             return Ok(());
         }
         let (name, definition) = match self.schemas.get(&schema) {
@@ -408,7 +414,7 @@ impl<R: Read + Seek> McapReader<R> {
     }
 
     /// Opens a chunk.
-    fn chunk(&mut self, length: u64) -> Result<(), Fault> {
+    fn open_chunk(&mut self, length: u64) -> Result<(), Fault> {
         let mut head = [0; CHUNK_HEAD as usize];
         self.read_exact(&mut head)?;
         let mut fields = FieldReader::unaligned(&head);
@@ -417,16 +423,16 @@ impl<R: Read + Seek> McapReader<R> {
         let mut name_length = [0; 4];
         self.read_exact(&mut name_length)?;
         let name_length = u64::from(u32::from_le_bytes(name_length));
-        let stored = length
+        let stored_length = length
             .checked_sub(CHUNK_HEAD + 4 + name_length + 8)
             .ok_or_else(too_short)?;
-        self.unread = name_length.min(LONGEST_NAME as u64);
+        self.unread = name_length.min(MAX_NAME_BYTES as u64);
         let name = self.read_body(self.unread).ok_or_else(ends_too_early)?;
         let compression = String::from_utf8_lossy(name).into_owned();
         self.body.clear();
         let mut stated = [0; 8];
         self.read_exact(&mut stated)?;
-        if u64::from_le_bytes(stated) != stored {
+        if u64::from_le_bytes(stated) != stored_length {
             let problem = "its length and that of its records differ".to_owned();
             return Err(Fault::UnreadableChunk { times, problem });
         }
@@ -435,7 +441,7 @@ impl<R: Read + Seek> McapReader<R> {
             length: content,
             crc,
             compression,
-            stored,
+            stored_length,
         };
         if let Source::File(file) = mem::replace(&mut self.source, Source::Ended) {
             match Chunk::open(&header, file) {
@@ -449,6 +455,7 @@ impl<R: Read + Seek> McapReader<R> {
         Ok(())
     }
 
+    /// Checks the checksum of a chunk, and continues after it.
     fn end_chunk(&mut self, chunk: Chunk<R>) -> Result<Option<Event>, Fault> {
         let (is_intact, times) = (chunk.is_intact(), chunk.times);
         self.source = Source::File(chunk.into_file()?);
@@ -463,28 +470,28 @@ impl<R: Read + Seek> McapReader<R> {
     }
 }
 
-/// The content of a compressed message; `None` if it is broken, or larger than [`LARGEST_MESSAGE`].
-fn unpacked(message: &[u8]) -> Option<Vec<u8>> {
+/// Decompresses a message; `None` if it is broken, or longer than [`MAX_MESSAGE_BYTES`].
+fn decompress_message(message: &[u8]) -> Option<Vec<u8>> {
     let mut body = Vec::new();
     let decoder = zstd::stream::read::Decoder::with_buffer(message).ok()?;
     let read = decoder
-        .take(LARGEST_MESSAGE + 1)
+        .take(MAX_MESSAGE_BYTES + 1)
         .read_to_end(&mut body)
         .ok()?;
-    (read as u64 <= LARGEST_MESSAGE).then_some(body)
+    (read as u64 <= MAX_MESSAGE_BYTES).then_some(body)
 }
 
-/// The problem of a file or chunk that is shorter than its records.
+/// Error message for a file or chunk that is shorter than its records.
 fn ends_too_early() -> String {
     "its bytes end too early".to_owned()
 }
 
-/// The problem of a record that is shorter than its fields.
+/// Error message for a record that is shorter than its fields.
 fn too_short() -> String {
     "a record is shorter than its fields".to_owned()
 }
 
-/// The problem of a file that does not begin as an MCAP file, by its first bytes.
+/// Error message for a file that is not an MCAP file, from its first bytes.
 fn not_mcap(start: &[u8]) -> String {
     if start.starts_with(b"#ROSBAG") {
         return "a bag of ROS 1; `darkqa-eval import rosbag FILE` shows how to convert it"

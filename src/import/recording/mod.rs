@@ -1,12 +1,12 @@
-//! Recordings of robots: MCAP files → images with their times, cameras and exposures.
+//! Recordings of robots in MCAP files: images with their times, cameras and exposures.
 //!
 //! ```text
 //! file ─ McapReader ─ Channel + bytes ─ ImageMessage ─ RawImage, or the bytes of an image file
 //!                                     └ CameraInfo, Exposure
-//! times ─ Sampling: the frames that are taken ─ Stretches: their scenes
+//! times ─ Sampler: the chosen frames ─ Stretches: their scenes
 //! ```
 //!
-//! All of it reads untrusted bytes: nothing is allocated for a length that a file states before the bytes were read.
+//! The input is untrusted: memory is never allocated for a length in a file before its bytes are read.
 
 mod camera_info;
 mod channel;
@@ -26,20 +26,20 @@ mod thumbnail;
 pub(crate) mod video;
 
 pub(crate) use camera_info::CameraInfo;
-pub(crate) use channel::{Channel, Content, camera_of};
+pub(crate) use channel::{Channel, ChannelContent, camera_name};
 pub(crate) use encoding::Encoding;
 pub(crate) use exposure::Exposure;
 pub(crate) use image_message::{ImageMessage, MessageImage, stamp};
-pub(crate) use mcap::{COMPRESSED_FILE, Event, LARGEST_MESSAGE, McapReader, Message, SQLITE_BAG};
+pub(crate) use mcap::{COMPRESSED_FILE, Event, MAX_MESSAGE_BYTES, McapReader, Message, SQLITE_BAG};
 pub(crate) use overview::{Overview, TopicOverview};
 pub(crate) use sampling::{Sampler, SamplingArgs};
 pub(crate) use stretches::{Place, Stretches, TopicClock};
 pub(crate) use thumbnail::Thumbnail;
 
-/// A time in nanoseconds, usually since 1970.
+/// Time in nanoseconds, usually since 1970.
 pub(crate) type Nanoseconds = i64;
 
-/// A time in seconds.
+/// Converts a time to seconds.
 pub(crate) fn seconds(time: Nanoseconds) -> f64 {
     time as f64 / 1e9
 }

@@ -1,27 +1,27 @@
-//! The topics of a recording: [`Overview`].
+//! Topics of a recording: [`Overview`].
 
 use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 
-use super::channel::Content;
+use super::channel::ChannelContent;
 use super::image_message::{ImageMessage, MessageImage};
-use super::mcap::{Event, LARGEST_MESSAGE, McapReader, Message};
+use super::mcap::{Event, MAX_MESSAGE_BYTES, McapReader, Message};
 use super::{Nanoseconds, seconds};
 use crate::types::text::excerpt;
 
-/// Maximum number of characters of a form: names of encodings and formats are from the recording.
-const MAX_FORM: usize = 100;
+/// Maximum number of characters of an image format, because names of encodings are from the recording.
+const MAX_FORMAT_LENGTH: usize = 100;
 
-/// Start of the form of images that cannot be read; the reason follows.
+/// Start of the format of images that cannot be read; the reason follows.
 const UNREAD: &str = "not read: ";
 
 /// All topics of a recording.
 #[derive(Debug, Default)]
 pub(crate) struct Overview {
     pub(crate) topics: BTreeMap<String, TopicOverview>,
-    /// Damage, with its place.
+    /// Messages about damage.
     pub(crate) problems: Vec<String>,
-    /// The recorder's time of the first message.
+    /// Log time of the first message.
     start: Option<Nanoseconds>,
 }
 
@@ -31,16 +31,16 @@ pub(crate) struct TopicOverview {
     pub(crate) schema: String,
     /// Number of messages.
     pub(crate) count: usize,
-    /// The least and the greatest time of a message.
+    /// First and last log time of its messages.
     pub(crate) times: [Nanoseconds; 2],
-    /// Size and encoding of the first image, or its problem; empty for other topics.
-    pub(crate) form: String,
+    /// Size and encoding of the first image, or why it cannot be read; empty for topics without images.
+    pub(crate) image_format: String,
 }
 
 impl TopicOverview {
-    /// Whether its first message has an image that can be read.
+    /// True if the first message has an image that can be read.
     pub(crate) fn has_images(&self) -> bool {
-        !self.form.is_empty() && !self.form.starts_with(UNREAD)
+        !self.image_format.is_empty() && !self.image_format.starts_with(UNREAD)
     }
 
     /// Seconds from the first message to the last.
@@ -48,7 +48,7 @@ impl TopicOverview {
         seconds(self.times[1].saturating_sub(self.times[0]))
     }
 
-    /// Messages per second; `None` for a single one.
+    /// Messages per second; `None` for a single message.
     pub(crate) fn rate(&self) -> Option<f64> {
         let duration = self.duration();
         (duration > 0.0).then(|| (self.count - 1) as f64 / duration)
@@ -56,7 +56,7 @@ impl TopicOverview {
 }
 
 impl Overview {
-    /// Adds the messages of a file. `size` finds the width and height of an image file.
+    /// Adds the messages of a file called `place`. `size` reads the width and height of an image file.
     pub(crate) fn add<R: Read + Seek>(
         &mut self,
         place: &str,
@@ -66,12 +66,12 @@ impl Overview {
         while let Some(event) = reader.next() {
             match event {
                 Event::Message(message) => {
-                    let is_new = self.count(&message);
-                    if is_new
-                        && let Some(form) = form(&mut reader, &message, &size)
+                    let is_first = self.count(&message);
+                    if is_first
+                        && let Some(format) = image_format(&mut reader, &message, &size)
                         && let Some(topic) = self.topics.get_mut(&message.channel.topic)
                     {
-                        topic.form = form;
+                        topic.image_format = format;
                     }
                 }
                 Event::ChunkRead => {}
@@ -84,7 +84,7 @@ impl Overview {
                 Event::Cut(problem) => {
                     self.problems.push(format!(
                         "{place}: the recording is cut off{}: {problem}",
-                        self.last_place()
+                        self.last_message()
                     ));
                 }
             }
@@ -96,15 +96,15 @@ impl Overview {
         seconds(time.saturating_sub(self.start.unwrap_or(time)))
     }
 
-    /// The place of the latest message, to follow a problem.
-    fn last_place(&self) -> String {
+    /// Topic and time of the latest message, to continue an error message.
+    fn last_message(&self) -> String {
         let last = self.topics.iter().max_by_key(|(_, topic)| topic.times[1]);
         last.map_or(String::new(), |(name, topic)| {
             format!(" after {name} at {:.3} s", self.since_start(topic.times[1]))
         })
     }
 
-    /// Counts a message; `true` if it is the first one of its topic.
+    /// Counts a message. Returns true if it is the first of its topic.
     fn count(&mut self, message: &Message) -> bool {
         let channel = &message.channel;
         let time = message.log_time;
@@ -118,13 +118,13 @@ impl Overview {
             schema: channel.schema.clone(),
             count: 1,
             times: [time; 2],
-            form: String::new(),
+            image_format: String::new(),
         };
         self.topics.insert(channel.topic.clone(), topic);
         true
     }
 
-    /// The names of the topics with images.
+    /// Names of the topics with images.
     pub(crate) fn image_topics(&self) -> Vec<&str> {
         self.topics
             .iter()
@@ -134,32 +134,32 @@ impl Overview {
     }
 }
 
-/// Size and encoding of an image, or its problem; `None` for other messages.
-fn form<R: Read + Seek>(
+/// Size and encoding of the image in a message, or why it cannot be read; `None` for other messages.
+fn image_format<R: Read + Seek>(
     reader: &mut McapReader<R>,
     message: &Message,
     size: impl Fn(&[u8]) -> Result<(u32, u32), String>,
 ) -> Option<String> {
     let channel = &message.channel;
     let encoding = match &channel.content {
-        Content::Image(encoding) => *encoding,
-        Content::Unread(reason) => return Some(format!("{UNREAD}{reason}")),
+        ChannelContent::Image(encoding) => *encoding,
+        ChannelContent::Unsupported(reason) => return Some(format!("{UNREAD}{reason}")),
         _ => return None,
     };
-    if message.length > LARGEST_MESSAGE {
+    if message.length > MAX_MESSAGE_BYTES {
         return Some(format!("{UNREAD}messages of {} MB", message.length >> 20));
     }
-    let parsed = ImageMessage::parse(&channel.schema, encoding, reader.body()?);
-    let form = parsed.and_then(|message| match message.image {
-        MessageImage::Raw(image) => {
-            let (width, height) = image.decode()?.size();
-            Ok(format!("{width}×{height} {}", image.encoding))
-        }
-        MessageImage::File { format, bytes } => {
-            let (width, height) = size(&bytes)?;
-            Ok(format!("{width}×{height} {format}"))
-        }
-    });
-    Some(form.unwrap_or_else(|problem| format!("{UNREAD}{problem}")))
-        .map(|form| excerpt(form.trim(), MAX_FORM))
+    let format = ImageMessage::parse(&channel.schema, encoding, reader.body()?)
+        .and_then(|message| match message.image {
+            MessageImage::Raw(image) => {
+                let (width, height) = image.decode()?.size();
+                Ok(format!("{width}×{height} {}", image.encoding))
+            }
+            MessageImage::File { format, bytes } => {
+                let (width, height) = size(&bytes)?;
+                Ok(format!("{width}×{height} {format}"))
+            }
+        })
+        .unwrap_or_else(|problem| format!("{UNREAD}{problem}"));
+    Some(excerpt(format.trim(), MAX_FORMAT_LENGTH))
 }

@@ -1,9 +1,9 @@
-//! Fields of a protobuf message by their numbers: [`fields`].
+//! Fields of a protobuf message by number: [`fields`].
 
 use super::Nanoseconds;
 use super::fields::ends_early;
 
-/// The value of a field.
+/// Value of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Value<'a> {
     Varint(u64),
@@ -13,7 +13,7 @@ pub(super) enum Value<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// The bytes of a text, a nested message or packed numbers; empty for numbers.
+    /// Bytes of a text, a nested message or packed numbers; empty for numbers.
     pub(super) fn bytes(self) -> &'a [u8] {
         match self {
             Self::Bytes(bytes) => bytes,
@@ -21,7 +21,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A whole number in any form; 0 for bytes.
+    /// Integer of any wire type; 0 for bytes.
     pub(super) fn number(self) -> u64 {
         match self {
             Self::Varint(number) => number,
@@ -35,7 +35,7 @@ impl<'a> Value<'a> {
         String::from_utf8_lossy(self.bytes()).into_owned()
     }
 
-    /// Numbers of 8 bytes: packed ones, or one that is not.
+    /// Floats of 8 bytes: a packed list, or a single one.
     pub(super) fn doubles(self) -> Vec<f64> {
         match self {
             Self::Fixed64(bytes) => vec![f64::from_le_bytes(bytes)],
@@ -49,7 +49,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A `google.protobuf.Timestamp`.
+    /// Parses a `google.protobuf.Timestamp`.
     pub(super) fn time(self) -> Result<Nanoseconds, String> {
         let mut time = 0_i64;
         for field in fields(self.bytes()) {
@@ -66,12 +66,12 @@ impl<'a> Value<'a> {
     }
 }
 
-/// The fields of a message in their order, each with its number. It ends after the first that is broken.
+/// Fields of a message in order, with their numbers. Stops after the first broken field.
 pub(super) fn fields(message: &[u8]) -> impl Iterator<Item = Result<(u64, Value<'_>), String>> {
     let mut rest = message;
     std::iter::from_fn(move || {
         (!rest.is_empty()).then(|| {
-            let field = field(&mut rest);
+            let field = parse_field(&mut rest);
             if field.is_err() {
                 rest = &[];
             }
@@ -80,7 +80,7 @@ pub(super) fn fields(message: &[u8]) -> impl Iterator<Item = Result<(u64, Value<
     })
 }
 
-fn field<'a>(rest: &mut &'a [u8]) -> Result<(u64, Value<'a>), String> {
+fn parse_field<'a>(rest: &mut &'a [u8]) -> Result<(u64, Value<'a>), String> {
     let tag = varint(rest)?;
     let value = match tag & 7 {
         0 => Value::Varint(varint(rest)?),

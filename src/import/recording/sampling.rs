@@ -1,4 +1,4 @@
-//! The choice of frames from a recording or video: [`SamplingArgs`] and [`Sampler`].
+//! Choice of frames from a recording or video: [`SamplingArgs`] and [`Sampler`].
 
 use std::num::NonZeroUsize;
 
@@ -10,7 +10,7 @@ use super::{Nanoseconds, seconds};
 use crate::types::Decides;
 use crate::types::flags::positive;
 
-/// Seconds between two frames that are taken, if no flag chooses others: the interval of DarkQA.
+/// Default interval between two frames, in seconds, as in DarkQA.
 const INTERVAL: f64 = 2.0;
 
 /// Flags that choose the frames of each topic.
@@ -34,26 +34,28 @@ pub(crate) struct SamplingArgs {
 
 /// Parses a number of seconds from 0 to a billion.
 fn interval(text: &str) -> Result<f64, String> {
-    let seconds = text.trim().parse().ok();
-    seconds
+    text.trim()
+        .parse()
+        .ok()
         .filter(|seconds| (0.0..=1e9).contains(seconds))
         .ok_or_else(|| "a number of seconds from 0 to 1e9 expected".to_owned())
 }
 
 impl SamplingArgs {
-    /// Seconds between two frames, by `--every` and its default.
+    /// Interval between two frames in seconds: `--every`, or its default.
     pub(crate) fn interval(&self) -> f64 {
-        let chooses = !self.at.is_empty() || self.max_frames.is_some() || self.changed.is_some();
-        self.every.unwrap_or(if chooses { 0.0 } else { INTERVAL })
+        let has_other_flag =
+            !self.at.is_empty() || self.max_frames.is_some() || self.changed.is_some();
+        self.every
+            .unwrap_or(if has_other_flag { 0.0 } else { INTERVAL })
     }
 
-    /// The sampler of a topic of this many seconds.
+    /// Sampler for a topic of this duration, in seconds.
     pub(crate) fn sampler(&self, duration: f64) -> Sampler {
-        let most = self.max_frames.map_or(usize::MAX, NonZeroUsize::get);
-        // Frames at 0, D / N, 2 D / N, … are N, also if the duration has a little more than the last frame.
+        // For a duration D and N frames, frames are due at 0, D/N, 2D/N, ….
         let spread = self
             .max_frames
-            .map_or(0.0, |most| duration / most.get() as f64);
+            .map_or(0.0, |limit| duration / limit.get() as f64);
         let mut at: Vec<Nanoseconds> = self
             .at
             .iter()
@@ -65,24 +67,24 @@ impl SamplingArgs {
             interval: nanoseconds(self.interval().max(spread)),
             at,
             passed: 0,
-            most,
+            limit: self.max_frames.map_or(usize::MAX, NonZeroUsize::get),
             taken: 0,
             next: 0,
-            changed: self.changed,
-            last: None,
+            min_change: self.changed,
+            last_taken: None,
         }
     }
 
-    /// The choice in words.
-    pub(crate) fn words(&self) -> String {
+    /// Description of the choice.
+    pub(crate) fn description(&self) -> String {
         let mut words = Vec::new();
         if !self.at.is_empty() {
             words.push(format!("at {} times", self.at.len()));
         } else if self.interval() > 0.0 {
             words.push(format!("one every {} s", self.interval()));
         }
-        if let Some(most) = self.max_frames {
-            words.push(format!("at most {most}, evenly spread"));
+        if let Some(limit) = self.max_frames {
+            words.push(format!("at most {limit}, evenly spread"));
         }
         if let Some(codes) = self.changed {
             words.push(format!("changed by more than {codes} codes"));
@@ -98,28 +100,31 @@ fn nanoseconds(seconds: f64) -> Nanoseconds {
     (seconds * 1e9).round() as Nanoseconds
 }
 
-/// The choice of frames of one topic, in the order in which they come.
+/// Chooses the frames of one topic, one after the other.
 #[derive(Debug)]
 pub(crate) struct Sampler {
-    /// Time between two frames; 0 for none.
+    /// Minimum time between two frames; 0 for every frame.
     interval: Nanoseconds,
-    /// Chosen times from the start, sorted; empty if the interval decides.
+    /// Times to sample since the first frame, sorted; empty if the interval decides.
     at: Vec<Nanoseconds>,
-    /// Number of chosen times that are past.
+    /// Number of these times that are in the past.
     passed: usize,
-    most: usize,
+    /// Maximum number of frames.
+    limit: usize,
+    /// Number of chosen frames.
     taken: usize,
-    /// Time from the first frame of the drive at which the next frame is due.
+    /// Time since the first frame of the drive when the next frame is due.
     next: Nanoseconds,
-    changed: Option<f64>,
-    last: Option<Thumbnail>,
+    /// Minimum difference from the last chosen frame, in 8-bit codes; `None` if pixels do not matter.
+    min_change: Option<f64>,
+    last_taken: Option<Thumbnail>,
 }
 
 impl Sampler {
-    /// Whether a frame is chosen by its time. If [`Self::compares`], its pixels decide then.
+    /// Chooses a frame by its time. If [`Self::compares_pixels`], [`Self::has_changed`] decides about a due frame.
     pub(crate) fn is_due(&mut self, place: Place) -> bool {
         let since = place.since;
-        if self.taken >= self.most {
+        if self.taken >= self.limit {
             return false;
         }
         if !self.at.is_empty() {
@@ -137,27 +142,27 @@ impl Sampler {
         is_due
     }
 
-    /// Whether pixels decide about due frames.
-    pub(crate) fn compares(&self) -> bool {
-        self.changed.is_some()
+    /// True if the pixels decide about due frames.
+    pub(crate) fn compares_pixels(&self) -> bool {
+        self.min_change.is_some()
     }
 
-    /// Whether a due frame differs enough from the last one taken; if so, it is the last one taken.
+    /// Chooses a due frame if it differs enough from the last chosen frame.
     pub(crate) fn has_changed(&mut self, thumbnail: Thumbnail) -> bool {
-        let limit = self.changed.unwrap_or(0.0);
+        let min_change = self.min_change.unwrap_or(0.0);
         let has_changed = self
-            .last
+            .last_taken
             .as_ref()
-            .is_none_or(|last| last.difference(&thumbnail) > limit);
+            .is_none_or(|last| last.difference(&thumbnail) > min_change);
         if has_changed {
-            self.last = Some(thumbnail);
+            self.last_taken = Some(thumbnail);
         } else {
             self.taken -= 1;
         }
         has_changed
     }
 
-    /// The chosen times in seconds at which no frame came.
+    /// Times given with `--at`, in seconds, after the last frame.
     pub(crate) fn missed(&self) -> Vec<f64> {
         self.at
             .iter()
@@ -171,7 +176,7 @@ impl Sampler {
 mod tests {
     use super::*;
 
-    /// The indexes of the frames that are chosen from frames at these times in seconds.
+    /// Indices of the chosen frames, from frames at these times in seconds.
     fn chosen(args: &SamplingArgs, times: &[f64]) -> Vec<usize> {
         let duration = times.last().unwrap() - times[0];
         let mut sampler = args.sampler(duration);
@@ -186,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn one_frame_for_each_interval() {
+    fn one_frame_is_chosen_per_interval() {
         let times = [100.0, 100.5, 101.9, 102.0, 102.1, 107.0, 107.5, 108.0];
         assert_eq!(chosen(&SamplingArgs::default(), &times), [0, 3, 5, 7]);
         let every = SamplingArgs {
@@ -197,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_frame_at_each_time() {
+    fn first_frame_at_each_time_is_chosen() {
         let at = SamplingArgs {
             at: vec![5.0, 0.0, 1.95, 1.96, 99.0],
             ..SamplingArgs::default()
@@ -221,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_that_did_not_change_do_not_count() {
+    fn unchanged_frames_do_not_count() {
         let args = SamplingArgs {
             changed: Some(5.0),
             max_frames: NonZeroUsize::new(2),
@@ -241,7 +246,7 @@ mod tests {
             .zip([10, 14, 15, 16, 200])
             .map(|(i, code)| takes(i, code))
             .collect();
-        // 15 differs from the last one taken, 10, by 5, and 16 by 6.
+        // 15 differs by 5 from the last chosen frame, 10, and 16 by 6.
         assert_eq!(found, [true, false, false, true, false]);
     }
 }

@@ -1,54 +1,56 @@
-//! The clocks of topics, and the parts of a drive that are scenes: [`Stretches`].
+//! Division of a drive into stretches of equal duration, one scene each: [`Stretches`].
 
 use super::Nanoseconds;
 
-/// A frame this much earlier than an earlier frame of its topic starts a new clock (chosen): messages overtake each other by less, and a
-/// recording that is played again goes further back.
-const SET_BACK: Nanoseconds = 5_000_000_000;
+/// Maximum time that a message arrives out of order (chosen). A frame that goes further back starts a new clock, as in a recording that is
+/// played again.
+const MAX_REORDERING: Nanoseconds = 5_000_000_000;
 
-/// Topics whose first frames differ by this much more in their own times than in the recorder's have different clocks (chosen): a frame
-/// reaches the recorder sooner.
-const ANOTHER_CLOCK: Nanoseconds = 1_000_000_000;
+/// Maximum difference between the delays of two topics to the recorder (chosen). If the first frames of two topics differ more than this,
+/// the topics have different clocks.
+const MAX_DELAY_DIFFERENCE: Nanoseconds = 1_000_000_000;
 
-/// The place of a frame in a drive.
+/// Position of a frame in a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Place {
     /// Time of the frame on the clock of its topic.
     pub(crate) time: Nanoseconds,
-    /// Time from the first frame of the drive, 0 or more.
+    /// Time since the first frame of the drive, at least 0.
     pub(crate) since: Nanoseconds,
     /// Number of the stretch, from 0.
     pub(crate) stretch: u64,
 }
 
-/// The clock of one topic.
+/// Clock of one topic.
 #[derive(Debug, Default)]
 pub(crate) struct TopicClock(Option<ClockRun>);
 
-/// The time since a clock was set.
+/// Run of a clock without a jump back.
 #[derive(Debug, Clone, Copy)]
 struct ClockRun {
-    /// Time of the first frame on this clock, and from the first frame of the drive.
+    /// Time of the first frame on this clock.
     first: Nanoseconds,
+    /// Time of the first frame since the first frame of the drive.
     since: Nanoseconds,
-    /// The latest time of a frame on this clock.
+    /// Latest time of a frame on this clock.
     latest: Nanoseconds,
-    /// The recorder's time of the last frame.
+    /// Log time of the last frame.
     log_time: Nanoseconds,
 }
 
 impl ClockRun {
-    /// Time from the first frame of the drive, at a time on this clock.
+    /// Converts a time on this clock to the time since the first frame of the drive.
     fn since(self, time: Nanoseconds) -> Nanoseconds {
         let passed = time.saturating_sub(self.first);
         self.since.saturating_add(passed).max(0)
     }
 }
 
-/// The stretches of a drive, of one length in time from the first frame, whatever frames are taken. The clocks of topics may differ; the
-/// recorder's time relates them, also after a clock was set back. If that was set back, too, the next stretch begins.
+/// Stretches of equal duration, counted from the first frame of the drive, whether or not it is chosen. The topics may have different
+/// clocks; the log time relates them, also after a clock jumped back. If the log time jumped back, too, the next stretch starts.
 #[derive(Debug)]
 pub(crate) struct Stretches {
+    /// Duration of a stretch.
     length: Nanoseconds,
     start: Option<DriveStart>,
 }
@@ -61,6 +63,7 @@ struct DriveStart {
 }
 
 impl Stretches {
+    /// Stretches of this duration.
     pub(crate) fn new(seconds: f64) -> Self {
         Self {
             length: ((seconds * 1e9) as Nanoseconds).max(1),
@@ -68,12 +71,12 @@ impl Stretches {
         }
     }
 
-    /// The recorder's time of the first frame.
+    /// Log time of the first frame.
     pub(crate) fn log_start(&self) -> Option<Nanoseconds> {
         self.start.map(|start| start.log_time)
     }
 
-    /// The place of the next frame of a topic, from its time on the clock of its topic and that of the recorder.
+    /// Position of the next frame of a topic, from its time on the clock of its topic and its log time.
     pub(crate) fn place(
         &mut self,
         clock: &mut TopicClock,
@@ -82,10 +85,10 @@ impl Stretches {
     ) -> Place {
         let start = *self.start.get_or_insert(DriveStart { time, log_time });
         let mut run = match clock.0 {
-            Some(run) if run.latest.saturating_sub(time) <= SET_BACK => run,
+            Some(run) if run.latest.saturating_sub(time) <= MAX_REORDERING => run,
             previous => ClockRun {
                 first: time,
-                since: self.first_of_clock(start, time, log_time, previous),
+                since: self.start_of_run(start, time, log_time, previous),
                 latest: time,
                 log_time,
             },
@@ -101,27 +104,32 @@ impl Stretches {
         }
     }
 
-    /// Time from the first frame of the drive to the first frame of a clock: by the clock, if it is that of the drive's first frame, else
-    /// by the recorder's. If both were set back, it goes on with the next stretch.
-    fn first_of_clock(
+    /// Time from the first frame of the drive to the first frame of a clock run: by the clock if it is the same as the clock of the drive's
+    /// first frame, else by the log time. If both jumped back, the run starts with the next stretch.
+    fn start_of_run(
         &self,
         start: DriveStart,
         time: Nanoseconds,
         log_time: Nanoseconds,
         previous: Option<ClockRun>,
     ) -> Nanoseconds {
-        let recorded = log_time.saturating_sub(start.log_time);
+        let by_log = log_time.saturating_sub(start.log_time);
         let Some(previous) = previous else {
-            let stated = time.saturating_sub(start.time);
-            let is_same = stated.saturating_sub(recorded).saturating_abs() <= ANOTHER_CLOCK;
-            return if is_same { stated } else { recorded.max(0) };
+            let by_clock = time.saturating_sub(start.time);
+            let is_same_clock =
+                by_clock.saturating_sub(by_log).saturating_abs() <= MAX_DELAY_DIFFERENCE;
+            return if is_same_clock {
+                by_clock
+            } else {
+                by_log.max(0)
+            };
         };
         if log_time > previous.log_time {
-            return recorded.max(0);
+            return by_log.max(0);
         }
         let passed = previous.since(previous.latest) / self.length;
         let next = passed.saturating_add(1).saturating_mul(self.length);
-        recorded.max(next)
+        by_log.max(next)
     }
 }
 
@@ -143,21 +151,21 @@ mod tests {
     }
 
     #[test]
-    fn stretches_have_one_length_from_the_first_frame() {
+    fn stretches_are_counted_from_the_first_frame() {
         assert_eq!(stretches(&[5.0, 14.9, 15.0, 44.0]), [0, 0, 1, 3]);
     }
 
     #[test]
-    fn a_clock_set_back_starts_the_next_stretch() {
+    fn clock_that_jumps_back_starts_the_next_stretch() {
         assert_eq!(stretches(&[100.0, 125.0, 3.0, 12.0, 14.0]), [0, 2, 3, 3, 4]);
-        // A drive that is played again has its first time twice.
+        // A drive that is played again repeats its first time.
         assert_eq!(stretches(&[100.0, 125.0, 100.0, 111.0]), [0, 2, 3, 4]);
-        // Frames that overtake each other do not.
+        // Frames that are slightly out of order do not start a stretch.
         assert_eq!(stretches(&[100.0, 100.9, 100.2, 99.95]), [0, 0, 0, 0]);
     }
 
     #[test]
-    fn topics_with_other_clocks_share_their_stretches() {
+    fn topics_with_different_clocks_share_stretches() {
         for milliseconds in [0, 900, -1200, 2000, -1_600_000_000_000] {
             let offset = milliseconds * 1_000_000;
             let mut stretches = Stretches::new(10.0);
@@ -178,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_is_played_again_goes_on_by_the_recorder() {
+    fn replayed_drive_continues_by_log_time() {
         let (mut stretches, mut clock) = (Stretches::new(10.0), TopicClock::default());
         let found = [(0, 0), (24, 24), (0, 25), (24, 49)].map(|(time, log_time)| {
             let [time, log_time] = [time, log_time].map(|seconds| seconds * 1_000_000_000);
@@ -188,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn any_times_have_places() {
+    fn extreme_times_do_not_overflow() {
         let (mut stretches, mut clock) = (Stretches::new(1e-9), TopicClock::default());
         for time in [i64::MIN, i64::MAX, 0, i64::MIN, -1, i64::MAX] {
             for log_time in [i64::MIN, 0, i64::MAX] {

@@ -1,4 +1,4 @@
-//! Recordings of every form, and thousands of damaged ones, read in memory.
+//! Recordings in every format, and thousands of damaged ones, read from memory.
 
 #[allow(
     dead_code,
@@ -17,7 +17,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use self::recording::{Compression, Records, drive, image};
 use super::*;
 
-/// What came of reading a recording.
+/// Result of reading a recording.
 #[derive(Debug, Default, PartialEq)]
 struct ReadBack {
     /// Messages whose body was read.
@@ -36,9 +36,9 @@ fn read(file: &[u8]) -> ReadBack {
     };
     while let Some(event) = reader.next() {
         match event {
-            Event::Message(message) if message.length <= LARGEST_MESSAGE => {
+            Event::Message(message) if message.length <= MAX_MESSAGE_BYTES => {
                 let schema = &message.channel.schema;
-                if let Content::Image(encoding) = message.channel.content
+                if let ChannelContent::Image(encoding) = message.channel.content
                     && let Some(start) = reader.start_of_body(64)
                 {
                     stamp(schema, encoding, start);
@@ -48,7 +48,7 @@ fn read(file: &[u8]) -> ReadBack {
                 };
                 found.messages += 1;
                 match &message.channel.content {
-                    Content::Image(encoding) => {
+                    ChannelContent::Image(encoding) => {
                         let parsed = ImageMessage::parse(schema, *encoding, body);
                         found.images +=
                             usize::from(parsed.is_ok_and(|message| match message.image {
@@ -56,9 +56,11 @@ fn read(file: &[u8]) -> ReadBack {
                                 MessageImage::File { bytes, .. } => !bytes.is_empty(),
                             }));
                     }
-                    Content::Camera(encoding) => drop(CameraInfo::parse(schema, *encoding, body)),
-                    Content::Exposure(fields) => drop(fields.parse(body)),
-                    Content::Unread(_) | Content::Other => {}
+                    ChannelContent::Camera(encoding) => {
+                        drop(CameraInfo::parse(schema, *encoding, body));
+                    }
+                    ChannelContent::Exposure(fields) => drop(fields.parse(body)),
+                    ChannelContent::Unsupported(_) | ChannelContent::Other => {}
                 }
             }
             Event::Message(_) => {}

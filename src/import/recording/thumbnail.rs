@@ -1,4 +1,4 @@
-//! A small grey copy of a frame, by which frames are compared: [`Thumbnail`].
+//! Small grey copy of a frame, to compare frames: [`Thumbnail`].
 
 use crate::types::Rgb;
 
@@ -10,7 +10,7 @@ const SIDE: usize = 16;
 pub(crate) struct Thumbnail(Vec<f64>);
 
 impl Thumbnail {
-    /// The thumbnail of an image.
+    /// Makes the thumbnail of an image.
     pub(crate) fn new(image: &Rgb) -> Self {
         let mut blocks = vec![(0_u64, 0_u64); SIDE * SIDE];
         for (y, row) in image.samples().chunks_exact(image.width() * 3).enumerate() {
@@ -21,23 +21,26 @@ impl Thumbnail {
                 *count += 3;
             }
         }
-        // An image smaller than the grid leaves blocks empty, in every frame the same ones.
-        let mean = |(sum, count): (u64, u64)| sum as f64 / count.max(1) as f64;
+        // An image smaller than the grid has empty blocks, the same ones in every frame.
         Self(
             blocks
                 .into_iter()
                 .filter(|(_, count)| *count > 0)
-                .map(mean)
+                .map(|(sum, count)| sum as f64 / count as f64)
                 .collect(),
         )
     }
 
-    /// The mean absolute difference of the blocks, in 8-bit codes; frames of other sizes may have other blocks, and are compared as far as
-    /// both have them.
+    /// Mean absolute difference of the blocks, in 8-bit codes. Frames of other sizes may have fewer blocks; only the blocks that both have
+    /// are compared.
     pub(crate) fn difference(&self, other: &Self) -> f64 {
-        let pairs = self.0.iter().zip(&other.0);
         let count = self.0.len().min(other.0.len()).max(1);
-        pairs.map(|(a, b)| (a - b).abs()).sum::<f64>() / count as f64
+        self.0
+            .iter()
+            .zip(&other.0)
+            .map(|(a, b)| (a - b).abs())
+            .sum::<f64>()
+            / count as f64
     }
 }
 

@@ -1,10 +1,10 @@
-//! Frames of a video, decoded by the program ffmpeg: [`Video`].
+//! Frames of a video, decoded by the program `ffmpeg`: [`Video`].
 
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdout, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use super::Nanoseconds;
@@ -13,22 +13,22 @@ use crate::picture::reading_rule::MOST_PIXELS;
 use crate::types::Rgb;
 use crate::types::text::excerpt;
 
-/// The most lines of ffmpeg that are kept for a message.
-const LAST_LINES: usize = 2;
+/// Maximum number of lines of ffmpeg in an error message.
+const MAX_LOG_LINES: usize = 2;
 
-/// A video file, as ffmpeg describes it.
+/// Video file with metadata from ffmpeg.
 #[derive(Debug)]
 pub(crate) struct Video {
     path: PathBuf,
-    /// Seconds; `None` if the file does not state it.
+    /// Duration in seconds; `None` if unknown.
     pub(crate) duration: Option<f64>,
     /// Codec, size and rate of the first video stream.
     pub(crate) stream: String,
-    /// The option of this version that keeps every frame once.
+    /// Option of the installed version to output every frame once.
     passthrough: [&'static str; 2],
 }
 
-/// A frame of a video.
+/// Frame of a video.
 #[derive(Debug)]
 pub(crate) struct VideoFrame {
     /// Time from the start of the video.
@@ -36,7 +36,7 @@ pub(crate) struct VideoFrame {
     pub(crate) image: Rgb,
 }
 
-/// The frames of a video while ffmpeg decodes it; it is stopped when this is dropped.
+/// Running decoder of a video. Dropping it stops ffmpeg.
 #[derive(Debug)]
 pub(crate) struct VideoFrames {
     path: PathBuf,
@@ -46,14 +46,15 @@ pub(crate) struct VideoFrames {
     log: Option<JoinHandle<FfmpegLog>>,
 }
 
-/// Lines that ffmpeg wrote while it decoded.
+/// Log of ffmpeg.
 #[derive(Debug, Default)]
 struct FfmpegLog {
-    /// The last lines, without those about frames.
+    /// Last lines, without lines about frames.
     last: Vec<String>,
-    /// The first line about damage, and the number of such lines.
+    /// First line about damage.
     first_damage: Option<String>,
-    damages: usize,
+    /// Number of lines about damage.
+    damage_lines: usize,
 }
 
 /// Words in ffmpeg's lines about damage, in lower case.
@@ -62,24 +63,24 @@ const DAMAGE_WORDS: [&str; 4] = ["error", "invalid", "corrupt", "truncating"];
 impl FfmpegLog {
     fn add(&mut self, line: &str) {
         let words = line.to_lowercase();
-        // The names of files, and their metadata, which are indented, are no damage.
+        // Names of files and their indented metadata may contain these words.
         let is_about_file = line.starts_with([' ', '\t'])
             || ["Input #", "Output #"]
                 .iter()
                 .any(|start| line.starts_with(start));
         if !is_about_file && DAMAGE_WORDS.iter().any(|word| words.contains(word)) {
-            self.damages += 1;
+            self.damage_lines += 1;
             self.first_damage.get_or_insert_with(|| line.to_owned());
         }
         self.last.push(line.trim().to_owned());
-        if self.last.len() > LAST_LINES {
+        if self.last.len() > MAX_LOG_LINES {
             self.last.remove(0);
         }
     }
 }
 
 impl Video {
-    /// Asks ffmpeg about a file.
+    /// Reads the metadata of a file with ffmpeg.
     ///
     /// # Errors
     /// If ffmpeg is not on PATH, or finds no video in the file.
@@ -88,7 +89,7 @@ impl Video {
         let output = ffmpeg(path)
             .stdin(Stdio::null())
             .output()
-            .map_err(|e| unstarted(&e))?;
+            .map_err(|e| start_error(&e))?;
         let log = String::from_utf8_lossy(&output.stderr).into_owned();
         let Some((_, stream)) = log.split_once(" Video: ") else {
             let lines: Vec<String> = log.lines().map(str::to_owned).collect();
@@ -97,12 +98,12 @@ impl Video {
         };
         let duration = log
             .split_once("Duration: ")
-            .and_then(|(_, rest)| clock(rest.split(',').next()?));
+            .and_then(|(_, rest)| parse_duration(rest.split(',').next()?));
         Ok(Self {
             path: path.to_owned(),
             duration,
             stream: stream.lines().next().unwrap_or_default().trim().to_owned(),
-            passthrough: if has_fps_mode(&log) {
+            passthrough: if supports_fps_mode(&log) {
                 ["-fps_mode", "passthrough"]
             } else {
                 ["-vsync", "passthrough"]
@@ -116,9 +117,10 @@ impl Video {
     /// If ffmpeg cannot be started.
     pub(crate) fn frames(&self, interval: f64) -> Result<VideoFrames> {
         let filter = if interval > 0.0 {
-            // The little more is for frames at a multiple of the interval, whose quotient may be rounded down.
-            let number = |time: &str| format!("floor(({time}-start_t)/{interval}+1e-7)");
-            let (this, last) = (number("t"), number("prev_selected_t"));
+            // The small addend is for frames at a multiple of the interval, whose quotient may be rounded down.
+            let interval_number = |time: &str| format!("floor(({time}-start_t)/{interval}+1e-7)");
+            let this = interval_number("t");
+            let last = interval_number("prev_selected_t");
             format!("select='isnan(prev_selected_t)+gt({this},{last})',showinfo")
         } else {
             "showinfo".to_owned()
@@ -131,33 +133,12 @@ impl Video {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
-        let mut child = command.spawn().map_err(|e| unstarted(&e))?;
+        let mut child = command.spawn().map_err(|e| start_error(&e))?;
         let (Some(output), Some(log)) = (child.stdout.take(), child.stderr.take()) else {
-            return Err(unstarted(&ErrorKind::BrokenPipe.into()));
+            return Err(start_error(&ErrorKind::BrokenPipe.into()));
         };
         let (sender, times) = channel();
-        let log = thread::spawn(move || {
-            let mut kept = FfmpegLog::default();
-            let mut base = None;
-            let mut lines = BufReader::new(log);
-            let mut line = Vec::new();
-            // Bytes, because names in a file need not be UTF-8.
-            while lines
-                .read_until(b'\n', &mut line)
-                .is_ok_and(|count| count > 0)
-            {
-                let text = String::from_utf8_lossy(&line);
-                base = time_base(&text).or(base);
-                match base.and_then(|base| time(&text, base)) {
-                    // The receiver is gone if the rest of the video is not wanted.
-                    Some(time) => drop(sender.send(time)),
-                    None if text.contains("showinfo") => {}
-                    None => kept.add(text.trim_end()),
-                }
-                line.clear();
-            }
-            kept
-        });
+        let log = thread::spawn(move || read_log(log, &sender));
         Ok(VideoFrames {
             path: self.path.clone(),
             child,
@@ -168,7 +149,31 @@ impl Video {
     }
 }
 
-/// ffmpeg with a file as its input. Only files are opened: a playlist in a stranger's file leads to no server.
+/// Reads the log of a running ffmpeg, and sends the times of the frames.
+fn read_log(log: ChildStderr, times: &Sender<Nanoseconds>) -> FfmpegLog {
+    let mut kept = FfmpegLog::default();
+    let mut base = None;
+    let mut lines = BufReader::new(log);
+    let mut line = Vec::new();
+    // Lines are read as bytes, because names in a file need not be UTF-8.
+    while lines
+        .read_until(b'\n', &mut line)
+        .is_ok_and(|count| count > 0)
+    {
+        let text = String::from_utf8_lossy(&line);
+        base = parse_time_base(&text).or(base);
+        match base.and_then(|base| parse_frame_time(&text, base)) {
+            // Sending fails if the rest of the video is not needed.
+            Some(time) => drop(times.send(time)),
+            None if text.contains("showinfo") => {}
+            None => kept.add(text.trim_end()),
+        }
+        line.clear();
+    }
+    kept
+}
+
+/// ffmpeg with a file as input. It may only open files, so a playlist in an untrusted file cannot lead to a server.
 fn ffmpeg(path: &Path) -> Command {
     let mut input = OsString::from("file:");
     input.push(path);
@@ -185,7 +190,8 @@ fn ffmpeg(path: &Path) -> Command {
     command
 }
 
-fn unstarted(problem: &std::io::Error) -> Error {
+/// Error if ffmpeg cannot be started.
+fn start_error(problem: &std::io::Error) -> Error {
     let remedy = if problem.kind() == ErrorKind::NotFound {
         "not found on PATH; videos are decoded by it: install it (apt install ffmpeg, brew install ffmpeg), or give the folder of extracted images to --data".to_owned()
     } else {
@@ -194,8 +200,8 @@ fn unstarted(problem: &std::io::Error) -> Error {
     Error::usage("ffmpeg", remedy)
 }
 
-/// Whether the version of ffmpeg knows `-fps_mode` (5.1), by its first line. Builds without a number are new.
-fn has_fps_mode(log: &str) -> bool {
+/// True if this version of ffmpeg supports `-fps_mode` (5.1 or later), from the first line of its log. Builds without a number are recent.
+fn supports_fps_mode(log: &str) -> bool {
     let version = log
         .split_once("ffmpeg version ")
         .map_or("", |(_, rest)| rest);
@@ -210,8 +216,8 @@ fn has_fps_mode(log: &str) -> bool {
     }
 }
 
-/// The seconds of a duration such as `00:01:02.50`.
-fn clock(text: &str) -> Option<f64> {
+/// Parses a duration such as `00:01:02.50` to seconds.
+fn parse_duration(text: &str) -> Option<f64> {
     let mut seconds = 0.0;
     for part in text.trim().split(':') {
         seconds = seconds * 60.0 + part.parse::<f64>().ok()?;
@@ -219,38 +225,39 @@ fn clock(text: &str) -> Option<f64> {
     Some(seconds)
 }
 
-/// The seconds of a unit of time in the first line of the filter `showinfo`: numerator and denominator.
-fn time_base(line: &str) -> Option<[i64; 2]> {
+/// Parses the seconds per unit of time in the first line of the filter `showinfo`: numerator and denominator.
+fn parse_time_base(line: &str) -> Option<[i64; 2]> {
     let (_, rest) = line.split_once("config in time_base: ")?;
     let (numerator, denominator) = rest.split(',').next()?.trim().split_once('/')?;
     let base = [numerator.parse().ok()?, denominator.parse().ok()?];
     base.iter().all(|number| *number > 0).then_some(base)
 }
 
-/// The time in a line of `showinfo` about a frame. Its `pts_time` has six digits, which are too few for long videos.
-fn time(line: &str, [numerator, denominator]: [i64; 2]) -> Option<Nanoseconds> {
+/// Parses the time in a line of `showinfo` about a frame. Its `pts_time` is not used, because six digits are too few for long videos.
+fn parse_frame_time(line: &str, [numerator, denominator]: [i64; 2]) -> Option<Nanoseconds> {
     let (_, rest) = line.split_once(" pts:")?;
     let units: i64 = rest.split_whitespace().next()?.parse().ok()?;
     let time = i128::from(units) * i128::from(numerator) * 1_000_000_000 / i128::from(denominator);
     Nanoseconds::try_from(time).ok()
 }
 
+/// Joins the last lines of a log.
 fn last_lines(lines: &[String]) -> String {
-    lines[lines.len().saturating_sub(LAST_LINES)..].join("; ")
+    lines[lines.len().saturating_sub(MAX_LOG_LINES)..].join("; ")
 }
 
 impl VideoFrames {
-    /// The next frame; `None` at the end.
+    /// Reads the next frame; `None` at the end.
     ///
     /// # Errors
-    /// If ffmpeg fails, or writes something else than an image.
+    /// If ffmpeg fails, or its output is not an image.
     pub(crate) fn next(&mut self) -> Result<Option<VideoFrame>> {
-        match self.image() {
+        match self.read_image() {
             Ok(Some(image)) => {
                 let time = self
                     .times
                     .recv()
-                    .map_err(|_| self.failed("it states no time of a frame"))?;
+                    .map_err(|_| self.failure("it states no time of a frame"))?;
                 Ok(Some(VideoFrame { time, image }))
             }
             Ok(None) => {
@@ -258,25 +265,25 @@ impl VideoFrames {
                 if status.is_ok_and(|status| status.success()) {
                     return Ok(None);
                 }
-                Err(self.failed("it ends with an error"))
+                Err(self.failure("it ends with an error"))
             }
-            Err(problem) => Err(self.failed(&problem)),
+            Err(problem) => Err(self.failure(&problem)),
         }
     }
 
-    /// The next image in the format PPM.
-    fn image(&mut self) -> Result<Option<Rgb>, String> {
-        let Some(magic) = self.word()? else {
+    /// Reads the next image, in the format PPM.
+    fn read_image(&mut self) -> Result<Option<Rgb>, String> {
+        let Some(magic) = self.read_word()? else {
             return Ok(None);
         };
         let mut number = || {
-            let word = self.word()?.unwrap_or_default();
+            let word = self.read_word()?.unwrap_or_default();
             word.parse::<usize>()
                 .map_err(|_| format!("{word:?} in the head of an image"))
         };
-        let (width, height, white) = (number()?, number()?, number()?);
+        let (width, height, max_value) = (number()?, number()?, number()?);
         let pixels = width.saturating_mul(height);
-        if magic != "P6" || white != 255 || pixels == 0 || pixels as u64 > MOST_PIXELS {
+        if magic != "P6" || max_value != 255 || pixels == 0 || pixels as u64 > MOST_PIXELS {
             return Err(format!("an image {magic} of {width} × {height} pixels"));
         }
         let mut samples = vec![0; pixels * 3];
@@ -288,8 +295,8 @@ impl VideoFrames {
             .map_err(|e| e.to_string())
     }
 
-    /// The next word of the head of an image, without the blank after it; `None` at the end.
-    fn word(&mut self) -> Result<Option<String>, String> {
+    /// Reads the next word of the header of an image and the space after it; `None` at the end.
+    fn read_word(&mut self) -> Result<Option<String>, String> {
         let mut word = String::new();
         loop {
             let mut byte = [0];
@@ -304,20 +311,20 @@ impl VideoFrames {
         }
     }
 
-    /// The damage that ffmpeg reported in a video that it decoded to the end; `None` if it reported none.
+    /// Message about damage that ffmpeg reported while it decoded the video to the end; `None` if it reported none.
     pub(crate) fn damage(mut self) -> Option<String> {
         let log = self.log.take()?.join().ok()?;
         let first = log.first_damage?;
-        let count = match log.damages {
+        let count = match log.damage_lines {
             1 => "a problem".to_owned(),
             count => format!("{count} problems, first"),
         };
         Some(format!("ffmpeg reports {count}: {}", excerpt(&first, 150)))
     }
 
-    /// The error for a failure of ffmpeg, with its last lines.
-    fn failed(&mut self, problem: &str) -> Error {
-        // Both may fail only because it has ended.
+    /// Stops ffmpeg, and returns the error with its last lines.
+    fn failure(&mut self, problem: &str) -> Error {
+        // These fail only if ffmpeg has already ended.
         drop(self.child.kill());
         drop(self.child.wait());
         let log = self
@@ -342,28 +349,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_files_are_no_damage() {
+    fn file_names_are_not_damage() {
         let mut log = FfmpegLog::default();
         log.add("Input #0, mov, from 'file:error_cases/x.mp4':");
         log.add("    title           : Error 404");
-        assert_eq!(log.damages, 0);
+        assert_eq!(log.damage_lines, 0);
         log.add("[h264 @ 0x1] error while decoding MB 3 5");
-        assert_eq!(log.damages, 1);
+        assert_eq!(log.damage_lines, 1);
     }
 
     #[test]
-    fn lines_of_ffmpeg_are_understood() {
-        let base =
-            time_base("[Parsed_showinfo_1 @ 0x55] config in time_base: 1/30000, frame_rate: 30/1");
+    fn log_of_ffmpeg_is_parsed() {
+        let base = parse_time_base(
+            "[Parsed_showinfo_1 @ 0x55] config in time_base: 1/30000, frame_rate: 30/1",
+        );
         assert_eq!(base, Some([1, 30_000]));
         let line = "[Parsed_showinfo_1 @ 0x55] n:   3 pts:  45045 pts_time:1.5015  duration:  1";
-        assert_eq!(time(line, [1, 30_000]), Some(1_501_500_000));
+        assert_eq!(parse_frame_time(line, [1, 30_000]), Some(1_501_500_000));
         assert_eq!(
-            time("[Parsed_showinfo_1 @ 0x55] color_range:tv", [1, 1]),
+            parse_frame_time("[Parsed_showinfo_1 @ 0x55] color_range:tv", [1, 1]),
             None
         );
-        assert_eq!(clock(" 00:01:02.50"), Some(62.5));
-        assert_eq!(clock("N/A"), None);
+        assert_eq!(parse_duration(" 00:01:02.50"), Some(62.5));
+        assert_eq!(parse_duration("N/A"), None);
         for (version, expected) in [
             ("4.4.2-0ubuntu", false),
             ("5.0", false),
@@ -373,7 +381,7 @@ mod tests {
             ("N-119", true),
         ] {
             assert_eq!(
-                has_fps_mode(&format!("ffmpeg version {version} Copyright")),
+                supports_fps_mode(&format!("ffmpeg version {version} Copyright")),
                 expected,
                 "{version}"
             );

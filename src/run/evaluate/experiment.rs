@@ -76,7 +76,7 @@ impl Experiment for ChoiceSetup<'_> {
             .chain(others)
             .map(|question| RunQuestion {
                 image: self.digests.get(&question.frame).copied(),
-                images: self.dataset.several(&question.frame).to_vec(),
+                images: self.dataset.image_series(&question.frame).to_vec(),
                 ..RunQuestion::new(
                     question,
                     self.file_places[&question.id],
@@ -124,7 +124,7 @@ impl Experiment for ChoiceSetup<'_> {
     fn notes(&self) -> Vec<(&'static str, Value)> {
         let bank = self.config.bank.iter();
         let bank = bank.map(|bank| ("questions without answers", json!(bank.words())));
-        let reading = match self.dataset.reading() {
+        let reading = match self.dataset.summary() {
             [] => None,
             lines => Some(("reading of the data", json!(lines))),
         };

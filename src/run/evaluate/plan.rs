@@ -136,7 +136,7 @@ fn prompts(
                     (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
                     _ => Prompt::from_text(words.into()),
                 };
-                let several = setup.dataset.several(&question.frame);
+                let several = setup.dataset.image_series(&question.frame);
                 Ok(match view {
                     View::Image if !several.is_empty() => prompt.with_places(ImagePlaces::Marked),
                     View::Image | View::Blind => prompt,

@@ -24,7 +24,7 @@ pub(super) fn power(
     let mut ties = FrameTies::default();
     for question in questions {
         let frame = &question.frame;
-        let (scene, several) = (dataset.scene(frame), dataset.several(frame));
+        let (scene, several) = (dataset.scene(frame), dataset.image_series(frame));
         if !scene.is_empty() {
             ties.scenes.insert(frame.clone(), scene);
         }

@@ -160,7 +160,7 @@ impl<'a> ChoiceSetup<'a> {
 
     /// Prints the inferred column mapping of a ready-made set, and warns about unnamed scenes.
     pub(super) fn say_reading(&self, progress: &Progress) {
-        for line in self.dataset.reading_to_say() {
+        for line in self.dataset.printed_summary() {
             progress.note(line);
         }
         if let Some(warning) = unnamed_scenes(&self.dataset, &self.questions) {

@@ -40,7 +40,7 @@ pub(crate) struct ExportArgs {
     #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
     pub kind: SetForm,
     /// A folder of frames, or a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them)
-    #[arg(value_name = "DATA", value_parser = dataset::place, add = Decides::Reply)]
+    #[arg(value_name = "DATA", value_parser = dataset::parse_data_place, add = Decides::Reply)]
     pub data: DataPlace,
     /// Where the sets go, one for each condition
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
@@ -96,7 +96,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         rule,
         progress,
     )?;
-    for line in dataset.reading_to_say() {
+    for line in dataset.printed_summary() {
         progress.note(line);
     }
     let questions = select(dataset.questions().to_vec(), &args.selection)?;
@@ -206,7 +206,7 @@ fn part_of_frames(
 fn refuse_several_images(dataset: &Dataset, questions: &[Question]) -> Result<()> {
     let mut several = questions
         .iter()
-        .filter(|question| !dataset.several(&question.frame).is_empty());
+        .filter(|question| !dataset.image_series(&question.frame).is_empty());
     match several.next() {
         None => Ok(()),
         Some(first) => Err(Error::usage(
@@ -215,7 +215,7 @@ fn refuse_several_images(dataset: &Dataset, questions: &[Question]) -> Result<()
                 "the question {:?} shows {} images, and an exported set has one image per question; --multi-image skip leaves such rows \
                  out",
                 first.id.0,
-                dataset.several(&first.frame).len()
+                dataset.image_series(&first.frame).len()
             ),
         )),
     }

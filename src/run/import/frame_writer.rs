@@ -8,11 +8,11 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
-use crate::dataset::frame_folder::{self, FramePaths};
+use crate::dataset::frame_folder::{self, FrameOutput};
 use crate::error::{Error, Result};
 use crate::images::frames::InputTally;
 use crate::import::recording::{
-    Channel, Content, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
+    Channel, ChannelContent, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
 };
 use crate::picture::ImageFile;
 use crate::picture::raw_image::RawPixels;
@@ -199,13 +199,13 @@ impl<'a> FrameWriter<'a> {
             },
         };
         let scene = format!("{}-{:04}", self.drive, frame.place.stretch);
-        let paths = FramePaths {
+        let output = FrameOutput {
             out: self.out,
             scene: &scene,
             frame: &frame.name,
         };
-        let mut line = paths.line(encoded.size);
-        let path = paths
+        let mut line = output.line(encoded.size);
+        let path = output
             .write("rgb", encoded.ending, &encoded.bytes)
             .map_err(|e| e.to_string())?;
         line.insert("rgb".to_owned(), json!(path));
@@ -292,7 +292,7 @@ impl<'a> FrameWriter<'a> {
         };
         self.written.sort_by_cached_key(key);
         let lines = self.written.iter().map(|written| &written.line);
-        frame_folder::finish(self.out, &Labels::default(), info, lines)?;
+        frame_folder::write_folder_files(self.out, &Labels::default(), info, lines)?;
         let mut scenes: Vec<&Value> = self
             .written
             .iter()
@@ -352,7 +352,7 @@ pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<T
 
 fn parse<'a>(channel: &Channel, bytes: &'a [u8]) -> Result<ImageMessage<'a>, String> {
     match channel.content {
-        Content::Image(encoding) => ImageMessage::parse(&channel.schema, encoding, bytes),
+        ChannelContent::Image(encoding) => ImageMessage::parse(&channel.schema, encoding, bytes),
         _ => Err(format!("a message of {}, not an image", channel.schema)),
     }
 }

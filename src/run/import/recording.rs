@@ -18,9 +18,9 @@ use crate::error::{Error, Result};
 use crate::images::progress::{Progress, StepBar};
 use crate::images::workers::{ThreadArgs, pool};
 use crate::import::recording::{
-    CameraInfo, Content, Encoding, Event, ImageMessage, LARGEST_MESSAGE, McapReader, Message,
-    Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview, camera_of,
-    seconds, stamp,
+    CameraInfo, ChannelContent, Encoding, Event, ImageMessage, MAX_MESSAGE_BYTES, McapReader,
+    Message, Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview,
+    camera_name, seconds, stamp,
 };
 use crate::runs::Outcome;
 use crate::text::words::{counted, first_names};
@@ -312,10 +312,10 @@ impl<'a> Import<'a> {
             bar.advance(position - megabytes);
             megabytes = position;
         }
-        if reader.without_channel > 0 {
+        if reader.messages_without_channel > 0 {
             problems.push(format!(
                 "{place}: {} of topics that are not described",
-                counted(reader.without_channel as usize, "message")
+                counted(reader.messages_without_channel as usize, "message")
             ));
         }
         self.writer.write_waiting();
@@ -329,7 +329,7 @@ impl<'a> Import<'a> {
     /// Takes what is needed of a message.
     fn take(&mut self, reader: &mut McapReader<File>, message: &Message) {
         let channel = &message.channel;
-        let has_images = matches!(channel.content, Content::Image(_));
+        let has_images = matches!(channel.content, ChannelContent::Image(_));
         if has_images && !self.with_images.contains(&channel.topic) {
             self.with_images.insert(channel.topic.clone());
         }
@@ -338,7 +338,7 @@ impl<'a> Import<'a> {
         {
             taken.seen += 1;
             let problem = match &channel.content {
-                Content::Unread(reason) => format!("{}: {reason}", channel.topic),
+                ChannelContent::Unsupported(reason) => format!("{}: {reason}", channel.topic),
                 _ => format!(
                     "{}: messages of {} are no images",
                     channel.topic, channel.schema
@@ -347,22 +347,22 @@ impl<'a> Import<'a> {
             self.writer.fail(&channel.topic, &problem);
         }
         match &channel.content {
-            Content::Camera(encoding) if message.length <= LARGEST_MESSAGE => {
+            ChannelContent::Camera(encoding) if message.length <= MAX_MESSAGE_BYTES => {
                 if let Some(bytes) = reader.body()
                     && let Ok(info) = CameraInfo::parse(&channel.schema, *encoding, bytes)
                 {
                     self.cameras
-                        .add(camera_of(&channel.topic), message.log_time, info);
+                        .add(camera_name(&channel.topic), message.log_time, info);
                 }
             }
-            Content::Exposure(fields) if message.length <= LARGEST_MESSAGE => {
+            ChannelContent::Exposure(fields) if message.length <= MAX_MESSAGE_BYTES => {
                 if let Some(bytes) = reader.body()
                     && let Ok(Some(exposure)) = fields.parse(bytes)
                 {
-                    self.exposures.add(camera_of(&channel.topic), exposure);
+                    self.exposures.add(camera_name(&channel.topic), exposure);
                 }
             }
-            Content::Image(encoding) if self.topics.contains_key(&channel.topic) => {
+            ChannelContent::Image(encoding) if self.topics.contains_key(&channel.topic) => {
                 self.take_image(reader, message, *encoding);
             }
             _ => {}
@@ -372,12 +372,12 @@ impl<'a> Import<'a> {
     fn take_image(&mut self, reader: &mut McapReader<File>, message: &Message, encoding: Encoding) {
         let topic = message.channel.topic.clone();
         let schema = &message.channel.schema;
-        if message.length > LARGEST_MESSAGE {
+        if message.length > MAX_MESSAGE_BYTES {
             let since = self.since_start(message.log_time);
             let problem = format!(
                 "{topic} at {since:.3} s: a message of {} MB; {} MB at most are read",
                 message.length >> 20,
-                LARGEST_MESSAGE >> 20
+                MAX_MESSAGE_BYTES >> 20
             );
             self.writer.fail(&topic, &problem);
             return;
@@ -413,7 +413,7 @@ impl<'a> Import<'a> {
             return;
         }
         let bytes = reader.take_body();
-        if taken.sampler.compares() {
+        if taken.sampler.compares_pixels() {
             // The writer finds the problem of an image that cannot be decoded, too, and counts it.
             if let Ok(thumbnail) = thumbnail(&message.channel, &bytes, self.white)
                 && !taken.sampler.has_changed(thumbnail)
@@ -422,7 +422,7 @@ impl<'a> Import<'a> {
             }
         }
         let name = format!("{}{number:06}", taken.prefix);
-        self.exposures.want(camera_of(&topic), time);
+        self.exposures.want(camera_name(&topic), time);
         let frame = ChosenFrame {
             topic,
             name,
@@ -469,7 +469,7 @@ impl<'a> Import<'a> {
     fn add_camera_facts(&mut self) -> [usize; 2] {
         let [mut with_intrinsics, mut with_exposure] = [0; 2];
         for written in &mut self.writer.written {
-            let camera = camera_of(&written.topic);
+            let camera = camera_name(&written.topic);
             let intrinsics =
                 self.cameras
                     .intrinsics(camera, &written.topic, written.log_time, written.size);
@@ -520,7 +520,7 @@ impl<'a> Import<'a> {
             output,
             "topics: {}; {}",
             names.join(", "),
-            args.sampling.words()
+            args.sampling.description()
         );
         let _ = writeln!(
             output,

@@ -29,18 +29,18 @@ fn lines(overview: &Overview) -> String {
         overview
             .topics
             .iter()
-            .filter(|(_, topic)| !topic.form.is_empty())
+            .filter(|(_, topic)| !topic.image_format.is_empty())
             .map(|(name, topic)| text(name, topic))
             .max()
             .unwrap_or(0)
     };
     let names = width(|name, _| name.chars().count());
-    let forms = width(|_, topic| topic.form.chars().count());
+    let forms = width(|_, topic| topic.image_format.chars().count());
     let schemas = width(|_, topic| topic.schema.chars().count());
     let mut lines = String::new();
     let mut others = 0;
     for (name, topic) in &overview.topics {
-        if topic.form.is_empty() {
+        if topic.image_format.is_empty() {
             others += 1;
             continue;
         }
@@ -49,7 +49,7 @@ fn lines(overview: &Overview) -> String {
             .map_or(String::new(), |rate| format!("{rate:.1} Hz, "));
         let TopicOverview {
             schema,
-            form,
+            image_format: form,
             count,
             ..
         } = topic;
@@ -68,14 +68,14 @@ pub(super) fn no_images(file: &Path, overview: &Overview) -> Error {
     let unread = overview
         .topics
         .iter()
-        .find(|(_, topic)| !topic.form.is_empty());
+        .find(|(_, topic)| !topic.image_format.is_empty());
     let topics: Vec<String> = overview
         .topics
         .iter()
         .map(|(name, topic)| format!("{name} ({})", topic.schema))
         .collect();
     let problem = match (unread, topics.is_empty()) {
-        (Some((name, topic)), _) => format!("{name} ({}) is {}", topic.schema, topic.form),
+        (Some((name, topic)), _) => format!("{name} ({}) is {}", topic.schema, topic.image_format),
         (None, true) => overview
             .problems
             .first()

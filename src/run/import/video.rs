@@ -87,7 +87,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         last = last.max(seconds(frame.time));
         bar.advance(last as usize - before);
         let is_taken = sampler.is_due(at)
-            && (!sampler.compares() || sampler.has_changed(Thumbnail::new(&frame.image)));
+            && (!sampler.compares_pixels() || sampler.has_changed(Thumbnail::new(&frame.image)));
         if is_taken {
             let frame = ChosenFrame {
                 topic: place.clone(),
@@ -123,7 +123,12 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         seen,
         failed,
     );
-    let _ = writeln!(output, "video: {}; {}", video.stream, args.sampling.words());
+    let _ = writeln!(
+        output,
+        "video: {}; {}",
+        video.stream,
+        args.sampling.description()
+    );
     Ok(Outcome::wrote(
         out,
         Outcome::complete_if(failed == 0 && is_whole),

@@ -47,7 +47,7 @@ impl<'a> OpenSetup<'a> {
     /// Opens the questions, the walks and the models. The files of the enhancers are read but not yet loaded.
     pub(super) fn open(config: &'a OpenEqa, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
-        let all = openeqa::questions(&config.questions)?;
+        let all = openeqa::read_questions(&config.questions)?;
         let ids = all.iter().map(|question| question.id.clone());
         let file_places = ids.zip(0..).collect();
         let selected = select(all, &config.chosen)?;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::dataset::image_names::is_image;
+use crate::dataset::image_paths::is_image;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::images::stored::OutputFile;

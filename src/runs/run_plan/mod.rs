@@ -103,7 +103,11 @@ impl RunPlan {
         if !own.is_empty() {
             self.check_questions(dataset, own)?;
         }
-        if let Some(lost) = self.frames.iter().find(|frame| !dataset.has(&frame.frame)) {
+        if let Some(lost) = self
+            .frames
+            .iter()
+            .find(|frame| !dataset.has_frames(&frame.frame))
+        {
             return Err(self.error(format!(
                 "the frame {:?} of the plan is not among the data any more; restore it, or write the plan again into another --out",
                 lost.frame.0
@@ -125,7 +129,7 @@ impl RunPlan {
         }
         let other = own.iter().zip(&self.questions).find(|(own, planned)| {
             !planned.is_same(&RunQuestion {
-                images: dataset.several(&own.frame).to_vec(),
+                images: dataset.image_series(&own.frame).to_vec(),
                 ..RunQuestion::new(own, 0, &dataset.scene(&own.frame))
             })
         });

@@ -1,4 +1,4 @@
-//! A value in a row of a ready-made set: [`Cell`].
+//! Value in a row of a ready-made set: [`Cell`].
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -7,47 +7,47 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
-use super::text_list::list;
+use super::text_list::parse_list;
 use crate::picture::image_file::format::FileFormat;
 use crate::types::Digest;
 use crate::types::text::excerpt;
 
-/// The maximum length of a text that may be a path or the id of a row. A longer one of the base64 alphabet is a file (the rule of
-/// VLMEvalKit, `vlmeval/dataset/image_base.py`).
-pub(in crate::dataset::ready_made) const LONGEST_NAME: usize = 64;
+/// Maximum length of a path or a row id, in bytes. A longer text in the base64 alphabet is a file (as in VLMEvalKit,
+/// `vlmeval/dataset/image_base.py`).
+pub(in crate::dataset::ready_made) const MAX_NAME_LENGTH: usize = 64;
 
-/// The length from which on a text of the base64 alphabet is not kept: its file is read again when it is shown.
-const LONGEST_KEPT: usize = 1024;
+/// Maximum length of a base64 text that is kept in memory, in bytes (chosen). A longer one is read from its file again when needed.
+const MAX_KEPT_BASE64: usize = 1024;
 
-/// The shortest line of base64 that is wrapped: PEM has 64 characters, MIME 76. Shorter words are those of a sentence.
-const SHORTEST_LINE: usize = 60;
+/// Minimum length of a line of wrapped base64 (PEM has 64 characters, MIME 76). Shorter words belong to a sentence.
+const MIN_BASE64_LINE: usize = 60;
 
-/// A value in a row. The bytes of files are not kept. Sets have millions of cells, so that a cell is no larger than a text.
+/// Value in a row, without the bytes of images. Sets have millions of cells, so a cell is no larger than a `String`.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::dataset::ready_made) enum Cell {
     /// Null, or no such column in this row.
     Absent,
     Bool(bool),
-    /// A number as its file writes it.
+    /// Number as written in its file.
     Number(Box<str>),
     Text(String),
-    /// Bytes, of a row that is read to show its image.
+    /// Bytes of a file. Only in rows that are read for their image.
     Bytes(Box<[u8]>),
-    /// Bytes that were looked at and not kept, of a row that is read for its question.
+    /// Digest and format of a file whose bytes were dropped. Only in rows that are read for their question.
     File(Box<FileFacts>),
     List(Box<[Cell]>),
     Fields(Fields),
 }
 
-/// The fields of a struct, with their names.
+/// Fields of a struct with their names.
 pub(in crate::dataset::ready_made) type Fields = Box<[(Arc<str>, Cell)]>;
 
-/// The names of fields in the cells of a table. Equal ones are held once.
+/// Interner for the names of fields in the cells of a table.
 #[derive(Debug, Default)]
 pub(super) struct FieldNames(BTreeSet<Arc<str>>);
 
 impl FieldNames {
-    fn once(&mut self, name: Arc<str>) -> Arc<str> {
+    fn intern(&mut self, name: Arc<str>) -> Arc<str> {
         if let Some(known) = self.0.get(&name) {
             return Arc::clone(known);
         }
@@ -56,11 +56,11 @@ impl FieldNames {
     }
 }
 
-/// Facts about bytes that are not kept.
+/// Digest and format of a file whose bytes were dropped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) struct FileFacts {
     pub(in crate::dataset::ready_made) digest: Digest,
-    /// The format by the first bytes; `None` if it is none that is read.
+    /// Image format, from the first bytes; `None` if it is not supported.
     pub(in crate::dataset::ready_made) format: Option<FileFormat>,
 }
 
@@ -74,56 +74,56 @@ impl FileFacts {
 }
 
 impl Cell {
-    /// The memory that the cell takes, in bytes.
-    pub(super) fn length(&self) -> usize {
+    /// Memory of the cell, in bytes.
+    pub(super) fn memory_size(&self) -> usize {
         let inner = match self {
             Self::Absent | Self::Bool(_) => 0,
             Self::Number(text) => text.len(),
             Self::Text(text) => text.len(),
             Self::Bytes(bytes) => bytes.len(),
             Self::File(_) => size_of::<FileFacts>(),
-            Self::List(cells) => cells.iter().map(Self::length).sum(),
+            Self::List(cells) => cells.iter().map(Self::memory_size).sum(),
             Self::Fields(fields) => fields
                 .iter()
-                .map(|(_, cell)| size_of::<Arc<str>>() + cell.length())
+                .map(|(_, cell)| size_of::<Arc<str>>() + cell.memory_size())
                 .sum(),
         };
         size_of::<Self>() + inner
     }
 
-    /// The cell without the bytes of files.
+    /// Replaces the bytes of files by their digest and format.
     pub(super) fn without_files(self, names: &mut FieldNames) -> Self {
         match self {
             Self::Bytes(bytes) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
-            Self::Text(text) if text.len() > LONGEST_KEPT => match (decoded(&text), list(&text)) {
-                (Some(bytes), _) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
-                (None, Some(items)) => {
-                    let items = items.into_iter();
-                    Self::List(
+            Self::Text(text) if text.len() > MAX_KEPT_BASE64 => {
+                match (decode_base64(&text), parse_list(&text)) {
+                    (Some(bytes), _) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
+                    (None, Some(items)) => Self::List(
                         items
+                            .into_iter()
                             .map(|item| Self::Text(item).without_files(names))
                             .collect(),
-                    )
+                    ),
+                    (None, None) => Self::Text(text),
                 }
-                (None, None) => Self::Text(text),
-            },
-            Self::List(cells) => {
-                let cells = cells.into_iter();
-                Self::List(cells.map(|cell| cell.without_files(names)).collect())
             }
-            Self::Fields(fields) => {
-                let fields = fields.into_iter();
-                Self::Fields(
-                    fields
-                        .map(|(name, cell)| (names.once(name), cell.without_files(names)))
-                        .collect(),
-                )
-            }
+            Self::List(cells) => Self::List(
+                cells
+                    .into_iter()
+                    .map(|cell| cell.without_files(names))
+                    .collect(),
+            ),
+            Self::Fields(fields) => Self::Fields(
+                fields
+                    .into_iter()
+                    .map(|(name, cell)| (names.intern(name), cell.without_files(names)))
+                    .collect(),
+            ),
             other => other,
         }
     }
 
-    /// Whether nothing is there: null, an empty text or list, or a word by which tables write that (`nan`, `N/A`, `None`, `null`).
+    /// True if the cell has no value: null, an empty text or list, or a word for a missing value (`nan`, `N/A`, `None`, `null`).
     pub(in crate::dataset::ready_made) fn is_absent(&self) -> bool {
         match self {
             Self::Absent => true,
@@ -137,17 +137,17 @@ impl Cell {
         }
     }
 
-    /// The cell as text; `None` if it is absent, or neither a text nor a number nor a truth value.
+    /// The cell as text; `None` if it is not a text, number or truth value, or is blank.
     pub(in crate::dataset::ready_made) fn text(&self) -> Option<String> {
         match self {
             Self::Bool(is_true) => Some(is_true.to_string()),
-            Self::Number(text) => Some(whole(text)),
+            Self::Number(text) => Some(without_zero_fraction(text)),
             Self::Text(text) if !text.trim().is_empty() => Some(text.clone()),
             _ => None,
         }
     }
 
-    /// The list or struct in a text of JSON; `None` if it holds none.
+    /// Parses a text with a JSON list or object; `None` if the cell has none.
     pub(in crate::dataset::ready_made) fn parsed(&self) -> Option<Self> {
         let Self::Text(text) = self else {
             return None;
@@ -158,7 +158,7 @@ impl Cell {
         serde_json::from_str::<Value>(text).ok().map(Self::from)
     }
 
-    /// The field of a struct, by its name; the item of a list, by its number from 0.
+    /// Field of a struct by its name, or item of a list by its index from 0.
     pub(in crate::dataset::ready_made) fn field(&self, name: &str) -> Option<&Self> {
         if let Self::List(cells) = self {
             return cells.get(name.parse::<usize>().ok()?);
@@ -172,7 +172,7 @@ impl Cell {
             .map(|(_, cell)| cell)
     }
 
-    /// The kind of value, for messages.
+    /// Kind of value, for messages.
     pub(in crate::dataset::ready_made) fn kind(&self) -> &'static str {
         match self {
             Self::Absent => "nothing",
@@ -185,8 +185,8 @@ impl Cell {
         }
     }
 
-    /// The value in at most about `most` characters, for messages.
-    pub(in crate::dataset::ready_made) fn shown(&self, most: usize) -> String {
+    /// Excerpt of the value with at most about `max` characters, for messages.
+    pub(in crate::dataset::ready_made) fn excerpt(&self, max: usize) -> String {
         let whole = match self {
             Self::Absent => String::new(),
             Self::Bool(_) | Self::Number(_) => self.text().unwrap_or_default(),
@@ -194,23 +194,23 @@ impl Cell {
             Self::Bytes(bytes) => format!("{} bytes", bytes.len()),
             Self::File(_) => "bytes".to_owned(),
             Self::List(cells) => {
-                let cells: Vec<String> = cells.iter().map(|cell| cell.shown(most)).collect();
+                let cells: Vec<String> = cells.iter().map(|cell| cell.excerpt(max)).collect();
                 format!("[{}]", cells.join(", "))
             }
             Self::Fields(fields) => {
                 let fields: Vec<String> = fields
                     .iter()
-                    .map(|(name, cell)| format!("{name}: {}", cell.shown(most)))
+                    .map(|(name, cell)| format!("{name}: {}", cell.excerpt(max)))
                     .collect();
                 format!("{{{}}}", fields.join(", "))
             }
         };
-        excerpt(&whole, most)
+        excerpt(&whole, max)
     }
 }
 
 impl From<&Cell> for Value {
-    /// The value as JSON; of bytes, null.
+    /// Converts the cell to JSON; bytes become null.
     fn from(cell: &Cell) -> Self {
         match cell {
             Cell::Absent | Cell::Bytes(_) | Cell::File(_) => Self::Null,
@@ -220,14 +220,12 @@ impl From<&Cell> for Value {
                 .map_or_else(|_| text.as_ref().into(), Self::Number),
             Cell::Text(text) => text.as_str().into(),
             Cell::List(cells) => cells.iter().map(Self::from).collect(),
-            Cell::Fields(fields) => {
-                let fields = fields.iter();
-                Self::Object(
-                    fields
-                        .map(|(name, cell)| (name.to_string(), Self::from(cell)))
-                        .collect(),
-                )
-            }
+            Cell::Fields(fields) => Self::Object(
+                fields
+                    .iter()
+                    .map(|(name, cell)| (name.to_string(), Self::from(cell)))
+                    .collect(),
+            ),
         }
     }
 }
@@ -240,31 +238,29 @@ impl From<Value> for Cell {
             Value::Number(number) => Self::Number(number.to_string().into()),
             Value::String(text) => Self::Text(text),
             Value::Array(values) => Self::List(values.into_iter().map(Self::from).collect()),
-            Value::Object(fields) => {
-                let fields = fields.into_iter();
-                Self::Fields(
-                    fields
-                        .map(|(name, value)| (name.into(), Self::from(value)))
-                        .collect(),
-                )
-            }
+            Value::Object(fields) => Self::Fields(
+                fields
+                    .into_iter()
+                    .map(|(name, value)| (name.into(), Self::from(value)))
+                    .collect(),
+            ),
         }
     }
 }
 
-/// The text of a number without a fraction of zero: `3.0` is `3`.
-fn whole(number: &str) -> String {
+/// Text of a number without a zero fraction: `3` for `3.0`.
+fn without_zero_fraction(number: &str) -> String {
     number.strip_suffix(".0").unwrap_or(number).to_owned()
 }
 
-/// The file in a text, if the text is base64 and longer than a name. The head of a `data:` address is cut.
-pub(in crate::dataset::ready_made) fn decoded(text: &str) -> Option<Vec<u8>> {
+/// Decodes a text of base64, or a `data:` URL, that is longer than a name; `None` for other texts.
+pub(in crate::dataset::ready_made) fn decode_base64(text: &str) -> Option<Vec<u8>> {
     let text = text.trim();
     let text = match text.strip_prefix("data:") {
-        Some(address) => address.split_once(',')?.1,
+        Some(url) => url.split_once(',')?.1,
         None => text,
     };
-    if text.len() <= LONGEST_NAME {
+    if text.len() <= MAX_NAME_LENGTH {
         return None;
     }
     let is_base64 = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'/' | b'=');
@@ -274,16 +270,16 @@ pub(in crate::dataset::ready_made) fn decoded(text: &str) -> Option<Vec<u8>> {
     let is_wrapped = text
         .split_ascii_whitespace()
         .next()
-        .is_some_and(|line| line.len() >= SHORTEST_LINE);
-    let mut bytes = text.bytes();
-    if !is_wrapped || !bytes.all(|byte| is_base64(byte) || byte.is_ascii_whitespace()) {
+        .is_some_and(|line| line.len() >= MIN_BASE64_LINE);
+    let is_base64_or_space = |byte: u8| is_base64(byte) || byte.is_ascii_whitespace();
+    if !is_wrapped || !text.bytes().all(is_base64_or_space) {
         return None;
     }
-    let dense: Vec<u8> = text
+    let unwrapped: Vec<u8> = text
         .bytes()
         .filter(|byte| !byte.is_ascii_whitespace())
         .collect();
-    STANDARD.decode(dense).ok()
+    STANDARD.decode(unwrapped).ok()
 }
 
 #[cfg(test)]
@@ -291,8 +287,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_text_of_base64_is_a_file_and_a_sentence_is_none() {
-        assert_eq!(decoded(&"what is this on a table ".repeat(60)), None);
+    fn long_base64_is_decoded_and_sentences_are_not() {
+        assert_eq!(decode_base64(&"what is this on a table ".repeat(60)), None);
         let file = vec![7; 90];
         let text = STANDARD.encode(&file);
         let wrapped = format!("{}\n{}", &text[..76], &text[76..]);
@@ -301,21 +297,21 @@ mod tests {
             wrapped,
             format!("data:image/png;base64,{text}"),
         ] {
-            assert_eq!(decoded(&form).unwrap(), file, "{form}");
+            assert_eq!(decode_base64(&form).unwrap(), file, "{form}");
         }
         let path = "a/long/path/of/an/image/that/has/more/than/sixty/four/characters/0.png";
         for text in [&text[..60], path, "What is this? ".repeat(9).as_str()] {
-            assert_eq!(decoded(text), None, "{text}");
+            assert_eq!(decode_base64(text), None, "{text}");
         }
     }
 
     #[test]
-    fn a_cell_is_no_larger_than_a_text() {
+    fn cell_is_no_larger_than_string() {
         assert_eq!(size_of::<Cell>(), size_of::<String>());
     }
 
     #[test]
-    fn files_are_known_by_their_digest_and_not_kept() {
+    fn files_are_replaced_by_their_digest() {
         let file = vec![9; 4000];
         let text = Cell::Text(STANDARD.encode(&file)).without_files(&mut FieldNames::default());
         assert_eq!(
@@ -330,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn words_for_nothing_are_nothing() {
+    fn words_for_missing_values_are_absent() {
         for nothing in ["", " ", "nan", "N/A", "None", "null"] {
             assert!(Cell::Text(nothing.to_owned()).is_absent(), "{nothing:?}");
         }

@@ -1,8 +1,8 @@
-//! A list of texts and an object as Python prints them: [`python_list`], [`python_dict`].
+//! Parser for lists and dictionaries in Python's notation: [`python_list`], [`python_dict`].
 
-/// The texts of a list in Python's notation, as `['it\'s', "b", 3]`; `None` if the text is anything else. Nothing is evaluated.
+/// Parses a list such as `['it\'s', "b", 3]` to texts; `None` if the text is anything else. Nothing is evaluated.
 ///
-/// Read are texts in single or double quotes with the escapes of Python's `repr` (The Python Language Reference, 2.4.1), numbers and
+/// Items are strings in single or double quotes with the escapes of Python's `repr` (The Python Language Reference, 2.4.1), numbers, and
 /// the words `True`, `False` and `None`.
 pub(super) fn python_list(text: &str) -> Option<Vec<String>> {
     let mut rest = text.trim().strip_prefix('[')?.trim_start();
@@ -12,8 +12,8 @@ pub(super) fn python_list(text: &str) -> Option<Vec<String>> {
             return end.trim().is_empty().then_some(items);
         }
         let (item, after) = match rest.chars().next()? {
-            quote @ ('\'' | '"') => quoted(&rest[1..], quote)?,
-            _ => bare(rest)?,
+            quote @ ('\'' | '"') => parse_quoted(&rest[1..], quote)?,
+            _ => parse_bare(rest)?,
         };
         items.push(item);
         rest = after.trim_start();
@@ -25,7 +25,8 @@ pub(super) fn python_list(text: &str) -> Option<Vec<String>> {
     }
 }
 
-/// The names and texts of an object in Python's notation, as `{'A': 'red', "B": 2}`; `None` is no text. Nothing is evaluated.
+/// Parses a dictionary such as `{'A': 'red', "B": 2}` to names and values, where Python's `None` has no value; `None` if the text is
+/// anything else. Nothing is evaluated.
 pub(super) fn python_dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
     let mut rest = text.trim().strip_prefix('{')?.trim_start();
     let mut fields = Vec::new();
@@ -34,13 +35,13 @@ pub(super) fn python_dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
             return end.trim().is_empty().then_some(fields);
         }
         let quote = rest.chars().next().filter(|c| matches!(c, '\'' | '"'))?;
-        let (name, after) = quoted(&rest[1..], quote)?;
+        let (name, after) = parse_quoted(&rest[1..], quote)?;
         let after = after.trim_start().strip_prefix(':')?.trim_start();
         let (value, after) = match after.chars().next()? {
             quote @ ('\'' | '"') => {
-                quoted(&after[1..], quote).map(|(value, end)| (Some(value), end))?
+                parse_quoted(&after[1..], quote).map(|(value, end)| (Some(value), end))?
             }
-            _ => bare(after).map(|(value, end)| ((value != "None").then_some(value), end))?,
+            _ => parse_bare(after).map(|(value, end)| ((value != "None").then_some(value), end))?,
         };
         fields.push((name, value));
         rest = after.trim_start();
@@ -52,13 +53,13 @@ pub(super) fn python_dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
     }
 }
 
-/// The text up to the closing quote, and what follows it.
-fn quoted(text: &str, quote: char) -> Option<(String, &str)> {
+/// Parses a string up to its closing quote. Returns it with the remaining text.
+fn parse_quoted(text: &str, quote: char) -> Option<(String, &str)> {
     let mut item = String::new();
     let mut chars = text.char_indices();
     while let Some((at, c)) = chars.next() {
         match c {
-            '\\' => item.push(escaped(&mut chars)?),
+            '\\' => item.push(parse_escape(&mut chars)?),
             c if c == quote => return Some((item, &text[at + 1..])),
             c => item.push(c),
         }
@@ -66,8 +67,8 @@ fn quoted(text: &str, quote: char) -> Option<(String, &str)> {
     None
 }
 
-/// The character that an escape stands for, after its backslash.
-fn escaped(chars: &mut std::str::CharIndices<'_>) -> Option<char> {
+/// Parses an escape sequence after its backslash.
+fn parse_escape(chars: &mut std::str::CharIndices<'_>) -> Option<char> {
     let digits = match chars.next()?.1 {
         'n' => return Some('\n'),
         'r' => return Some('\r'),
@@ -85,8 +86,8 @@ fn escaped(chars: &mut std::str::CharIndices<'_>) -> Option<char> {
         .and_then(char::from_u32)
 }
 
-/// A number or a word of Python, and what follows it.
-fn bare(text: &str) -> Option<(String, &str)> {
+/// Parses a number, `True`, `False` or `None`. Returns it with the remaining text.
+fn parse_bare(text: &str) -> Option<(String, &str)> {
     let (item, rest) = text.split_at(text.find([',', ']', '}'])?);
     let item = item.trim();
     let is_known = matches!(item, "True" | "False" | "None") || item.parse::<f64>().is_ok();
@@ -98,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lists_of_python_are_read_and_code_is_not() {
+    fn python_literals_are_parsed_and_code_is_not() {
         for (text, items) in [
             (r#"['a', "b"]"#, vec!["a", "b"]),
             (

@@ -1,48 +1,54 @@
-//! A list or an object in a text: [`list`], [`dict`].
+//! Lists and objects written in a text: [`parse_list`], [`parse_object`].
 
 use serde_json::Value;
 
 use super::python_list::{python_dict, python_list};
 
-/// The texts of a list in a text: JSON, then Python's notation; `None` if the text is no list of texts and numbers.
-pub(in crate::dataset::ready_made) fn list(text: &str) -> Option<Vec<String>> {
+/// Parses a list in JSON, or else in Python's notation; `None` if the text is not a list of scalars.
+pub(in crate::dataset::ready_made) fn parse_list(text: &str) -> Option<Vec<String>> {
     let text = text.trim();
-    if !text.starts_with('[') || !is_short(text) {
+    if !text.starts_with('[') || !has_few_values(text) {
         return None;
     }
-    let items = serde_json::from_str::<Vec<Value>>(text).ok();
-    let texts = items.and_then(|items| items.iter().map(item).collect());
-    texts.or_else(|| python_list(text))
+    serde_json::from_str::<Vec<Value>>(text)
+        .ok()
+        .and_then(|items| items.iter().map(scalar_text).collect())
+        .or_else(|| python_list(text))
 }
 
-/// The names and the texts of an object in a text: JSON, then Python's notation; `None` if the text is no object of texts and numbers.
-pub(in crate::dataset::ready_made) fn dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
+/// Parses an object in JSON, or else a dictionary in Python's notation, to names and values; `None` if the text is not an object of
+/// scalars. A value is `None` if it is null.
+pub(in crate::dataset::ready_made) fn parse_object(
+    text: &str,
+) -> Option<Vec<(String, Option<String>)>> {
     let text = text.trim();
-    if !text.starts_with('{') || !is_short(text) {
+    if !text.starts_with('{') || !has_few_values(text) {
         return None;
     }
-    let fields = serde_json::from_str::<serde_json::Map<String, Value>>(text).ok();
-    let texts = fields.and_then(|fields| {
-        fields
-            .iter()
-            .map(|(name, value)| match value {
-                Value::Null => Some((name.clone(), None)),
-                value => Some((name.clone(), Some(item(value)?))),
-            })
-            .collect()
-    });
-    texts.or_else(|| python_dict(text))
+    serde_json::from_str::<serde_json::Map<String, Value>>(text)
+        .ok()
+        .and_then(|fields| {
+            fields
+                .iter()
+                .map(|(name, value)| match value {
+                    Value::Null => Some((name.clone(), None)),
+                    value => Some((name.clone(), Some(scalar_text(value)?))),
+                })
+                .collect()
+        })
+        .or_else(|| python_dict(text))
 }
 
-/// Whether a text holds so few signs between values that these may be held in memory.
-fn is_short(text: &str) -> bool {
-    let signs = text
-        .bytes()
-        .filter(|byte| matches!(byte, b',' | b'[' | b'{'));
-    signs.count() <= 1 << 20
+/// True if a text has at most about a million values, which limits the memory to parse it.
+fn has_few_values(text: &str) -> bool {
+    text.bytes()
+        .filter(|byte| matches!(byte, b',' | b'[' | b'{'))
+        .count()
+        <= 1 << 20
 }
 
-fn item(value: &Value) -> Option<String> {
+/// Text of a string, number or truth value.
+fn scalar_text(value: &Value) -> Option<String> {
     match value {
         Value::String(text) => Some(text.clone()),
         Value::Number(_) | Value::Bool(_) => Some(value.to_string()),

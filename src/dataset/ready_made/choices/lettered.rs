@@ -1,37 +1,38 @@
-//! Options with their letters in a text: [`in_question`], [`in_cell`], [`without_letters`].
+//! Options with letters in a text: [`find_in_question`], [`split_cell`], [`without_letters`].
 
 use std::sync::LazyLock;
 
 use regex::Regex;
 
-use crate::dataset::ready_made::columns::names::without_endings;
+use crate::dataset::ready_made::columns::names::split_instructions;
 use crate::types::Choices;
 use crate::types::questions::letter;
 use crate::types::text::excerpt;
 
-/// A letter of an option in a text: `(A)`, `A.`, `A)` or `A:`.
+/// Letter of an option in a text: `(A)`, `A.`, `A)` or `A:`.
 struct Mark {
-    /// Where the mark begins.
+    /// Byte offset of the mark.
     start: usize,
-    /// Where the text of the option begins.
+    /// Byte offset of the option after the mark.
     end: usize,
     letter: char,
 }
 
-/// The form of options with letters in a question.
+/// Options with letters in the text of a question.
 #[derive(Debug, PartialEq, Eq)]
-pub(in crate::dataset::ready_made) enum Lettered {
+pub(in crate::dataset::ready_made) enum LetteredOptions {
+    /// The text has no options.
     None,
-    /// The question, with what stands behind the options as its last line, and the options.
     Found {
+        /// The question, followed by the text after the options.
         question: String,
         options: Vec<String>,
     },
-    /// It cannot be told where the options begin or end; in words.
+    /// It is not clear where the options begin or end: the error message.
     Unclear(String),
 }
 
-/// Words of a sentence that states how to answer, by which it is told from an option.
+/// Words of an instruction how to answer, which distinguish it from an option.
 static INSTRUCTION: LazyLock<Option<Regex>> = LazyLock::new(|| {
     Regex::new(concat!(
         r"(?i)\b(?:please|answer (?:with|using|by|in|the|directly|only)|(?:select|choose|pick) (?:the|one|from|your)",
@@ -40,27 +41,31 @@ static INSTRUCTION: LazyLock<Option<Regex>> = LazyLock::new(|| {
     .ok()
 });
 
-/// The question and the options of a text that holds options: those of the last run of the marks A, B, … in order, at least two, whose
-/// options have a letter or a digit each. A mark stands at the start, or after space, a comma, a semicolon or a colon. The last option
-/// ends with its line, if the others stand on one line each; what follows belongs to the question.
-pub(in crate::dataset::ready_made) fn in_question(text: &str) -> Lettered {
-    let (body, _) = without_endings(text);
+/// Splits a text into the question and its options.
+///
+/// The options follow the last sequence of at least two marks A, B, … in order. Each option has a letter or a digit. A mark is at the
+/// start, or after space, a comma, a semicolon or a colon. If the other options have one line each, the last option ends with its line,
+/// and the rest belongs to the question.
+pub(in crate::dataset::ready_made) fn find_in_question(text: &str) -> LetteredOptions {
+    let (body, _) = split_instructions(text);
     let tail = text[body.len()..].trim();
     let marks = marks(body);
     let begins_line = |mark: &&Mark| {
         let before = body[..mark.start].trim_end_matches([' ', '\t']);
         before.is_empty() || before.ends_with('\n')
     };
-    let runs = (0..marks.len())
-        .rev()
-        .filter(|&at| marks[at].letter == 'A')
-        .map(|start| run(&marks[start..]))
-        .filter(|run| run.len() > 1);
     let mut found = None;
-    for run in runs {
-        let (options, rest) = match split(body, &run) {
+    for start in (0..marks.len()).rev() {
+        if marks[start].letter != 'A' {
+            continue;
+        }
+        let run = alphabetical_run(&marks[start..]);
+        if run.len() < 2 {
+            continue;
+        }
+        let (options, rest) = match split_options(body, &run) {
             Ok(parts) => parts,
-            Err(problem) if found.is_none() => return Lettered::Unclear(problem),
+            Err(problem) if found.is_none() => return LetteredOptions::Unclear(problem),
             Err(_) => continue,
         };
         let are_options = options
@@ -78,7 +83,7 @@ pub(in crate::dataset::ready_made) fn in_question(text: &str) -> Lettered {
                 }
             }
             Some(_) if are_lines => {
-                return Lettered::Unclear(
+                return LetteredOptions::Unclear(
                     "letters of options occur twice in the question, and it is not clear which are meant; write the options in columns of \
                      their own".to_owned(),
                 );
@@ -87,18 +92,18 @@ pub(in crate::dataset::ready_made) fn in_question(text: &str) -> Lettered {
         }
     }
     let Some((start, options, rest)) = found else {
-        return Lettered::None;
+        return LetteredOptions::None;
     };
-    let parts = [head(&body[..start]), rest, tail];
-    let parts = parts.into_iter().filter(|part| !part.is_empty());
-    Lettered::Found {
-        question: parts.collect::<Vec<&str>>().join("\n"),
+    let mut parts = vec![without_announcement(&body[..start]), rest, tail];
+    parts.retain(|part| !part.is_empty());
+    LetteredOptions::Found {
+        question: parts.join("\n"),
         options,
     }
 }
 
-/// The text before options, without the word that announces them.
-fn head(text: &str) -> &str {
+/// Removes the word that announces the options, such as `Options:`, from the end of a text.
+fn without_announcement(text: &str) -> &str {
     let text = text.trim();
     let words = ["options:", "option:", "choices:"];
     let announced = words.iter().find_map(|word| {
@@ -109,16 +114,14 @@ fn head(text: &str) -> &str {
     announced.unwrap_or(text)
 }
 
-/// The options of a run, and the text behind the last one.
-fn split<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a str), String> {
-    let mut options = texts(text, run);
+/// Splits a text into the options of a run of marks, and the text after the last option.
+///
+/// # Errors
+/// If it is not clear where the last option ends.
+fn split_options<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a str), String> {
+    let mut options = option_texts(text, run);
     let Some(last) = options.pop() else {
         return Ok((options, ""));
-    };
-    let tells = |option: &String| {
-        INSTRUCTION
-            .as_ref()
-            .is_some_and(|words| words.is_match(option))
     };
     let unclear = || {
         format!(
@@ -126,42 +129,50 @@ fn split<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a str), Str
             excerpt(&last, 80)
         )
     };
-    let (only, rest) = match last.split_once('\n') {
+    let (last_line, rest) = match last.split_once('\n') {
         None => (last.as_str(), ""),
-        Some((only, _)) if !options.iter().any(|option| option.contains('\n')) => {
-            let at = run.last().map_or(text.len(), |mark| mark.end + only.len());
-            (only, text[at..].trim())
+        Some((line, _)) if !options.iter().any(|option| option.contains('\n')) => {
+            let end = run.last().map_or(text.len(), |mark| mark.end + line.len());
+            (line, text[end..].trim())
         }
         Some(_) => return Err(unclear()),
     };
-    if tells(&only.to_owned()) && !options.iter().any(tells) {
+    if is_instruction(last_line) && !options.iter().any(|option| is_instruction(option)) {
         return Err(unclear());
     }
-    let only = only.trim_end_matches(|c: char| c.is_whitespace() || c == ',' || c == ';');
-    options.push(only.to_owned());
+    let last_option =
+        last_line.trim_end_matches(|c: char| c.is_whitespace() || c == ',' || c == ';');
+    options.push(last_option.to_owned());
     Ok((options, rest))
 }
 
-/// The options of a cell that has nothing else, as `(a) Open (b) Closed`.
-pub(super) fn in_cell(text: &str) -> Option<Vec<String>> {
-    let text = text.trim();
-    let marks: Vec<Mark> = brackets(text);
-    let run = run(&marks);
-    (run.len() > 1 && run.len() == marks.len() && run[0].start == 0).then(|| texts(text, &run))
+/// True if a text has the words of an instruction how to answer.
+fn is_instruction(text: &str) -> bool {
+    INSTRUCTION
+        .as_ref()
+        .is_some_and(|words| words.is_match(text))
 }
 
-/// The options without the letters before them, if each has its own: `A. yes`, `B) no`, `(C) maybe`, `D: never`.
+/// Splits a cell that has only options, such as `(a) Open (b) Closed`; `None` for other texts.
+pub(super) fn split_cell(text: &str) -> Option<Vec<String>> {
+    let text = text.trim();
+    let marks = bracket_marks(text);
+    let run = alphabetical_run(&marks);
+    let is_only_options = run.len() > 1 && run.len() == marks.len() && run[0].start == 0;
+    is_only_options.then(|| option_texts(text, &run))
+}
+
+/// Removes the letters before the options, if each option has its own: `A. yes`, `B) no`, `(C) maybe`, `D: never`.
 pub(super) fn without_letters(options: Vec<String>) -> Vec<String> {
-    let bare: Option<Vec<String>> = options
+    options
         .iter()
         .enumerate()
-        .by_ref()
         .map(|(index, option)| after_letter(option, index))
-        .collect();
-    bare.unwrap_or(options)
+        .collect::<Option<Vec<String>>>()
+        .unwrap_or(options)
 }
 
-/// The text after the letter of an index; `None` without it.
+/// Text after the letter of the option with this index; `None` if the text does not start with the letter.
 fn after_letter(text: &str, index: usize) -> Option<String> {
     if index >= Choices::MOST {
         return None;
@@ -169,25 +180,25 @@ fn after_letter(text: &str, index: usize) -> Option<String> {
     let text = text.trim();
     let text = text.strip_prefix(['(', '（']).unwrap_or(text);
     let rest = text.strip_prefix([letter(index), full_width(letter(index))])?;
-    let rest = rest.strip_prefix(CLOSES)?.trim();
+    let rest = rest.strip_prefix(CLOSING_MARKS)?.trim();
     (!rest.is_empty()).then(|| rest.to_owned())
 }
 
-/// Marks behind the letter of an option, also full-width ones, as Chinese and Japanese sets have them.
-const CLOSES: [char; 8] = ['.', ')', ':', '．', '。', '）', '：', '、'];
+/// Characters after the letter of an option, with the full-width ones of Chinese and Japanese sets.
+const CLOSING_MARKS: [char; 8] = ['.', ')', ':', '．', '。', '）', '：', '、'];
 
-/// The full-width form of a sign of ASCII.
+/// Full-width form of an ASCII character.
 fn full_width(c: char) -> char {
     char::from_u32(c as u32 + 0xFEE0).unwrap_or(c)
 }
 
-/// The capital letter that a sign is, in either width.
-fn capital(c: char) -> Option<char> {
+/// Converts a capital letter in either width to ASCII; `None` for other characters.
+fn capital_letter(c: char) -> Option<char> {
     ('A'..='Z').find(|letter| [*letter, full_width(*letter)].contains(&c))
 }
 
-/// The marks A, B, … in order from the first of a list, whose letter is A.
-fn run(marks: &[Mark]) -> Vec<&Mark> {
+/// Marks A, B, … in alphabetical order, starting at the first mark, which must be A. Other marks are skipped.
+fn alphabetical_run(marks: &[Mark]) -> Vec<&Mark> {
     let mut run: Vec<&Mark> = Vec::new();
     for mark in marks {
         if run.len() < Choices::MOST && mark.letter == letter(run.len()) {
@@ -197,66 +208,69 @@ fn run(marks: &[Mark]) -> Vec<&Mark> {
     run
 }
 
-/// The texts between the marks of a run, without commas and semicolons at their ends.
-fn texts(text: &str, run: &[&Mark]) -> Vec<String> {
-    let ends = run[1..].iter().map(|mark| mark.start);
-    let spans = run.iter().zip(ends.chain([text.len()]));
-    let cut = |c: char| c.is_whitespace() || ",;，；".contains(c);
-    spans
+/// Texts between the marks of a run, without commas and semicolons at their ends.
+fn option_texts(text: &str, run: &[&Mark]) -> Vec<String> {
+    let ends = run[1..].iter().map(|mark| mark.start).chain([text.len()]);
+    run.iter()
+        .zip(ends)
         .map(|(mark, end)| {
-            let option = text[mark.end..end.max(mark.end)].trim_end_matches(cut);
-            option.to_owned()
+            text[mark.end..end.max(mark.end)]
+                .trim_end_matches(|c: char| c.is_whitespace() || ",;，；".contains(c))
+                .to_owned()
         })
         .collect()
 }
 
-/// All marks of capital letters in a text.
+/// All marks with capital letters in a text.
 fn marks(text: &str) -> Vec<Mark> {
     let mut marks = Vec::new();
     let mut before = None;
     for (start, c) in text.char_indices() {
-        let is_free =
+        let is_separate =
             before.is_none_or(|b: char| b.is_whitespace() || ",;:，；：。？、".contains(b));
         before = Some(c);
-        if !is_free {
+        if !is_separate {
             continue;
         }
         let rest = &text[start..];
         let opened = rest.strip_prefix(['(', '（']);
         let mut chars = opened.unwrap_or(rest).chars();
-        let name = chars.next().and_then(capital);
+        let name = chars.next().and_then(capital_letter);
         let (Some(name), Some(close)) = (name, chars.next()) else {
             continue;
         };
-        let closes = match opened {
+        let is_closed = match opened {
             Some(_) => matches!(close, ')' | '）'),
-            None => CLOSES.contains(&close),
+            None => CLOSING_MARKS.contains(&close),
         };
-        if closes {
-            marks.push(mark(text, start, text.len() - chars.as_str().len(), name));
+        if is_closed {
+            let end = text.len() - chars.as_str().len();
+            marks.push(Mark::new(text, start, end, name));
         }
     }
     marks
 }
 
-/// All letters in brackets in a text, of either case, as capitals.
-fn brackets(text: &str) -> Vec<Mark> {
-    let starts = text.match_indices(['(', '（']);
-    let found = starts.filter_map(|(start, open)| {
-        let mut chars = text[start + open.len()..].chars();
-        let (name, close) = (chars.next()?, chars.next()?);
-        let name = capital(name.to_ascii_uppercase())?;
-        let end = text.len() - chars.as_str().len();
-        matches!(close, ')' | '）').then(|| mark(text, start, end, name))
-    });
-    found.collect()
+/// All marks with a letter in brackets in a text. Letters of either case become capitals.
+fn bracket_marks(text: &str) -> Vec<Mark> {
+    text.match_indices(['(', '（'])
+        .filter_map(|(start, open)| {
+            let mut chars = text[start + open.len()..].chars();
+            let (name, close) = (chars.next()?, chars.next()?);
+            let name = capital_letter(name.to_ascii_uppercase())?;
+            let end = text.len() - chars.as_str().len();
+            matches!(close, ')' | '）').then(|| Mark::new(text, start, end, name))
+        })
+        .collect()
 }
 
-/// A mark whose option begins at the first character after `end` that is no space.
-fn mark(text: &str, start: usize, end: usize, letter: char) -> Mark {
-    let rest = &text[end..];
-    let end = end + rest.len() - rest.trim_start().len();
-    Mark { start, end, letter }
+impl Mark {
+    /// A mark whose option begins at the first character after `end` that is not a space.
+    fn new(text: &str, start: usize, end: usize, letter: char) -> Self {
+        let rest = &text[end..];
+        let end = end + rest.len() - rest.trim_start().len();
+        Self { start, end, letter }
+    }
 }
 
 #[cfg(test)]
@@ -306,11 +320,11 @@ mod tests {
                 vec!["red", "blue"],
             ),
         ] {
-            let found = Lettered::Found {
+            let found = LetteredOptions::Found {
                 question: question.to_owned(),
                 options: options.iter().map(ToString::to_string).collect(),
             };
-            assert_eq!(in_question(text), found, "{text}");
+            assert_eq!(find_in_question(text), found, "{text}");
         }
         for text in [
             "Which?",
@@ -321,22 +335,28 @@ mod tests {
             "Is person (A) left of person (B)?",
             "Which? (A) (B)",
         ] {
-            assert_eq!(in_question(text), Lettered::None, "{text}");
+            assert_eq!(find_in_question(text), LetteredOptions::None, "{text}");
         }
         for text in [
             "Which? (A) red (B) blue Answer with the right one.",
             "Which?\nA. one\nof two\nB. three\nof four",
             "Which?\nA. one\nB. two\nSay (A) or (B) only",
         ] {
-            let found = in_question(text);
-            assert!(matches!(found, Lettered::Unclear(_)), "{text}: {found:?}");
+            let found = find_in_question(text);
+            assert!(
+                matches!(found, LetteredOptions::Unclear(_)),
+                "{text}: {found:?}"
+            );
         }
     }
 
     #[test]
-    fn a_cell_of_options_holds_nothing_else() {
-        assert_eq!(in_cell("(a) Open (b) Closed").unwrap(), ["Open", "Closed"]);
-        assert_eq!(in_cell("（A）开（B）关").unwrap(), ["开", "关"]);
+    fn cell_with_only_options_is_split() {
+        assert_eq!(
+            split_cell("(a) Open (b) Closed").unwrap(),
+            ["Open", "Closed"]
+        );
+        assert_eq!(split_cell("（A）开（B）关").unwrap(), ["开", "关"]);
         for text in [
             "(a) Open",
             "see (a) x (b) y",
@@ -344,12 +364,12 @@ mod tests {
             "(a) f(x) (b) y (x) z",
             "red|green",
         ] {
-            assert_eq!(in_cell(text), None, "{text}");
+            assert_eq!(split_cell(text), None, "{text}");
         }
     }
 
     #[test]
-    fn letters_are_cut_if_every_option_has_its_own() {
+    fn letters_are_removed_if_every_option_has_its_own() {
         let cut =
             |options: &[&str]| without_letters(options.iter().map(ToString::to_string).collect());
         assert_eq!(cut(&["A. yes", "(B) no"]), ["yes", "no"]);

@@ -1,14 +1,14 @@
-//! Choices of a question: its options and its answer.
+//! Options and answers of the questions in a set.
 
-mod answers;
+mod answer_format;
 mod lettered;
-mod offered;
+mod option_list;
 mod options;
 mod truths;
 
-pub(super) use answers::{Reading, digit, yes_or_no};
-pub(super) use lettered::{Lettered, in_question};
-pub(in crate::dataset) use offered::one_line;
-pub(super) use offered::{AllOffered, Offered};
+pub(super) use answer_format::{AnswerFormat, digit_index, yes_no_index};
+pub(super) use lettered::{LetteredOptions, find_in_question};
+pub(in crate::dataset) use option_list::one_line;
+pub(super) use option_list::{OptionInterner, OptionList};
 pub(super) use options::Options;
-pub(super) use truths::{Answered, is_own, truths};
+pub(super) use truths::{ParsedQuestion, find_truths, is_native_format};

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::lettered::{in_cell, without_letters};
-use super::offered::Offered;
-use crate::dataset::ready_made::cells::{Cell, Fields, Row, dict, list};
+use super::lettered::{split_cell, without_letters};
+use super::option_list::OptionList;
+use crate::dataset::ready_made::cells::{Cell, Fields, Row, parse_list, parse_object};
 use crate::dataset::ready_made::columns::{Column, Roles};
 use crate::types::questions::letter;
 use crate::types::shell_word;
@@ -16,7 +16,7 @@ pub(in crate::dataset::ready_made) enum Options {
     /// No column has options.
     None,
     /// The options; if several columns have options, all have the same texts.
-    Found(Offered),
+    Found(OptionList),
     /// Two columns have different options: the names of both.
     Differ([String; 2]),
     /// A cell cannot be read as options: the error message.
@@ -26,38 +26,38 @@ pub(in crate::dataset::ready_made) enum Options {
 impl Options {
     /// Reads the options of a row from the columns that have this role.
     pub(in crate::dataset::ready_made) fn from_row(row: &Row, roles: &Roles) -> Self {
-        let mut found: Vec<(String, Offered)> = Vec::new();
+        let mut found: Vec<(String, OptionList)> = Vec::new();
         let (texts, positions): (Vec<String>, Vec<usize>) = roles
-            .cells
+            .option_cells
             .iter()
             .enumerate()
             .filter_map(|(position, column)| Some((single_option(column.cell(row))?, position)))
             .unzip();
         if !texts.is_empty() {
-            let offered = Offered::placed(&without_letters(texts), positions);
-            found.push((joined_names(&roles.cells), offered));
+            let options = OptionList::with_positions(&without_letters(texts), positions);
+            found.push((joined_names(&roles.option_cells), options));
         }
-        for column in &roles.options {
+        for column in &roles.option_lists {
             let cell = column.cell(row);
             if cell.is_absent() {
                 continue;
             }
-            let separator = roles.split_options.as_deref();
-            let offered = match object_fields(cell).filter(|_| separator.is_none()) {
+            let separator = roles.option_separator.as_deref();
+            let options = match object_fields(cell).filter(|_| separator.is_none()) {
                 Some(fields) => lettered_options(&fields).map_err(|problem| {
-                    let shown = cell.shown(60);
                     format!(
-                        "the options in the column {:?} {problem}: {shown}",
-                        column.name
+                        "the options in the column {:?} {problem}: {}",
+                        column.name,
+                        cell.excerpt(60)
                     )
                 }),
                 None => listed_options(cell, separator)
-                    .map(|texts| Offered::listed(&without_letters(texts)))
+                    .map(|texts| OptionList::from_list(&without_letters(texts)))
                     .ok_or_else(|| not_a_list(column, cell)),
             };
-            match offered {
-                Ok(offered) if offered.texts.is_empty() => {}
-                Ok(offered) => found.push((column.name.clone(), offered)),
+            match options {
+                Ok(options) if options.texts.is_empty() => {}
+                Ok(options) => found.push((column.name.clone(), options)),
                 Err(problem) => return Self::Unread(problem),
             }
         }
@@ -78,7 +78,7 @@ fn not_a_list(column: &Column, cell: &Cell) -> String {
     format!(
         "the column {:?} holds no list of options: {}; --map options={} names the signs between them",
         column.name,
-        cell.shown(60),
+        cell.excerpt(60),
         shell_word(&split)
     )
 }
@@ -88,7 +88,7 @@ fn object_fields(cell: &Cell) -> Option<Fields> {
     match cell {
         Cell::Fields(fields) => Some(fields.clone()),
         Cell::Text(text) => Some(
-            dict(text)?
+            parse_object(text)?
                 .into_iter()
                 .map(|(name, text)| (name.into(), text.map_or(Cell::Absent, Cell::Text)))
                 .collect(),
@@ -101,7 +101,7 @@ fn object_fields(cell: &Cell) -> Option<Fields> {
 ///
 /// # Errors
 /// If a name is not the next letter, or a value is not a text. The message continues a sentence about the options.
-fn lettered_options(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
+fn lettered_options(fields: &[(Arc<str>, Cell)]) -> Result<OptionList, String> {
     let mut sorted: Vec<(char, &Cell)> = Vec::with_capacity(fields.len());
     for (name, cell) in fields {
         let mut chars = name.trim().chars();
@@ -135,7 +135,10 @@ fn lettered_options(fields: &[(Arc<str>, Cell)]) -> Result<Offered, String> {
             None => return Err(format!("hold no text at {key}")),
         }
     }
-    Ok(Offered::placed(&without_letters(texts), positions))
+    Ok(OptionList::with_positions(
+        &without_letters(texts),
+        positions,
+    ))
 }
 
 /// The names of columns with commas between them, as in the value of `--map`.
@@ -162,7 +165,7 @@ fn listed_options(cell: &Cell, separator: Option<&str>) -> Option<Vec<String>> {
                 .map(|part| part.trim().to_owned())
                 .collect(),
         ),
-        (Cell::Text(text), None) => list(text).or_else(|| in_cell(text)),
+        (Cell::Text(text), None) => parse_list(text).or_else(|| split_cell(text)),
         _ => None,
     }
 }

@@ -1,95 +1,89 @@
-//! The true option of each question of a set: [`Truths`].
+//! True option of each question of a set: [`find_truths`].
 
 use std::sync::Arc;
 
-use super::answers::{
-    AnswerOf, OneReading, Reading, asks_yes_or_no, digit, one_reading, yes_or_no,
+use super::answer_format::{
+    AnswerFormat, FormatSearch, RowAnswer, asks_yes_or_no, digit_index, find_format, yes_no_index,
 };
-use super::offered::Offered;
+use super::option_list::OptionList;
 use crate::dataset::ready_made::cells::{Cell, Table};
-use crate::dataset::ready_made::columns::map::{CellFormat, flag};
+use crate::dataset::ready_made::columns::map::{CellFormat, map_flag};
 use crate::dataset::ready_made::columns::names::Role;
-use crate::dataset::ready_made::columns::{Column, Roles, answer_column};
+use crate::dataset::ready_made::columns::{Column, Roles, answer_column, describe_columns};
 use crate::dataset::ready_made::items::{AnswerCell, Item};
 use crate::dataset::ready_made::omissions::{OmissionReason, Omissions};
 use crate::types::Choices;
 use crate::types::text::excerpt;
 
-/// A question with its choices.
+/// Question of a row with its choices and the true one.
 #[derive(Debug)]
-pub(in crate::dataset::ready_made) struct Answered {
+pub(in crate::dataset::ready_made) struct ParsedQuestion {
+    /// Index of the row in the table.
     pub(in crate::dataset::ready_made) row: usize,
     pub(in crate::dataset::ready_made) text: String,
     pub(in crate::dataset::ready_made) choices: Choices,
 }
 
-/// The questions with their truths, and how these were read.
-#[derive(Debug)]
+/// Questions of a set with their true options.
+#[derive(Debug, Default)]
 pub(in crate::dataset::ready_made) struct Truths {
-    pub(in crate::dataset::ready_made) answered: Vec<Answered>,
-    /// The column and the reading, in words.
-    pub(in crate::dataset::ready_made) said: Vec<String>,
+    pub(in crate::dataset::ready_made) questions: Vec<ParsedQuestion>,
+    /// Columns of the answers with their formats, for the summary.
+    pub(in crate::dataset::ready_made) columns: Vec<String>,
 }
 
-/// The smallest share of questions that begin with a verb, for digits to mean no and yes.
-const SHARE_OF_VERBS: f64 = 0.9;
+/// Minimum share of questions that begin with a verb, for the digits 0 and 1 to mean no and yes (chosen).
+const MIN_VERB_SHARE: f64 = 0.9;
 
-/// The truths of all questions: one reading for those with options, another for those of yes and no.
+/// Finds the true options of all questions. Answers of questions with options have one common format, and answers of yes/no questions
+/// another.
 ///
 /// # Errors
-/// If there are no answers, no reading fits all of them, or two readings fit and differ.
-pub(in crate::dataset::ready_made) fn truths(
+/// If there are no answers, no format fits any row, or two formats fit and disagree.
+pub(in crate::dataset::ready_made) fn find_truths(
     table: &Table,
     roles: &Roles,
-    how: &CellFormat,
+    format: &CellFormat,
     items: Vec<Item>,
-    left: &mut Omissions,
+    omissions: &mut Omissions,
 ) -> Result<Truths, String> {
     if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
         for item in items {
-            left.add(OmissionReason::Open, || {
+            omissions.add(OmissionReason::Open, || {
                 format!("not in a column that is known ({})", table.place(item.row))
             });
         }
-        return Ok(Truths {
-            answered: Vec::new(),
-            said: Vec::new(),
-        });
+        return Ok(Truths::default());
     }
     if roles.answers.is_empty() {
-        let remedy = answer_column::unnamed(table, roles, &items).map_or_else(
+        let remedy = answer_column::suggest_column(table, roles, &items).map_or_else(
             || "a test split without them? (--ask FILE asks questions without answers about every image.)".to_owned(),
             |flag| format!("{flag} reads those of a column."),
         );
         return Err(format!(
             "no answers among its columns: {remedy} Its columns:\n{}",
-            crate::dataset::ready_made::columns::shown(table)
+            describe_columns(table)
         ));
     }
-    let mut listed: Vec<Item> = items
+    let (with_options, without_options): (Vec<Item>, Vec<Item>) = items
         .into_iter()
         .map(|item| {
-            if names_no_options(table, roles, &item) {
+            if letters_are_not_options(table, roles, &item) {
                 item.without_options()
             } else {
                 item
             }
         })
-        .collect();
-    let bare = listed.extract_if(.., |item| item.options.is_none());
-    let bare: Vec<Item> = bare.collect();
-    let mut truths = Truths {
-        answered: Vec::new(),
-        said: Vec::new(),
-    };
-    read_with_options(table, roles, how, listed, left, &mut truths)?;
-    read_without_options(table, roles, bare, left, &mut truths)?;
-    truths.answered.sort_by_key(|answered| answered.row);
+        .partition(|item| item.options.is_some());
+    let mut truths = Truths::default();
+    answer_with_options(table, roles, format, with_options, omissions, &mut truths)?;
+    answer_without_options(table, roles, without_options, omissions, &mut truths)?;
+    truths.questions.sort_by_key(|question| question.row);
     Ok(truths)
 }
 
-/// Whether the letters in a question name things in the image and no options, because its answer is yes or no and none of them.
-fn names_no_options(table: &Table, roles: &Roles, item: &Item) -> bool {
+/// True if the letters in a question label things in the image, because its answer is yes or no and not one of the lettered texts.
+fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
     let Some(options) = item.options.as_deref().filter(|_| item.whole.is_some()) else {
         return false;
     };
@@ -104,16 +98,15 @@ fn names_no_options(table: &Table, roles: &Roles, item: &Item) -> bool {
         )
         .collect();
     let is_option = |answer: &String| {
-        let readings = [Reading::Letter, Reading::Text];
-        readings
+        [AnswerFormat::Letter, AnswerFormat::Text]
             .iter()
-            .any(|reading| reading.truth(answer, options).is_some())
+            .any(|format| format.choice_index(answer, options).is_some())
     };
-    answers.iter().any(|answer| yes_or_no(answer).is_some()) && !answers.iter().any(is_option)
+    answers.iter().any(|answer| yes_no_index(answer).is_some()) && !answers.iter().any(is_option)
 }
 
-/// Whether the lines are of this program's own form, in which the answer is the text of a choice.
-pub(in crate::dataset::ready_made) fn is_own(table: &Table) -> bool {
+/// True if the table is in this program's own format, in which the answer is the text of a choice.
+pub(in crate::dataset::ready_made) fn is_native_format(table: &Table) -> bool {
     const FIELDS: [&str; 11] = [
         "id",
         "frame",
@@ -127,30 +120,32 @@ pub(in crate::dataset::ready_made) fn is_own(table: &Table) -> bool {
         "group_size",
         "scene",
     ];
-    let has = |name: &&str| table.find(name).is_some();
-    ["question", "choices", "answer"].iter().all(has)
+    ["question", "choices", "answer"]
+        .iter()
+        .all(|name| table.find(name).is_some())
         && table
             .columns
             .iter()
             .all(|column| FIELDS.contains(&column.as_str()))
 }
 
-/// Whether every answer is written as a text, and none as a number.
+/// True if all cells of the column are texts.
 fn are_texts(table: &Table, column: &Column) -> bool {
     table
         .rows
         .iter()
-        .map(|row| column.cell(row))
-        .all(|cell| matches!(cell, Cell::Text(_)))
+        .all(|row| matches!(column.cell(row), Cell::Text(_)))
 }
 
-/// Items with an answer each. Those without one, or with several, are counted. `other` is a flag for a column of answers that is not
-/// known by its name, for the error if there are none.
+/// Pairs the items with their answers. Items without an answer, or with several, are added to the omissions.
+///
+/// # Errors
+/// If no item has an answer. The error suggests the flag in `other`, if given, to read the answers of another column.
 fn with_answers(
     table: &Table,
     column: &Column,
     items: Vec<Item>,
-    left: &mut Omissions,
+    omissions: &mut Omissions,
     other: Option<String>,
 ) -> Result<Vec<(Item, String)>, String> {
     let count = items.len();
@@ -159,7 +154,9 @@ fn with_answers(
     for item in items {
         match AnswerCell::from_row(&table.rows[item.row], column) {
             AnswerCell::One(answer) => found.push((item, answer)),
-            AnswerCell::Several(shown) => left.add(OmissionReason::SeveralTruths, || shown),
+            AnswerCell::Several(excerpt) => {
+                omissions.add(OmissionReason::SeveralTruths, || excerpt);
+            }
             AnswerCell::Absent => absent.push(item.row),
         }
     }
@@ -174,42 +171,39 @@ fn with_answers(
         ));
     }
     for row in absent {
-        left.add(OmissionReason::Bad, || {
+        omissions.add(OmissionReason::Bad, || {
             format!("{}: no answer (column {:?})", table.place(row), column.name)
         });
     }
     Ok(found)
 }
 
-/// The questions with options.
-fn read_with_options(
+/// Finds the true options of questions with options.
+fn answer_with_options(
     table: &Table,
     roles: &Roles,
-    how: &CellFormat,
+    format: &CellFormat,
     items: Vec<Item>,
-    left: &mut Omissions,
+    omissions: &mut Omissions,
     truths: &mut Truths,
 ) -> Result<(), String> {
     if items.is_empty() {
         return Ok(());
     }
     let column = answer_column::option_column(table, roles, &items)?;
-    let other = answer_column::unnamed(table, roles, &items);
-    let items = with_answers(table, column, items, left, other)?;
-    let read = ColumnReading::choose(table, column, how, &items)?;
-    let name = read.reading.name();
-    truths.said.push(format!("{} ({name})", column.name));
-    truths.answered.reserve(items.len());
-    for (
-        Item {
+    let other = answer_column::suggest_column(table, roles, &items);
+    let items = with_answers(table, column, items, omissions, other)?;
+    let format = ColumnFormat::choose(table, column, format, &items)?;
+    let name = format.format.name();
+    truths.columns.push(format!("{} ({name})", column.name));
+    truths.questions.reserve(items.len());
+    for (item, answer) in items {
+        let Item {
             row, text, options, ..
-        },
-        answer,
-    ) in items
-    {
-        match read.choices(&answer, &options.unwrap_or_default()) {
-            Ok(choices) => truths.answered.push(Answered { row, text, choices }),
-            Err(problem) => left.add(OmissionReason::Bad, || {
+        } = item;
+        match format.choices(&answer, &options.unwrap_or_default()) {
+            Ok(choices) => truths.questions.push(ParsedQuestion { row, text, choices }),
+            Err(problem) => omissions.add(OmissionReason::Bad, || {
                 format!("{}: {problem}", table.place(row))
             }),
         }
@@ -217,162 +211,181 @@ fn read_with_options(
     Ok(())
 }
 
-/// How the answers of a column are read: in one way, in all rows.
-struct ColumnReading<'h> {
-    how: &'h CellFormat,
-    reading: Reading,
-    /// The number of rows that it fits.
+/// Format of the answers in a column, the same in all rows.
+struct ColumnFormat {
+    format: AnswerFormat,
+    /// True if the user chose the format with `--map`.
+    is_chosen: bool,
+    /// Number of rows that the format fits.
     fit: usize,
 }
 
-impl<'h> ColumnReading<'h> {
-    /// The reading that the user names, else the one that fits all rows, else the one that fits most of them.
+impl ColumnFormat {
+    /// The format given with `--map`, else the one that fits all rows, else the one that fits most rows.
     ///
     /// # Errors
-    /// If it fits no row, or two readings fit and differ.
+    /// If the format fits no row, or two formats fit and disagree.
     fn choose(
         table: &Table,
         column: &Column,
-        how: &'h CellFormat,
+        format: &CellFormat,
         items: &[(Item, String)],
     ) -> Result<Self, String> {
-        let none = Offered::default();
-        let rows: Vec<AnswerOf<'_>> = items
+        let none = OptionList::default();
+        let rows: Vec<RowAnswer<'_>> = items
             .iter()
-            .map(|(item, answer)| (answer.as_str(), item.options.as_deref().unwrap_or(&none)))
+            .map(|(item, answer)| RowAnswer {
+                answer,
+                options: item.options.as_deref().unwrap_or(&none),
+            })
             .collect();
-        let by = |reading: Reading| {
-            let mut read = Self {
-                how,
-                reading,
-                fit: 0,
-            };
-            let fit = rows.iter().filter(|row| read.truth(**row).is_some());
-            read.fit = fit.count();
-            read
-        };
-        let read = match how {
-            CellFormat::Answer(reading) => by(*reading),
-            CellFormat::ByRule | CellFormat::Split(_) => {
-                let texts = is_own(table) && are_texts(table, column);
-                let texts = texts.then(|| by(Reading::Text));
-                // Of two readings that fit as many rows, the text is what this form has.
-                match texts.filter(|read| read.fit > 0 && 2 * read.fit >= rows.len()) {
-                    Some(texts) => texts,
-                    None => by(by_rule(&rows).map_err(|(readings, row)| {
-                        ambiguous(table, &items[row].0, rows[row], readings, column)
-                    })?),
+        let chosen = match format {
+            CellFormat::Answer(format) => Self::new(*format, true, &rows),
+            CellFormat::Inferred | CellFormat::Split(_) => {
+                // In this program's own format answers are texts, so text wins over a format that fits as many rows.
+                let texts = (is_native_format(table) && are_texts(table, column))
+                    .then(|| Self::new(AnswerFormat::Text, false, &rows))
+                    .filter(|texts| texts.fit > 0 && 2 * texts.fit >= rows.len());
+                if let Some(texts) = texts {
+                    texts
+                } else {
+                    let format = infer_format(&rows).map_err(|(formats, row)| {
+                        ambiguous_answer(table, &items[row].0, rows[row], formats, column)
+                    })?;
+                    Self::new(format, false, &rows)
                 }
             }
         };
         match items.first() {
-            Some((item, answer)) if read.fit == 0 => Err(format!(
+            Some((item, answer)) if chosen.fit == 0 => Err(format!(
                 "{}: the answer {:?} (column {:?}) is not one of the options {}, neither by letter nor by text nor by number",
                 table.place(item.row),
                 excerpt(answer, 60),
                 column.name,
-                rows[0].1.shown(120)
+                rows[0].options.excerpt(120)
             )),
-            _ => Ok(read),
+            _ => Ok(chosen),
         }
     }
 
-    /// The index of the option that an answer means.
-    fn truth(&self, (answer, options): AnswerOf<'_>) -> Option<usize> {
-        match self.how {
-            CellFormat::Answer(_) => self.reading.truth(answer, options),
-            CellFormat::ByRule | CellFormat::Split(_) => self.reading.by_rule(answer, options),
+    fn new(format: AnswerFormat, is_chosen: bool, rows: &[RowAnswer<'_>]) -> Self {
+        let mut new = Self {
+            format,
+            is_chosen,
+            fit: 0,
+        };
+        new.fit = rows
+            .iter()
+            .filter(|row| new.choice_index(row.answer, row.options).is_some())
+            .count();
+        new
+    }
+
+    /// Index of the option that an answer identifies.
+    fn choice_index(&self, answer: &str, options: &OptionList) -> Option<usize> {
+        if self.is_chosen {
+            self.format.choice_index(answer, options)
+        } else {
+            self.format.inferred_choice_index(answer, options)
         }
     }
 
-    /// The options as choices, with the one that an answer means as the true one.
+    /// Choices of a question, with the option that the answer identifies as the true one.
     ///
     /// # Errors
-    /// If the answer means none of them, or they are no choices.
-    fn choices(&self, answer: &str, options: &Offered) -> Result<Choices, String> {
-        match self.truth((answer, options)) {
+    /// If the answer does not identify an option, or the options are not valid choices.
+    fn choices(&self, answer: &str, options: &OptionList) -> Result<Choices, String> {
+        match self.choice_index(answer, options) {
             Some(truth) => Choices::known_by(Arc::clone(&options.texts), Some(truth))
                 .map_err(|e| e.to_string()),
             None => Err(format!(
                 "the answer {:?} is not one of the options {} (read as {}, which fits {} rows)",
                 excerpt(answer, 60),
-                options.shown(120),
-                self.reading.name(),
+                options.excerpt(120),
+                self.format.name(),
                 self.fit
             )),
         }
     }
 }
 
-/// The reading that fits all rows; if there is none, the one that fits most of them.
+/// Finds the format that fits all rows, else the one that fits most rows.
 ///
 /// # Errors
-/// If two readings fit and differ: both, and the row.
-fn by_rule(rows: &[AnswerOf<'_>]) -> Result<Reading, ([Reading; 2], usize)> {
-    match one_reading(rows) {
-        OneReading::Fits(reading) => Ok(reading),
-        OneReading::Ambiguous { readings, row } => Err((readings, row)),
-        OneReading::None { best, unfit } => {
-            let read: Vec<usize> = (0..rows.len())
-                .filter(|row| unfit.binary_search(row).is_err())
-                .collect();
-            let kept: Vec<AnswerOf<'_>> = read.iter().map(|&row| rows[row]).collect();
-            match one_reading(&kept) {
-                OneReading::Ambiguous { readings, row } => Err((readings, read[row])),
-                OneReading::Fits(_) | OneReading::None { .. } => Ok(best),
+/// If two formats fit and disagree: both formats, and the index of the row.
+fn infer_format(rows: &[RowAnswer<'_>]) -> Result<AnswerFormat, ([AnswerFormat; 2], usize)> {
+    match find_format(rows) {
+        FormatSearch::Fits(format) => Ok(format),
+        FormatSearch::Ambiguous { formats, row } => Err((formats, row)),
+        FormatSearch::None { best, unfit } => {
+            let (indices, fitting): (Vec<usize>, Vec<RowAnswer<'_>>) = rows
+                .iter()
+                .enumerate()
+                .filter(|(index, _)| unfit.binary_search(index).is_err())
+                .map(|(index, row)| (index, *row))
+                .unzip();
+            match find_format(&fitting) {
+                FormatSearch::Ambiguous { formats, row } => Err((formats, indices[row])),
+                FormatSearch::Fits(_) | FormatSearch::None { .. } => Ok(best),
             }
         }
     }
 }
 
-/// The error for an answer that two readings understand in two ways.
-fn ambiguous(
+/// Error message for an answer that identifies different options in two formats.
+fn ambiguous_answer(
     table: &Table,
     item: &Item,
-    (answer, options): AnswerOf<'_>,
-    readings: [Reading; 2],
+    RowAnswer { answer, options }: RowAnswer<'_>,
+    formats: [AnswerFormat; 2],
     column: &Column,
 ) -> String {
-    let [one, other] = readings.map(Reading::name);
-    let [first, second] = readings.map(|reading| flag(Role::Answer, &column.name, Some(reading)));
+    let [one, other] = formats.map(AnswerFormat::name);
+    let [first, second] = formats.map(|format| map_flag(Role::Answer, &column.name, Some(format)));
     format!(
         "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {}; {first} or {second} says which is meant",
         table.place(item.row),
         excerpt(answer, 60),
-        options.shown(120),
+        options.excerpt(120),
     )
 }
 
-/// The questions without options: of yes and no, or open.
-fn read_without_options(
+/// Finds the true options of yes/no questions. Other questions without options are open, and added to the omissions.
+fn answer_without_options(
     table: &Table,
     roles: &Roles,
     items: Vec<Item>,
-    left: &mut Omissions,
+    omissions: &mut Omissions,
     truths: &mut Truths,
 ) -> Result<(), String> {
     if items.is_empty() {
         return Ok(());
     }
     let column = answer_column::yes_or_no_column(table, roles, &items)?;
-    let items = with_answers(table, column, items, left, None)?;
+    let items = with_answers(table, column, items, omissions, None)?;
     let verbs = items
         .iter()
         .filter(|(item, _)| asks_yes_or_no(last_line(&item.text)))
         .count();
-    let are_digits = verbs as f64 >= SHARE_OF_VERBS * items.len() as f64
-        && items.iter().all(|(_, answer)| digit(answer).is_some());
-    let both: Arc<[String]> = ["yes", "no"].map(str::to_owned).into();
+    let are_digits = verbs as f64 >= MIN_VERB_SHARE * items.len() as f64
+        && items
+            .iter()
+            .all(|(_, answer)| digit_index(answer).is_some());
+    let yes_and_no: Arc<[String]> = ["yes", "no"].map(str::to_owned).into();
     let mut count = 0;
     for (Item { row, text, .. }, answer) in items {
-        let read = if are_digits { digit(&answer) } else { None };
-        let truth = read.or_else(|| yes_or_no(&answer));
-        match Choices::known_by(Arc::clone(&both), truth) {
+        let digit = if are_digits {
+            digit_index(&answer)
+        } else {
+            None
+        };
+        let truth = digit.or_else(|| yes_no_index(&answer));
+        match Choices::known_by(Arc::clone(&yes_and_no), truth) {
             Ok(choices) if choices.truth().is_some() => {
                 count += 1;
-                truths.answered.push(Answered { row, text, choices });
+                truths.questions.push(ParsedQuestion { row, text, choices });
             }
-            Ok(_) | Err(_) => left.add(OmissionReason::Open, || {
+            Ok(_) | Err(_) => omissions.add(OmissionReason::Open, || {
                 format!("{:?}", excerpt(&answer, 60))
             }),
         }
@@ -380,13 +393,13 @@ fn read_without_options(
     if count > 0 {
         let digits = if are_digits { ", 1 is yes" } else { "" };
         truths
-            .said
+            .columns
             .push(format!("{} (yes/no{digits})", column.name));
     }
     Ok(())
 }
 
-/// The last line of a text, behind a hint.
+/// Last line of a text, which is the question if a hint comes first.
 fn last_line(text: &str) -> &str {
     text.lines().next_back().unwrap_or(text)
 }

@@ -1,26 +1,27 @@
-//! The column that holds the answers, among several that may: [`option_column`], [`yes_or_no_column`].
+//! Choice of the answer column among several candidates: [`option_column`], [`yes_or_no_column`].
 //!
-//! A gap in a column, or a broken answer, does not make it give way to another: columns are compared in the rows that both answer.
+//! Columns are compared in the rows where both have a valid answer, so a gap or a broken answer in a column does not exclude it.
 
-use super::map::flag;
+use super::column::Column;
+use super::map::map_flag;
 use super::names::Role;
-use super::roles::{Column, Roles};
+use super::roles::Roles;
 use crate::dataset::ready_made::cells::Table;
-use crate::dataset::ready_made::choices::{Offered, Reading, digit, yes_or_no};
+use crate::dataset::ready_made::choices::{AnswerFormat, OptionList, digit_index, yes_no_index};
 use crate::dataset::ready_made::items::{AnswerCell, Item};
 use crate::types::text::excerpt;
 
-/// The choice that a column names in each row; `None` where it names none that can be read.
-type Said = Vec<Option<usize>>;
+/// Index of the choice that each row of a column identifies; `None` for a row without a valid answer.
+type RowChoices = Vec<Option<usize>>;
 
-/// A column that may hold the answers.
+/// Column that may have the answers.
 struct Candidate<'a> {
     column: &'a Column,
-    /// The ways in which its answers can be read, at least one.
-    ways: Vec<Said>,
+    /// Choices of the rows in each format that fits, at least one.
+    interpretations: Vec<RowChoices>,
 }
 
-/// The answer of a row in a column, if it is one.
+/// Answer of a row in a column; `None` if it has none or several.
 fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
     match AnswerCell::from_row(&table.rows[item.row], column) {
         AnswerCell::One(answer) => Some(answer),
@@ -28,83 +29,91 @@ fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
     }
 }
 
-/// The column whose answers are options.
+/// Answer of each row in a column.
+fn column_answers(table: &Table, items: &[Item], column: &Column) -> Vec<Option<String>> {
+    items
+        .iter()
+        .map(|item| answer(table, item, column))
+        .collect()
+}
+
+/// Column whose answers identify options.
 ///
 /// # Errors
-/// If two columns say different things of a row; the error shows the row and the two commands.
+/// If two columns have different answers for a row; the error shows the row and the flags to choose a column.
 pub(in crate::dataset::ready_made) fn option_column<'a>(
     table: &Table,
     roles: &'a Roles,
     items: &[Item],
 ) -> Result<&'a Column, String> {
-    let none = Offered::default();
-    let candidate = |column: &'a Column| {
-        let answers: Vec<Option<String>> = items
-            .iter()
-            .map(|item| answer(table, item, column))
-            .collect();
-        let filled = answers.iter().flatten().count();
-        let said = |reading: Reading| -> Said {
-            items
-                .iter()
-                .zip(&answers)
-                .map(|(item, answer)| {
-                    let options = item.options.as_deref().unwrap_or(&none);
-                    reading.by_rule(answer.as_ref()?, options)
-                })
-                .collect()
-        };
-        let all = Reading::ALL.map(said);
-        let most = all.iter().map(read).max().unwrap_or(0);
-        // A text that happens to be an option here and there is no column of answers.
-        if 2 * most <= filled {
-            return None;
-        }
-        let mut ways: Vec<Said> = Vec::new();
-        for said in all {
-            if read(&said) == most && !ways.contains(&said) {
-                ways.push(said);
-            }
-        }
-        Some(Candidate { column, ways })
-    };
-    chosen(table, roles, items, candidate)
+    choose(table, roles, items, |column| {
+        option_candidate(table, items, column)
+    })
 }
 
-/// The flag for a column of no known name whose cells are an option in every row, in the first way that fits; `None` if there is none.
-pub(in crate::dataset::ready_made) fn unnamed(
+/// A column as candidate for the answers of questions with options; `None` if at most half of its answers identify options.
+fn option_candidate<'a>(
+    table: &Table,
+    items: &[Item],
+    column: &'a Column,
+) -> Option<Candidate<'a>> {
+    let none = OptionList::default();
+    let answers = column_answers(table, items, column);
+    let filled = answers.iter().flatten().count();
+    let by_format = AnswerFormat::ALL.map(|format| -> RowChoices {
+        items
+            .iter()
+            .zip(&answers)
+            .map(|(item, answer)| {
+                let options = item.options.as_deref().unwrap_or(&none);
+                format.inferred_choice_index(answer.as_ref()?, options)
+            })
+            .collect()
+    });
+    let most = by_format.iter().map(count_valid).max().unwrap_or(0);
+    if 2 * most <= filled {
+        return None;
+    }
+    let mut interpretations: Vec<RowChoices> = Vec::new();
+    for choices in by_format {
+        if count_valid(&choices) == most && !interpretations.contains(&choices) {
+            interpretations.push(choices);
+        }
+    }
+    Some(Candidate {
+        column,
+        interpretations,
+    })
+}
+
+/// Flag for a column without a role whose cells identify an option in every row, in the first format that fits; `None` if there is no
+/// such column.
+pub(in crate::dataset::ready_made) fn suggest_column(
     table: &Table,
     roles: &Roles,
     items: &[Item],
 ) -> Option<String> {
-    let none = Offered::default();
-    let mut fitting = table
-        .columns
-        .iter()
-        .enumerate()
-        .filter(|(at, _)| !roles.holds(*at))
-        .flat_map(|(at, name)| {
-            let column = Column {
-                at,
-                field: None,
-                name: name.clone(),
-            };
-            Reading::ALL
-                .into_iter()
-                .map(move |reading| (column.clone(), reading))
-        })
-        .filter(|(column, reading)| {
+    let none = OptionList::default();
+    for (index, name) in table.columns.iter().enumerate() {
+        if roles.uses(index) {
+            continue;
+        }
+        let column = Column::new(index, name);
+        let fitting = AnswerFormat::ALL.into_iter().find(|format| {
             items.iter().all(|item| {
                 let options = item.options.as_deref().unwrap_or(&none);
-                answer(table, item, column)
-                    .is_some_and(|answer| reading.truth(&answer, options).is_some())
+                answer(table, item, &column)
+                    .is_some_and(|answer| format.choice_index(&answer, options).is_some())
             })
         });
-    let (column, reading) = fitting.next()?;
-    Some(flag(Role::Answer, &column.name, Some(reading)))
+        if let Some(format) = fitting {
+            return Some(map_flag(Role::Answer, name, Some(format)));
+        }
+    }
+    None
 }
 
-/// The column whose answers are yes or no. A column of other words beside it differs from it.
+/// Column whose answers are yes or no. Other words count as a third answer.
 ///
 /// # Errors
 /// As [`option_column`].
@@ -113,87 +122,108 @@ pub(in crate::dataset::ready_made) fn yes_or_no_column<'a>(
     roles: &'a Roles,
     items: &[Item],
 ) -> Result<&'a Column, String> {
-    /// The meaning of a word that is neither yes nor no.
+    choose(table, roles, items, |column| {
+        yes_or_no_candidate(table, items, column)
+    })
+}
+
+/// A column as candidate for the answers of yes/no questions; `None` if it has no answers.
+fn yes_or_no_candidate<'a>(
+    table: &Table,
+    items: &[Item],
+    column: &'a Column,
+) -> Option<Candidate<'a>> {
+    let answers = column_answers(table, items, column);
+    if !answers.iter().any(Option::is_some) {
+        return None;
+    }
+    let mut interpretations = vec![parse_answers(&answers, yes_no_index)];
+    if answers
+        .iter()
+        .flatten()
+        .all(|answer| digit_index(answer).is_some())
+    {
+        interpretations.push(parse_answers(&answers, digit_index));
+    }
+    Some(Candidate {
+        column,
+        interpretations,
+    })
+}
+
+/// Index of yes or no for each answer, and a third index for other words.
+fn parse_answers(answers: &[Option<String>], parse: fn(&str) -> Option<usize>) -> RowChoices {
     const OTHER: usize = usize::MAX;
-    let candidate = |column: &'a Column| {
-        let answers: Vec<Option<String>> = items
-            .iter()
-            .map(|item| answer(table, item, column))
-            .collect();
-        let said = |read: fn(&str) -> Option<usize>| -> Said {
-            answers
-                .iter()
-                .map(|answer| Some(read(answer.as_ref()?).unwrap_or(OTHER)))
-                .collect()
-        };
-        let mut ways = vec![said(yes_or_no)];
-        if answers
-            .iter()
-            .flatten()
-            .all(|answer| digit(answer).is_some())
-        {
-            ways.push(said(digit));
-        }
-        (answers.iter().flatten().count() > 0).then_some(Candidate { column, ways })
-    };
-    chosen(table, roles, items, candidate)
+    answers
+        .iter()
+        .map(|answer| Some(parse(answer.as_ref()?).unwrap_or(OTHER)))
+        .collect()
 }
 
-/// How many rows are read.
-fn read(said: &Said) -> usize {
-    said.iter().flatten().count()
+/// Number of rows with a valid answer.
+fn count_valid(choices: &RowChoices) -> usize {
+    choices.iter().flatten().count()
 }
 
-/// The first of the columns that may hold the answers, if no other contradicts it; one that can be read in one way alone goes first.
-/// The first of all columns if none may.
-fn chosen<'a>(
+/// Chooses the first candidate with a single interpretation, else the first candidate, else the first column.
+///
+/// # Errors
+/// If another candidate contradicts the chosen one.
+fn choose<'a>(
     table: &Table,
     roles: &'a Roles,
     items: &[Item],
     candidate: impl Fn(&'a Column) -> Option<Candidate<'a>>,
 ) -> Result<&'a Column, String> {
-    let [only] = &*roles.answers else {
-        let candidates: Vec<Candidate<'a>> = roles.answers.iter().filter_map(candidate).collect();
-        let clear = candidates.iter().find(|one| one.ways.len() == 1);
-        let Some(chosen) = clear.or(candidates.first()) else {
-            return Ok(&roles.answers[0]);
-        };
-        for other in &candidates {
-            if let Some(at) = difference(chosen, other) {
-                return Err(differ(table, &items[at], chosen.column, other.column));
-            }
-        }
-        return Ok(chosen.column);
+    if let [only] = &*roles.answers {
+        return Ok(only);
+    }
+    let candidates: Vec<Candidate<'a>> = roles.answers.iter().filter_map(candidate).collect();
+    let unambiguous = candidates
+        .iter()
+        .find(|candidate| candidate.interpretations.len() == 1);
+    let Some(chosen) = unambiguous.or(candidates.first()) else {
+        return Ok(&roles.answers[0]);
     };
-    Ok(only)
+    for other in &candidates {
+        if let Some(row) = first_difference(chosen, other) {
+            return Err(differing_answers(
+                table,
+                &items[row],
+                chosen.column,
+                other.column,
+            ));
+        }
+    }
+    Ok(chosen.column)
 }
 
-/// The first row in which two columns differ, however they are read; `None` if they can be read alike.
-fn difference(one: &Candidate<'_>, other: &Candidate<'_>) -> Option<usize> {
+/// Index of a row in which two columns differ in every interpretation; `None` if some interpretations agree.
+fn first_difference(one: &Candidate<'_>, other: &Candidate<'_>) -> Option<usize> {
     let mut first = None;
-    for said in &one.ways {
-        for others in &other.ways {
-            let mut rows = said.iter().zip(others);
-            let differs = |(said, others): (&Option<usize>, &Option<usize>)| {
-                said.is_some() && others.is_some() && said != others
-            };
-            let row = rows.position(differs)?;
+    for choices in &one.interpretations {
+        for other_choices in &other.interpretations {
+            let row = choices
+                .iter()
+                .zip(other_choices)
+                .position(|(one, other)| one.is_some() && other.is_some() && one != other)?;
             first.get_or_insert(row);
         }
     }
     first
 }
 
-fn differ(table: &Table, item: &Item, one: &Column, other: &Column) -> String {
-    let says = |column: &Column| excerpt(&answer(table, item, column).unwrap_or_default(), 60);
+/// Error message for two columns with different answers in a row.
+fn differing_answers(table: &Table, item: &Item, one: &Column, other: &Column) -> String {
+    let answer_in = |column: &Column| excerpt(&answer(table, item, column).unwrap_or_default(), 60);
     format!(
         "{}: the answers of {:?} and {:?} differ, {:?} and {:?}; {} or {} says which is meant",
         table.place(item.row),
         one.name,
         other.name,
-        says(one),
-        says(other),
-        flag(Role::Answer, &one.name, None),
-        flag(Role::Answer, &other.name, None)
+        answer_in(one),
+        answer_in(other),
+        map_flag(Role::Answer, &one.name, None),
+        map_flag(Role::Answer, &other.name, None)
     )
 }

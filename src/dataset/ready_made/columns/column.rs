@@ -1,33 +1,52 @@
-//! A column of a set: [`Column`].
+//! Column of a set: [`Column`].
 
 use crate::dataset::ready_made::cells::{Cell, Row};
 
-/// A column, or a field of structs in it.
+/// A column, or a field of the structs in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) struct Column {
-    pub(in crate::dataset::ready_made) at: usize,
+    /// Index in the table.
+    pub(in crate::dataset::ready_made) index: usize,
+    /// Path of the field, with dots; `None` for the whole cell.
     pub(in crate::dataset::ready_made) field: Option<String>,
+    /// Name for messages, with the field.
     pub(in crate::dataset::ready_made) name: String,
 }
 
 impl Column {
-    /// The cell of the column in a row.
-    pub(in crate::dataset::ready_made) fn cell<'a>(&self, row: &'a Row) -> &'a Cell {
-        let cell = row.cell(self.at);
-        match &self.field {
-            None => cell,
-            Some(field) => {
-                let mut fields = field.split('.');
-                fields
-                    .try_fold(cell, |cell, field| cell.field(field))
-                    .unwrap_or(&Cell::Absent)
-            }
+    /// A whole column.
+    pub(in crate::dataset::ready_made) fn new(index: usize, name: &str) -> Self {
+        Self {
+            index,
+            field: None,
+            name: name.to_owned(),
         }
     }
 
-    /// The cell as text, if it holds one.
+    /// A field of the structs in a column.
+    pub(super) fn with_field(index: usize, name: &str, field: &str) -> Self {
+        Self {
+            index,
+            field: Some(field.to_owned()),
+            name: format!("{name}.{field}"),
+        }
+    }
+
+    /// Cell of the column in a row.
+    pub(in crate::dataset::ready_made) fn cell<'a>(&self, row: &'a Row) -> &'a Cell {
+        let cell = row.cell(self.index);
+        match &self.field {
+            None => cell,
+            Some(path) => path
+                .split('.')
+                .try_fold(cell, |cell, field| cell.field(field))
+                .unwrap_or(&Cell::Absent),
+        }
+    }
+
+    /// Cell of a row as text; `None` if it is absent or has no text.
     pub(in crate::dataset::ready_made) fn text(&self, row: &Row) -> Option<String> {
         let cell = self.cell(row);
-        (!cell.is_absent()).then(|| cell.text()).flatten()
+        if cell.is_absent() { None } else { cell.text() }
     }
 }

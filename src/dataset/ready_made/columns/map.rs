@@ -1,50 +1,50 @@
-//! Column mapping given by the user with `--map`: [`Map`].
+//! Column mapping given by the user with `--map`: [`ColumnMap`].
 
 use std::fmt;
 use std::str::FromStr;
 
 use super::names::Role;
-use crate::dataset::ready_made::choices::Reading;
+use crate::dataset::ready_made::choices::AnswerFormat;
 use crate::types::shell_word;
 
 /// Value of `--map`: roles and their columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Map {
+pub struct ColumnMap {
     text: String,
-    pub(in crate::dataset::ready_made) entries: Vec<Entry>,
+    pub(in crate::dataset::ready_made) entries: Vec<MapEntry>,
 }
 
 /// One `role=column` entry of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::dataset::ready_made) struct Entry {
+pub(in crate::dataset::ready_made) struct MapEntry {
     pub(super) role: Role,
     /// One column, several (for options or images) or a template with `{Column}`; empty turns the role off.
     pub(in crate::dataset::ready_made) columns: Vec<String>,
     /// Text of `columns` before it was split at commas. A column with exactly this name takes precedence.
-    pub(super) whole: String,
-    pub(in crate::dataset::ready_made) how: CellFormat,
+    pub(super) unsplit: String,
+    pub(in crate::dataset::ready_made) format: CellFormat,
 }
 
-/// How the cells of a column are read.
+/// Format of the cells in a column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) enum CellFormat {
-    /// By the default rules: no reading was given.
-    ByRule,
-    /// As options in one cell, separated by this text.
+    /// Not given, to be inferred.
+    Inferred,
+    /// Options in one cell, separated by this text.
     Split(String),
-    /// As answers, in this reading.
-    Answer(Reading),
+    /// Answers in this format.
+    Answer(AnswerFormat),
 }
 
-/// Writes a `--map` flag for one column, quoted for the shell, with the reading of answers if one is given.
-pub(in crate::dataset::ready_made) fn flag(
+/// Writes a `--map` flag for one column, quoted for the shell, with the format of answers if one is given.
+pub(in crate::dataset::ready_made) fn map_flag(
     role: Role,
     column: &str,
-    reading: Option<Reading>,
+    format: Option<AnswerFormat>,
 ) -> String {
-    let suffix = match reading {
-        Some(reading) => format!(":{}", reading.name()),
-        // Ends a column name that contains a colon: the text after the last colon is the reading, and an empty one means the rules.
+    let suffix = match format {
+        Some(format) => format!(":{}", format.name()),
+        // A colon ends a column name that contains colons: the text after the last colon is the format, and an empty one is inferred.
         None if column.contains(':') && matches!(role, Role::Options | Role::Answer) => {
             ":".to_owned()
         }
@@ -54,33 +54,34 @@ pub(in crate::dataset::ready_made) fn flag(
     format!("--map {}={}", role.name(), shell_word(&value))
 }
 
-impl Map {
+impl ColumnMap {
     /// Merges maps. An entry replaces earlier ones of the same role.
-    pub(in crate::dataset::ready_made) fn joined<'a>(
+    pub(in crate::dataset::ready_made) fn merge<'a>(
         maps: impl IntoIterator<Item = &'a Self>,
     ) -> Self {
-        let mut joined = Self::default();
+        let mut merged = Self::default();
         for map in maps {
             for entry in &map.entries {
-                joined.entries.retain(|known| known.role != entry.role);
-                joined.entries.push(entry.clone());
+                merged.entries.retain(|known| known.role != entry.role);
+                merged.entries.push(entry.clone());
             }
         }
-        joined
+        merged
     }
 
-    pub(in crate::dataset::ready_made) fn entry(&self, role: Role) -> Option<&Entry> {
+    /// Entry of a role; `None` if the map does not have the role.
+    pub(in crate::dataset::ready_made) fn entry(&self, role: Role) -> Option<&MapEntry> {
         self.entries.iter().find(|entry| entry.role == role)
     }
 }
 
-impl fmt::Display for Map {
+impl fmt::Display for ColumnMap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)
     }
 }
 
-impl FromStr for Map {
+impl FromStr for ColumnMap {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -91,10 +92,12 @@ impl FromStr for Map {
                 "role=column expected, with one of the roles {roles}"
             ));
         }
-        let ends = starts[1..].iter().map(|start| start - 1);
-        let parts = starts.iter().zip(ends.chain([text.len()]));
-        let mut entries: Vec<Entry> = Vec::new();
-        for (start, end) in parts {
+        let ends = starts[1..]
+            .iter()
+            .map(|start| start - 1)
+            .chain([text.len()]);
+        let mut entries: Vec<MapEntry> = Vec::new();
+        for (start, end) in starts.iter().zip(ends) {
             let entry = parse_entry(&text[*start..end])?;
             if entries.iter().any(|known| known.role == entry.role) {
                 return Err(format!("{} occurs twice", entry.role.name()));
@@ -110,41 +113,42 @@ impl FromStr for Map {
 
 /// Byte offsets of the entries: each `role=` at the start of the text or after a comma.
 fn entry_starts(text: &str) -> Vec<usize> {
-    let commas = text.match_indices(',').map(|(at, _)| at + 1);
-    let is_role = |at: &usize| {
-        let rest = &text[*at..];
-        rest.split_once('=')
-            .is_some_and(|(name, _)| Role::ALL.iter().any(|role| role.name() == name.trim()))
-    };
-    std::iter::once(0).chain(commas).filter(is_role).collect()
+    std::iter::once(0)
+        .chain(text.match_indices(',').map(|(comma, _)| comma + 1))
+        .filter(|start| {
+            text[*start..]
+                .split_once('=')
+                .is_some_and(|(name, _)| Role::ALL.iter().any(|role| role.name() == name.trim()))
+        })
+        .collect()
 }
 
-/// Parses one entry: `role=column`, or `role=column:reading` for options and answers.
-fn parse_entry(text: &str) -> Result<Entry, String> {
+/// Parses one entry: `role=column`, or `role=column:format` for options and answers.
+fn parse_entry(text: &str) -> Result<MapEntry, String> {
     let (name, value) = text.split_once('=').ok_or("role=column expected")?;
     let name = name.trim();
     let role = Role::ALL
         .into_iter()
         .find(|role| role.name() == name)
         .ok_or_else(|| format!("no role {name:?}"))?;
-    let (column, how) = match (role, value.rsplit_once(':')) {
-        (Role::Options | Role::Answer, Some((column, ""))) => (column, CellFormat::ByRule),
-        (Role::Options, Some((column, how))) => {
-            let separator = how
+    let (column, format) = match (role, value.rsplit_once(':')) {
+        (Role::Options | Role::Answer, Some((column, ""))) => (column, CellFormat::Inferred),
+        (Role::Options, Some((column, split))) => {
+            let separator = split
                 .strip_prefix("split(")
-                .and_then(|how| how.strip_suffix(')'))
+                .and_then(|rest| rest.strip_suffix(')'))
                 .filter(|separator| !separator.is_empty())
                 .ok_or("options=COLUMN:split(|) expected, with the signs between options")?;
             (column, CellFormat::Split(separator.to_owned()))
         }
-        (Role::Answer, Some((column, how))) => {
-            let reading = Reading::from_name(how).ok_or_else(|| {
-                let names = Reading::ALL.map(Reading::name).join(", ");
+        (Role::Answer, Some((column, name))) => {
+            let format = AnswerFormat::from_name(name).ok_or_else(|| {
+                let names = AnswerFormat::ALL.map(AnswerFormat::name).join(", ");
                 format!("answer=COLUMN:HOW expected, with one of {names}")
             })?;
-            (column, CellFormat::Answer(reading))
+            (column, CellFormat::Answer(format))
         }
-        _ => (value, CellFormat::ByRule),
+        _ => (value, CellFormat::Inferred),
     };
     let is_list = matches!(role, Role::Options | Role::Image) && !column.contains('{');
     let columns = if column.is_empty() {
@@ -157,11 +161,11 @@ fn parse_entry(text: &str) -> Result<Entry, String> {
     } else {
         vec![column.trim().to_owned()]
     };
-    Ok(Entry {
+    Ok(MapEntry {
         role,
         columns,
-        whole: column.trim().to_owned(),
-        how,
+        unsplit: column.trim().to_owned(),
+        format,
     })
 }
 
@@ -173,41 +177,41 @@ mod tests {
 
     #[test]
     fn map_names_columns_by_role() {
-        let map: Map = TEXT.parse().unwrap();
+        let map: ColumnMap = TEXT.parse().unwrap();
         assert_eq!(map.to_string(), TEXT);
         let columns = |role| map.entry(role).unwrap().columns.clone();
         assert_eq!(columns(Role::Image), ["pics/{bild}.png"]);
         assert_eq!(columns(Role::Family), Vec::<String>::new());
         assert_eq!(
-            map.entry(Role::Options).unwrap().how,
+            map.entry(Role::Options).unwrap().format,
             CellFormat::Split("|".into())
         );
         assert_eq!(
-            map.entry(Role::Answer).unwrap().how,
-            CellFormat::Answer(Reading::Index1)
+            map.entry(Role::Answer).unwrap().format,
+            CellFormat::Answer(AnswerFormat::Index1)
         );
         assert_eq!(map.entry(Role::Hint), None);
     }
 
     #[test]
     fn option_columns_split_at_commas() {
-        assert!("options=first,second:x,third".parse::<Map>().is_err());
-        let cells: Map = "options=first,second,answer=truth".parse().unwrap();
+        assert!("options=first,second:x,third".parse::<ColumnMap>().is_err());
+        let cells: ColumnMap = "options=first,second,answer=truth".parse().unwrap();
         assert_eq!(
             cells.entry(Role::Options).unwrap().columns,
             ["first", "second"]
         );
-        let comma: Map = "options=all:split(,)".parse().unwrap();
+        let comma: ColumnMap = "options=all:split(,)".parse().unwrap();
         assert_eq!(
-            comma.entry(Role::Options).unwrap().how,
+            comma.entry(Role::Options).unwrap().format,
             CellFormat::Split(",".into())
         );
     }
 
     #[test]
     fn later_map_replaces_roles() {
-        let map: Map = TEXT.parse().unwrap();
-        let both = Map::joined([&map, &"id=,answer=x".parse().unwrap()]);
+        let map: ColumnMap = TEXT.parse().unwrap();
+        let both = ColumnMap::merge([&map, &"id=,answer=x".parse().unwrap()]);
         assert_eq!(both.entry(Role::Id).unwrap().columns, Vec::<String>::new());
         assert_eq!(both.entry(Role::Question).unwrap().columns, ["frage"]);
     }
@@ -221,7 +225,7 @@ mod tests {
             ("answer=a:second", "one of letter, text, index0, index1"),
             ("options=a:split()", "split(|) expected"),
         ] {
-            let problem = text.parse::<Map>().unwrap_err();
+            let problem = text.parse::<ColumnMap>().unwrap_err();
             assert!(problem.contains(expected), "{text}: {problem}");
         }
     }

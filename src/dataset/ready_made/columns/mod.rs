@@ -1,12 +1,15 @@
-//! Columns of a set, and the role of each.
+//! Columns of a set and their roles.
 
 pub(super) mod answer_column;
 mod column;
-mod family_column;
+mod family_source;
 pub(super) mod map;
 pub(super) mod names;
 mod roles;
 mod template;
 
-pub(super) use family_column::FamilyOf;
-pub(super) use roles::{Asked, Column, Images, InQuestion, Roles, column, shown};
+pub(super) use column::Column;
+pub(super) use family_source::FamilySource;
+pub(super) use roles::{
+    ImageColumns, OptionsInQuestion, QuestionSource, Roles, describe_columns, find_column,
+};

@@ -1,4 +1,4 @@
-//! The names of columns and the instructions in questions that are known: [`Role`], [`known`], [`without_endings`].
+//! Known names of columns and known instructions in questions: [`Role`], [`known_names`], [`split_instructions`].
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -6,10 +6,10 @@ use std::sync::LazyLock;
 use regex::{Match, Regex};
 use serde::Deserialize;
 
-/// The file of names and instructions.
+/// Names and instructions in TOML.
 const COLUMNS: &str = include_str!("../columns.toml");
 
-/// The role of a column.
+/// Role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(in crate::dataset::ready_made) enum Role {
@@ -26,7 +26,7 @@ pub(in crate::dataset::ready_made) enum Role {
 }
 
 impl Role {
-    /// The roles that `--map` knows.
+    /// Roles that `--map` accepts.
     pub(super) const ALL: [Self; 9] = [
         Self::Question,
         Self::Image,
@@ -39,7 +39,7 @@ impl Role {
         Self::Scene,
     ];
 
-    /// The name in `--map` and messages.
+    /// Name in `--map` and messages.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Question => "question",
@@ -56,22 +56,23 @@ impl Role {
     }
 }
 
-/// The content of the file.
+/// Content of `columns.toml`.
 #[derive(Deserialize)]
-struct Columns {
+struct KnownColumns {
     roles: BTreeMap<Role, Vec<String>>,
     instructions: Instructions,
 }
 
 #[derive(Deserialize)]
 struct Instructions {
+    /// Regular expressions of instructions at the end of a question.
     endings: Vec<String>,
 }
 
-/// The file, read once. A test holds that it can be read.
-static KNOWN: LazyLock<Option<Columns>> = LazyLock::new(|| toml::from_str(COLUMNS).ok());
+/// Parsed `columns.toml`. A test checks that it can be parsed.
+static KNOWN: LazyLock<Option<KnownColumns>> = LazyLock::new(|| toml::from_str(COLUMNS).ok());
 
-/// The instructions as expressions that match at the end of a text.
+/// Regular expressions that match an instruction at the end of a text.
 static ENDINGS: LazyLock<Vec<Regex>> = LazyLock::new(|| {
     KNOWN
         .iter()
@@ -80,38 +81,44 @@ static ENDINGS: LazyLock<Vec<Regex>> = LazyLock::new(|| {
         .collect()
 });
 
-/// The names of the columns of a role, plain, the best first.
-pub(in crate::dataset::ready_made) fn known(role: Role) -> &'static [String] {
-    let known = KNOWN.as_ref().and_then(|known| known.roles.get(&role));
-    known.map_or(&[], Vec::as_slice)
+/// Known column names of a role, normalized, in order of preference.
+pub(in crate::dataset::ready_made) fn known_names(role: Role) -> &'static [String] {
+    KNOWN
+        .as_ref()
+        .and_then(|known| known.roles.get(&role))
+        .map_or(&[], Vec::as_slice)
 }
 
-/// A name in lower case, letters and digits alone.
-pub(in crate::dataset::ready_made) fn plain(name: &str) -> String {
+/// Normalizes a name: only letters and digits, in lower case.
+pub(in crate::dataset::ready_made) fn normalize(name: &str) -> String {
     name.chars()
         .filter(|c| c.is_alphanumeric())
         .flat_map(char::to_lowercase)
         .collect()
 }
 
-/// A text without the instructions at its end, and these, the last first. An instruction is a sentence or a line of its own, with
-/// something before it.
-pub(in crate::dataset::ready_made) fn without_endings(text: &str) -> (&str, Vec<String>) {
-    let (mut text, mut cut) = (text.trim_end(), Vec::new());
+/// Splits the instructions off the end of a text. Returns the rest and the instructions, the last one first.
+pub(in crate::dataset::ready_made) fn split_instructions(text: &str) -> (&str, Vec<String>) {
+    let (mut text, mut instructions) = (text.trim_end(), Vec::new());
     loop {
-        let own = |ending: &Match<'_>| {
-            let before = text[..ending.start()].chars().next_back();
-            let begins = ending.as_str().len() - ending.as_str().trim_start().len();
-            let has_line = ending.as_str()[..begins].contains('\n');
-            before.is_some_and(|before| has_line || !before.is_alphanumeric())
+        let instruction = ENDINGS
+            .iter()
+            .filter_map(|ending| ending.find(text))
+            .find(|ending| is_separate(text, ending));
+        let Some(instruction) = instruction else {
+            return (text, instructions);
         };
-        let mut endings = ENDINGS.iter().filter_map(|ending| ending.find(text));
-        let Some(ending) = endings.find(own) else {
-            return (text, cut);
-        };
-        cut.push(ending.as_str().trim().to_owned());
-        text = text[..ending.start()].trim_end();
+        instructions.push(instruction.as_str().trim().to_owned());
+        text = text[..instruction.start()].trim_end();
     }
+}
+
+/// True if the text before an instruction is not empty and ends with its own sentence or line.
+fn is_separate(text: &str, instruction: &Match<'_>) -> bool {
+    let matched = instruction.as_str();
+    let space = &matched[..matched.len() - matched.trim_start().len()];
+    let before = text[..instruction.start()].chars().next_back();
+    before.is_some_and(|before| space.contains('\n') || !before.is_alphanumeric())
 }
 
 #[cfg(test)]
@@ -119,14 +126,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_can_be_read_and_every_name_in_it_is_plain() {
-        let known = toml::from_str::<Columns>(COLUMNS).unwrap();
-        // Questions have a group by the word of the user alone.
+    fn names_in_the_file_are_normalized() {
+        let known = toml::from_str::<KnownColumns>(COLUMNS).unwrap();
+        // Groups have no known names, because only the user assigns them.
         for role in Role::ALL.iter().filter(|role| **role != Role::Group) {
             assert!(!known.roles[role].is_empty(), "{role:?}");
         }
-        let names = known.roles.values().flatten();
-        assert!(names.clone().all(|name| plain(name) == *name));
+        assert!(
+            known
+                .roles
+                .values()
+                .flatten()
+                .all(|name| normalize(name) == *name)
+        );
         assert_eq!(ENDINGS.len(), known.instructions.endings.len());
     }
 
@@ -152,8 +164,8 @@ mod tests {
             ("Answer yes or no.", "Answer yes or no.", 0),
             ("A. x\nB. y\nPlease answer yes or no.", "A. x\nB. y", 1),
         ] {
-            let (cut, endings) = without_endings(text);
-            assert_eq!((cut, endings.len()), (rest, count), "{text}");
+            let (before, instructions) = split_instructions(text);
+            assert_eq!((before, instructions.len()), (rest, count), "{text}");
         }
     }
 }

@@ -1,409 +1,433 @@
-//! Which column of a set is which: [`Roles`].
+//! Roles of the columns of a set: [`Roles`].
 
 use std::collections::BTreeSet;
 
-pub(in crate::dataset::ready_made) use super::column::Column;
-use super::map::{CellFormat, Map, flag};
-use super::names::{Role, known, plain};
+use super::column::Column;
+use super::map::{CellFormat, ColumnMap, map_flag};
+use super::names::{Role, known_names, normalize};
 use super::template::Template;
-use crate::dataset::ready_made::cells::{Cell, Table, Turns};
+use crate::dataset::ready_made::cells::{Cell, ConversationPaths, Table};
 use crate::types::Choices;
 use crate::types::questions::letter;
 use crate::types::text::excerpt;
 
-/// The columns by role.
+/// Columns by role. If a role has several columns, they are in order of preference.
 #[derive(Debug)]
 pub(in crate::dataset::ready_made) struct Roles {
-    pub(in crate::dataset::ready_made) question: Asked,
-    /// The columns of images; the first that has any wins, or all of a numbered family.
-    pub(in crate::dataset::ready_made) images: Images,
-    /// Columns of lists or texts of options.
-    pub(in crate::dataset::ready_made) options: Vec<Column>,
-    /// Columns of one option each, in order.
-    pub(in crate::dataset::ready_made) cells: Vec<Column>,
+    pub(in crate::dataset::ready_made) question: QuestionSource,
+    pub(in crate::dataset::ready_made) images: ImageColumns,
+    /// Columns with all options of a row in one cell.
+    pub(in crate::dataset::ready_made) option_lists: Vec<Column>,
+    /// Columns with one option each, in order.
+    pub(in crate::dataset::ready_made) option_cells: Vec<Column>,
     pub(in crate::dataset::ready_made) answers: Vec<Column>,
     pub(in crate::dataset::ready_made) ids: Vec<Column>,
     pub(in crate::dataset::ready_made) hint: Option<Column>,
-    pub(in crate::dataset::ready_made) families: Families,
+    pub(in crate::dataset::ready_made) families: FamilyColumns,
     pub(in crate::dataset::ready_made) evidence: Option<Column>,
     pub(in crate::dataset::ready_made) scene: Option<Column>,
-    pub(in crate::dataset::ready_made) split_options: Option<String>,
-    pub(in crate::dataset::ready_made) in_question: InQuestion,
+    /// Text between the options in one cell, if given by the user.
+    pub(in crate::dataset::ready_made) option_separator: Option<String>,
+    pub(in crate::dataset::ready_made) in_question: OptionsInQuestion,
 }
 
-/// Where the text of a question stands.
+/// Source of the text of a question.
 #[derive(Debug)]
-pub(in crate::dataset::ready_made) enum Asked {
+pub(in crate::dataset::ready_made) enum QuestionSource {
     Column(Column),
-    /// In the image, as the user states: the text only points there.
-    InImage,
+    /// The question is in the image, according to the user. The prompt only refers to it.
+    Image,
 }
 
-impl Asked {
-    /// The text of questions that stand in their images.
-    pub(in crate::dataset::ready_made) const IN_IMAGE: &str = "Answer the question in the image.";
+impl QuestionSource {
+    /// Text of a question that is in its image.
+    pub(in crate::dataset::ready_made) const IN_IMAGE_TEXT: &str =
+        "Answer the question in the image.";
 
-    /// The column; `None` if there is none.
+    /// Column of the text; `None` if the question is in the image.
     pub(in crate::dataset::ready_made) fn column(&self) -> Option<&Column> {
         match self {
             Self::Column(column) => Some(column),
-            Self::InImage => None,
+            Self::Image => None,
         }
     }
 }
 
-/// The columns that may name families.
+/// Columns of the families.
 #[derive(Debug)]
-pub(in crate::dataset::ready_made) enum Families {
-    /// By their names, the best first.
-    Known(Vec<Column>),
-    /// The one that the user names, or none.
-    Said(Option<Column>),
+pub(in crate::dataset::ready_made) enum FamilyColumns {
+    /// Candidates by their names, in order of preference.
+    Candidates(Vec<Column>),
+    /// Column given by the user, or none.
+    Chosen(Option<Column>),
 }
 
-/// Whether options are looked for in the text of a question whose columns have none.
+impl FamilyColumns {
+    fn as_slice(&self) -> &[Column] {
+        match self {
+            Self::Candidates(columns) => columns,
+            Self::Chosen(column) => column.as_slice(),
+        }
+    }
+}
+
+/// Treatment of options in the text of a question, if the row has no columns of options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::dataset::ready_made) enum InQuestion {
-    Searched,
-    /// The user states that there are no options.
+pub(in crate::dataset::ready_made) enum OptionsInQuestion {
+    Search,
+    /// There are no options, according to the user.
     None,
 }
 
-/// Where the images of a row stand.
+/// Columns of the images.
 #[derive(Debug)]
-pub(in crate::dataset::ready_made) enum Images {
-    /// In the first of these columns that has one.
+pub(in crate::dataset::ready_made) enum ImageColumns {
+    /// The first of these columns with an image.
     First(Vec<Column>),
-    /// In all of these columns.
+    /// All of these columns.
     All(Vec<Column>),
-    /// In a file of this name, with the cells of columns in braces.
+    /// The file named by a template.
     Template(Template),
 }
 
 impl Roles {
-    /// The roles of the columns of a table, by a map and else by their names.
+    /// Assigns roles to the columns of a table, by the map, else by their names.
     ///
     /// # Errors
-    /// If a column of the map is not there, no column is the question, or the columns hold several questions a row.
-    pub(in crate::dataset::ready_made) fn new(table: &Table, map: &Map) -> Result<Self, String> {
-        let named = |role| Self::named(table, map, role);
-        let question = named(Role::Question)?;
-        refuse_wide(table, map)?;
+    /// If a column of the map does not exist, there is no question column, or a row has several questions.
+    pub(in crate::dataset::ready_made) fn new(
+        table: &Table,
+        map: &ColumnMap,
+    ) -> Result<Self, String> {
+        let columns_of = |role| columns_of(table, map, role);
+        let question = columns_of(Role::Question)?;
+        refuse_several_questions(table, map)?;
         let question = match (question.into_iter().next(), map.entry(Role::Question)) {
-            (Some(column), _) => Asked::Column(column),
-            (None, Some(_)) => Asked::InImage,
+            (Some(column), _) => QuestionSource::Column(column),
+            (None, Some(_)) => QuestionSource::Image,
             (None, None) => return Err(no_question(table)),
         };
-        let how = map.entry(Role::Options);
-        let mut options = named(Role::Options)?;
-        let is_of_cells = how.is_some() && options.len() > 1;
-        let cells = match how {
-            Some(_) if is_of_cells => std::mem::take(&mut options),
-            Some(_) => Vec::new(),
-            None => cells(table),
+        let options_entry = map.entry(Role::Options);
+        let options = columns_of(Role::Options)?;
+        let (option_lists, option_cells) = match options_entry {
+            Some(_) if options.len() > 1 => (Vec::new(), options),
+            Some(_) => (options, Vec::new()),
+            None => (options, option_cells(table)),
         };
-        let evidence = named(Role::Evidence)?.into_iter().next();
+        let evidence = columns_of(Role::Evidence)?.into_iter().next();
         Ok(Self {
             question,
-            images: Self::images(table, map)?,
-            options,
-            cells,
-            answers: named(Role::Answer)?,
-            ids: named(Role::Id)?,
-            hint: named(Role::Hint)?.into_iter().next(),
+            images: image_columns(table, map)?,
+            option_lists,
+            option_cells,
+            answers: columns_of(Role::Answer)?,
+            ids: columns_of(Role::Id)?,
+            hint: columns_of(Role::Hint)?.into_iter().next(),
             families: match map.entry(Role::Family) {
-                Some(_) => Families::Said(named(Role::Family)?.into_iter().next()),
-                None => Families::Known(named(Role::Family)?),
+                Some(_) => FamilyColumns::Chosen(columns_of(Role::Family)?.into_iter().next()),
+                None => FamilyColumns::Candidates(columns_of(Role::Family)?),
             },
             evidence,
-            scene: named(Role::Scene)?.into_iter().next(),
-            in_question: match how {
-                Some(entry) if entry.columns.is_empty() => InQuestion::None,
-                _ => InQuestion::Searched,
+            scene: columns_of(Role::Scene)?.into_iter().next(),
+            in_question: match options_entry {
+                Some(entry) if entry.columns.is_empty() => OptionsInQuestion::None,
+                _ => OptionsInQuestion::Search,
             },
-            split_options: how.and_then(|entry| match &entry.how {
-                CellFormat::Split(signs) => Some(signs.clone()),
-                CellFormat::ByRule | CellFormat::Answer(_) => None,
+            option_separator: options_entry.and_then(|entry| match &entry.format {
+                CellFormat::Split(separator) => Some(separator.clone()),
+                CellFormat::Inferred | CellFormat::Answer(_) => None,
             }),
         })
     }
 
-    /// The columns that nobody reads again once the questions have their text, their options and their answers: not those of images,
-    /// ids, families and scenes.
-    pub(in crate::dataset::ready_made) fn read_once(&self) -> BTreeSet<usize> {
-        let (Images::First(images) | Images::All(images)) = &self.images else {
-            // A template may name any column.
-            return BTreeSet::new();
-        };
-        let families = match &self.families {
-            Families::Known(columns) => columns.as_slice(),
-            Families::Said(column) => column.as_slice(),
-        };
-        let kept: BTreeSet<usize> = images
-            .iter()
-            .chain(&self.ids)
-            .chain(families)
-            .chain(&self.evidence)
-            .chain(&self.scene)
-            .map(|column| column.at)
-            .collect();
+    /// Columns of the question text, its options and its answer.
+    fn question_columns(&self) -> impl Iterator<Item = &Column> {
         self.question
             .column()
             .into_iter()
             .chain(&self.hint)
-            .chain(&self.options)
-            .chain(&self.cells)
+            .chain(&self.option_lists)
+            .chain(&self.option_cells)
             .chain(&self.answers)
-            .map(|column| column.at)
-            .filter(|at| !kept.contains(at))
+    }
+
+    /// Columns that are not read again after the questions are parsed. Images, ids, families, evidence and scenes are read later.
+    pub(in crate::dataset::ready_made) fn columns_to_clear(&self) -> BTreeSet<usize> {
+        let (ImageColumns::First(images) | ImageColumns::All(images)) = &self.images else {
+            // A template may name any column.
+            return BTreeSet::new();
+        };
+        let needed: BTreeSet<usize> = images
+            .iter()
+            .chain(&self.ids)
+            .chain(self.families.as_slice())
+            .chain(&self.evidence)
+            .chain(&self.scene)
+            .map(|column| column.index)
+            .collect();
+        self.question_columns()
+            .map(|column| column.index)
+            .filter(|index| !needed.contains(index))
             .collect()
     }
 
-    /// Whether a column has a role.
-    pub(super) fn holds(&self, at: usize) -> bool {
+    /// True if the column is used for a question, image, id or family.
+    pub(super) fn uses(&self, index: usize) -> bool {
         let images = match &self.images {
-            Images::First(columns) | Images::All(columns) => columns.as_slice(),
-            Images::Template(_) => &[],
+            ImageColumns::First(columns) | ImageColumns::All(columns) => columns.as_slice(),
+            ImageColumns::Template(_) => &[],
         };
-        let families = match &self.families {
-            Families::Known(columns) => columns.as_slice(),
-            Families::Said(column) => column.as_slice(),
-        };
-        let mut columns = images
+        images
             .iter()
-            .chain(families)
+            .chain(self.families.as_slice())
             .chain(&self.ids)
-            .chain(self.question.column());
-        let mut others = self
-            .hint
-            .iter()
-            .chain(&self.options)
-            .chain(&self.cells)
-            .chain(&self.answers);
-        columns.any(|column| column.at == at) || others.any(|column| column.at == at)
+            .chain(self.question_columns())
+            .any(|column| column.index == index)
     }
+}
 
-    /// The columns of a role: those of the map, or those with one of its names, the best first.
-    fn named(table: &Table, map: &Map, role: Role) -> Result<Vec<Column>, String> {
-        if let Some(entry) = map.entry(role) {
-            if entry.columns.len() > 1
-                && let Some(at) = table.find(&entry.whole)
-            {
-                let name = entry.whole.clone();
-                let field = None;
-                return Ok(vec![Column { at, field, name }]);
-            }
-            let columns = entry.columns.iter();
-            return columns.map(|name| column(table, name)).collect();
+/// Columns of a role: those in the map, else those with a known name, in order of preference.
+fn columns_of(table: &Table, map: &ColumnMap, role: Role) -> Result<Vec<Column>, String> {
+    if let Some(entry) = map.entry(role) {
+        if entry.columns.len() > 1
+            && let Some(index) = table.find(&entry.unsplit)
+        {
+            return Ok(vec![Column::new(index, &entry.unsplit)]);
         }
-        let columns = known(role).iter().flat_map(|name| {
+        return entry
+            .columns
+            .iter()
+            .map(|name| find_column(table, name))
+            .collect();
+    }
+    Ok(known_names(role)
+        .iter()
+        .flat_map(|name| {
             table
                 .columns
                 .iter()
                 .enumerate()
-                .filter(move |(_, column)| plain(column) == *name)
-                .map(|(at, column)| Column {
-                    at,
-                    field: None,
-                    name: column.clone(),
-                })
-        });
-        Ok(columns.collect())
-    }
+                .filter(move |(_, column)| normalize(column) == *name)
+                .map(|(index, column)| Column::new(index, column))
+        })
+        .collect())
+}
 
-    fn images(table: &Table, map: &Map) -> Result<Images, String> {
-        let entry = map.entry(Role::Image);
-        if let Some([template]) = entry.map(|entry| &*entry.columns)
-            && template.contains('{')
-        {
-            let template = Template::new(table, template, |name| column(table, name));
-            return template.map(Images::Template);
-        }
-        let columns = Self::named(table, map, Role::Image)?;
-        if entry.is_some() && columns.len() > 1 {
-            return Ok(Images::All(columns));
-        }
-        let numbered = numbered(table, &["image", "img"]);
-        if let (Some(first), false) = (columns.first(), numbered.is_empty()) {
-            // A picture beside numbered ones is one of several.
-            let all = std::iter::once(first.clone()).chain(numbered);
-            return Ok(Images::All(all.collect()));
-        }
-        if !columns.is_empty() {
-            return Ok(Images::First(columns));
-        }
-        Ok(Images::All(numbered))
+/// Columns of images: by the map, else by their names and numbers.
+fn image_columns(table: &Table, map: &ColumnMap) -> Result<ImageColumns, String> {
+    let entry = map.entry(Role::Image);
+    if let Some([template]) = entry.map(|entry| &*entry.columns)
+        && template.contains('{')
+    {
+        return Template::parse(table, template, |name| find_column(table, name))
+            .map(ImageColumns::Template);
+    }
+    let columns = columns_of(table, map, Role::Image)?;
+    if entry.is_some() && columns.len() > 1 {
+        return Ok(ImageColumns::All(columns));
+    }
+    let numbered = numbered_columns(table, &["image", "img"]);
+    match columns.first() {
+        None => Ok(ImageColumns::All(numbered)),
+        Some(_) if numbered.is_empty() => Ok(ImageColumns::First(columns)),
+        // With numbered columns, a column without a number has one of several images.
+        Some(first) => Ok(ImageColumns::All(
+            std::iter::once(first.clone()).chain(numbered).collect(),
+        )),
     }
 }
 
-/// The problem of a table without a column of questions, with the map that reads it, as far as one can be told.
-fn no_question(table: &Table) -> String {
-    let known: BTreeSet<&String> = Role::ALL.iter().flat_map(|role| known(*role)).collect();
-    let is_free = |(_, name): &(usize, &String)| {
-        !known.contains(&plain(name)) && !cells(table).iter().any(|cell| cell.name == **name)
-    };
-    let texts = table.columns.iter().enumerate().filter(is_free);
-    let likely = texts
-        .map(|(at, name)| {
-            let cells: Vec<bool> = table
+/// Column without a role that most likely has the questions: the one with most texts that end in a question mark, else with most texts.
+fn likely_question_column(table: &Table) -> Option<&String> {
+    let known: BTreeSet<&String> = Role::ALL
+        .iter()
+        .flat_map(|role| known_names(*role))
+        .collect();
+    let option_cells = option_cells(table);
+    table
+        .columns
+        .iter()
+        .enumerate()
+        .filter(|(_, name)| {
+            !known.contains(&normalize(name))
+                && !option_cells.iter().any(|column| column.name == **name)
+        })
+        .map(|(index, name)| {
+            let texts: Vec<&String> = table
                 .rows
                 .iter()
-                .filter_map(|row| match row.cell(at) {
-                    Cell::Text(text) => Some(text.trim_end().ends_with(['?', '？'])),
+                .filter_map(|row| match row.cell(index) {
+                    Cell::Text(text) => Some(text),
                     _ => None,
                 })
                 .collect();
-            (
-                cells.iter().filter(|asks| **asks).count(),
-                cells.len(),
-                name,
-            )
+            let questions = texts
+                .iter()
+                .filter(|text| text.trim_end().ends_with(['?', '？']))
+                .count();
+            (questions, texts.len(), name)
         })
         .filter(|(_, texts, _)| *texts > 0)
-        .max_by_key(|(asks, texts, _)| (*asks, *texts));
-    let remedy = match (Turns::find(table), likely) {
-        (Some(Turns { question, answer }), _) => {
+        .max_by_key(|(questions, texts, _)| (*questions, *texts))
+        .map(|(_, _, name)| name)
+}
+
+/// Error message for a table without a question column, with the `--map` flag that most likely helps.
+fn no_question(table: &Table) -> String {
+    let remedy = match (
+        ConversationPaths::find(table),
+        likely_question_column(table),
+    ) {
+        (Some(ConversationPaths { question, answer }), _) => {
             let answer = answer.map_or_else(String::new, |path| format!(",answer={path}"));
             format!(
                 "it holds conversations, whose first question is read with {}",
-                flag(Role::Question, &format!("{question}{answer}"), None)
+                map_flag(Role::Question, &format!("{question}{answer}"), None)
             )
         }
-        (None, Some((_, _, name))) => format!(
+        (None, Some(name)) => format!(
             "say which is which, e.g. {}; {} if it stands in the image",
-            flag(Role::Question, name, None),
-            flag(Role::Question, "", None)
+            map_flag(Role::Question, name, None),
+            map_flag(Role::Question, "", None)
         ),
         (None, None) => format!(
             "if the question stands in the image, {} asks {:?}; else say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN",
-            flag(Role::Question, "", None),
-            Asked::IN_IMAGE
+            map_flag(Role::Question, "", None),
+            QuestionSource::IN_IMAGE_TEXT
         ),
     };
     format!(
         "no question among its columns:\n{}\n {remedy}",
-        shown(table)
+        describe_columns(table)
     )
 }
 
-/// The column of a name, or the field of structs in it, as `meta.source`.
-pub(in crate::dataset::ready_made) fn column(table: &Table, name: &str) -> Result<Column, String> {
-    let own = |name: &str, field: Option<&str>| {
-        table.find(name).map(|at| Column {
-            at,
-            field: field.map(str::to_owned),
-            name: field.map_or_else(|| name.to_owned(), |field| format!("{name}.{field}")),
-        })
-    };
-    let inner = || {
-        let (name, field) = name.split_once('.')?;
-        own(name, Some(field))
-    };
-    own(name, None).or_else(inner).ok_or_else(|| {
-        let near = table
-            .columns
-            .iter()
-            .find(|known| plain(known) == plain(name));
-        let near = near.map_or_else(String::new, |near| format!("; did you mean {near:?}?"));
-        format!(
-            "--map names the column {name:?}, which is not there{near}\n{}",
-            shown(table)
-        )
-    })
+/// Finds a column by its name, or a field of the structs in a column, such as `meta.source`.
+///
+/// # Errors
+/// If there is no such column; the error lists the columns.
+pub(in crate::dataset::ready_made) fn find_column(
+    table: &Table,
+    name: &str,
+) -> Result<Column, String> {
+    if let Some(index) = table.find(name) {
+        return Ok(Column::new(index, name));
+    }
+    if let Some((column, field)) = name.split_once('.')
+        && let Some(index) = table.find(column)
+    {
+        return Ok(Column::with_field(index, column, field));
+    }
+    let similar = table
+        .columns
+        .iter()
+        .find(|known| normalize(known) == normalize(name))
+        .map_or_else(String::new, |similar| {
+            format!("; did you mean {similar:?}?")
+        });
+    Err(format!(
+        "--map names the column {name:?}, which is not there{similar}\n{}",
+        describe_columns(table)
+    ))
 }
 
-/// The columns `NAME` and a number, in the order of the numbers.
-fn numbered(table: &Table, names: &[&str]) -> Vec<Column> {
+/// Columns with one of these names and a number, in the order of their numbers.
+fn numbered_columns(table: &Table, names: &[&str]) -> Vec<Column> {
     let mut found: Vec<(u32, Column)> = Vec::new();
-    for (at, column) in table.columns.iter().enumerate() {
-        let plain = plain(column);
-        let digits = names.iter().find_map(|name| plain.strip_prefix(name));
-        if let Some(number) = digits.and_then(|digits| digits.parse().ok()) {
-            let name = column.clone();
-            found.push((
-                number,
-                Column {
-                    at,
-                    field: None,
-                    name,
-                },
-            ));
+    for (index, column) in table.columns.iter().enumerate() {
+        let normalized = normalize(column);
+        let number = names
+            .iter()
+            .find_map(|name| normalized.strip_prefix(name))
+            .and_then(|digits| digits.parse().ok());
+        if let Some(number) = number {
+            found.push((number, Column::new(index, column)));
         }
     }
     found.sort_by_key(|(number, _)| *number);
     found.into_iter().map(|(_, column)| column).collect()
 }
 
-/// The columns of one option each: `A`, `B`, … (at least these two), or `option0`, `option_a`, `choice_a` and so on.
-fn cells(table: &Table) -> Vec<Column> {
-    let of = |name: &str| {
-        table.find(name).map(|at| Column {
-            at,
-            field: None,
-            name: name.to_owned(),
-        })
-    };
+/// Columns with one option each: `A`, `B`, … (at least these two), or `option0`, `option_a`, `choice_a` and so on.
+fn option_cells(table: &Table) -> Vec<Column> {
     let letters: Vec<Column> = (0..Choices::MOST)
-        .map_while(|index| of(&letter(index).to_string()))
+        .map_while(|option| {
+            let name = letter(option).to_string();
+            table.find(&name).map(|index| Column::new(index, &name))
+        })
         .collect();
     if letters.len() > 1 {
         return letters;
     }
-    let digits = numbered(table, &["option", "choice"]);
-    if digits.len() > 1 {
-        return digits;
+    let numbered = numbered_columns(table, &["option", "choice"]);
+    if numbered.len() > 1 {
+        return numbered;
     }
-    let named = |index: usize| {
-        let name = letter(index).to_ascii_lowercase();
-        let names = [format!("option{name}"), format!("choice{name}")];
-        let column = table
-            .columns
-            .iter()
-            .find(|column| names.contains(&plain(column)))?;
-        of(column)
-    };
-    let named: Vec<Column> = (0..Choices::MOST).map_while(named).collect();
+    let named: Vec<Column> = (0..Choices::MOST)
+        .map_while(|option| {
+            let letter = letter(option).to_ascii_lowercase();
+            let names = [format!("option{letter}"), format!("choice{letter}")];
+            let index = table
+                .columns
+                .iter()
+                .position(|column| names.contains(&normalize(column)))?;
+            Some(Column::new(index, &table.columns[index]))
+        })
+        .collect();
     if named.len() > 1 { named } else { Vec::new() }
 }
 
-/// Refuses a table that has several questions a row.
-fn refuse_wide(table: &Table, map: &Map) -> Result<(), String> {
-    let wide = numbered(table, &["question"]);
-    if wide.len() < 2 || map.entry(Role::Question).is_some() {
+/// Refuses a table with several questions per row, unless the map chooses one.
+fn refuse_several_questions(table: &Table, map: &ColumnMap) -> Result<(), String> {
+    let questions = numbered_columns(table, &["question"]);
+    if questions.len() < 2 || map.entry(Role::Question).is_some() {
         return Ok(());
     }
-    let names: Vec<&str> = wide.iter().map(|column| column.name.as_str()).collect();
+    let names: Vec<&str> = questions
+        .iter()
+        .map(|column| column.name.as_str())
+        .collect();
     Err(format!(
         "several questions per row, in the columns {}; one question per row is read: write a row for each, or take the ones in a column \
          with {}",
         names.join(", "),
-        flag(Role::Question, names[0], None)
+        map_flag(Role::Question, names[0], None)
     ))
 }
 
-/// The most characters of values that are shown of a table, and of a name.
-const MOST_SHOWN: usize = 360;
-const LONGEST_SHOWN_NAME: usize = 40;
+/// Maximum number of columns in a message (chosen).
+const MAX_LISTED_COLUMNS: usize = 40;
 
-/// The columns with their kinds and a short value each, one a line.
-pub(in crate::dataset::ready_made) fn shown(table: &Table) -> String {
+/// Maximum length of all values in a message about a table, in characters (chosen).
+const MAX_VALUES_LENGTH: usize = 360;
+
+/// Maximum length of a column name in a message, in characters (chosen).
+const MAX_LISTED_NAME: usize = 40;
+
+/// Lists the columns with their kinds and an example value, one per line.
+pub(in crate::dataset::ready_made) fn describe_columns(table: &Table) -> String {
     let width = table.columns.iter().map(|name| name.chars().count()).max();
     let width = width.unwrap_or(0).min(24);
-    let most = (MOST_SHOWN / table.columns.len().clamp(1, 40)).min(60);
+    let columns = table.columns.len().clamp(1, MAX_LISTED_COLUMNS);
+    let max_value = (MAX_VALUES_LENGTH / columns).min(60);
     let mut lines: Vec<String> = table
         .columns
         .iter()
         .enumerate()
-        .take(40)
-        .map(|(at, name)| {
+        .take(MAX_LISTED_COLUMNS)
+        .map(|(index, name)| {
             let cell = table
                 .rows
                 .iter()
-                .map(|row| row.cell(at))
+                .map(|row| row.cell(index))
                 .find(|cell| !cell.is_absent())
                 .unwrap_or(&Cell::Absent);
-            let name = excerpt(name, LONGEST_SHOWN_NAME);
-            format!("   {name:width$}  {:8} {}", cell.kind(), cell.shown(most))
+            let name = excerpt(name, MAX_LISTED_NAME);
+            format!(
+                "   {name:width$}  {:8} {}",
+                cell.kind(),
+                cell.excerpt(max_value)
+            )
         })
         .collect();
     if table.columns.len() > lines.len() {

@@ -1,67 +1,65 @@
-//! Names of image files with the cells of a row in them: [`Template`].
+//! Templates for the names of image files: [`Template`].
 
 use super::column::Column;
 use crate::dataset::ready_made::cells::{Row, Table};
 
-/// The greatest width of a number; chosen.
-const WIDEST: usize = 64;
+/// Maximum width of a number (chosen).
+const MAX_WIDTH: usize = 64;
 
-/// The name of an image file with cells in braces: `images/{id}.jpg`, or `images/{id:012}.jpg` for a number in twelve digits.
+/// Name of an image file with columns in braces: `images/{id}.jpg`, or `images/{id:012}.jpg` for a number in twelve digits.
 #[derive(Debug)]
 pub(in crate::dataset::ready_made) struct Template {
     text: String,
-    parts: Vec<Part>,
+    parts: Vec<TemplatePart>,
 }
 
 #[derive(Debug)]
-enum Part {
-    Words(String),
-    /// A cell, with zeros before it up to a width; 0 for none.
-    Cell {
-        column: Column,
-        width: usize,
-    },
+enum TemplatePart {
+    /// Literal text.
+    Literal(String),
+    /// Text of a cell, with leading zeros up to a minimum width.
+    Cell { column: Column, width: usize },
 }
 
 impl Template {
-    /// Reads a template for the columns of a table, which `column` finds by their names.
+    /// Parses a template for a table. `find_column` finds a column of the table by its name.
     ///
     /// # Errors
-    /// If a brace is missing, or a column is not there.
-    pub(super) fn new(
+    /// If a brace or a column is missing.
+    pub(super) fn parse(
         table: &Table,
         text: &str,
-        column: impl Fn(&str) -> Result<Column, String>,
+        find_column: impl Fn(&str) -> Result<Column, String>,
     ) -> Result<Self, String> {
         let mut parts = Vec::new();
         let mut rest = text;
-        while let Some((words, after)) = rest.split_once('{') {
+        while let Some((literal, after)) = rest.split_once('{') {
             let (field, after) = after
                 .split_once('}')
                 .ok_or_else(|| format!("{text:?}: '}}' is missing"))?;
-            parts.push(Part::Words(words.to_owned()));
-            parts.push(cell(table, field, &column)?);
+            parts.push(TemplatePart::Literal(literal.to_owned()));
+            parts.push(parse_field(table, field, &find_column)?);
             rest = after;
         }
-        parts.push(Part::Words(rest.to_owned()));
+        parts.push(TemplatePart::Literal(rest.to_owned()));
         Ok(Self {
             text: text.to_owned(),
             parts,
         })
     }
 
-    /// The template as the user wrote it.
+    /// Template as written by the user.
     pub(in crate::dataset::ready_made) fn text(&self) -> &str {
         &self.text
     }
 
-    /// The name with the cells of a row; `None` if one is absent.
-    pub(in crate::dataset::ready_made) fn filled(&self, row: &Row) -> Option<String> {
+    /// Fills in the cells of a row; `None` if one is absent.
+    pub(in crate::dataset::ready_made) fn fill(&self, row: &Row) -> Option<String> {
         self.parts
             .iter()
             .map(|part| match part {
-                Part::Words(words) => Some(words.clone()),
-                Part::Cell { column, width } => {
+                TemplatePart::Literal(text) => Some(text.clone()),
+                TemplatePart::Cell { column, width } => {
                     let value = column.text(row)?;
                     Some(format!("{:0>width$}", value.trim()))
                 }
@@ -70,29 +68,31 @@ impl Template {
     }
 }
 
-/// The cell in braces: a column, or a column and a width as in Python, `id:012` or `id:012d`. A column of the whole name goes first.
-fn cell(
+/// Parses a field in braces: a column, or a column with a width in Python's notation, `id:012` or `id:012d`. A column with the whole
+/// name takes precedence.
+fn parse_field(
     table: &Table,
     field: &str,
-    column: impl Fn(&str) -> Result<Column, String>,
-) -> Result<Part, String> {
+    find_column: impl Fn(&str) -> Result<Column, String>,
+) -> Result<TemplatePart, String> {
     if table.find(field).is_none()
         && let Some((name, format)) = field.rsplit_once(':')
-        && let Some(width) = width(format)
+        && let Some(width) = parse_width(format)
     {
-        if width > WIDEST {
-            return Err(format!("{{{field}}}: a width of at most {WIDEST} expected"));
+        if width > MAX_WIDTH {
+            return Err(format!(
+                "{{{field}}}: a width of at most {MAX_WIDTH} expected"
+            ));
         }
-        let column = column(name)?;
-        return Ok(Part::Cell { column, width });
+        let column = find_column(name)?;
+        return Ok(TemplatePart::Cell { column, width });
     }
-    let column = column(field)?;
-    Ok(Part::Cell { column, width: 0 })
+    let column = find_column(field)?;
+    Ok(TemplatePart::Cell { column, width: 0 })
 }
 
-/// The width of a format with leading zeros; `None` for other texts.
-fn width(format: &str) -> Option<usize> {
+/// Parses a width with leading zeros, such as `012`; `None` for other texts.
+fn parse_width(format: &str) -> Option<usize> {
     let digits = format.strip_suffix('d').unwrap_or(format);
-    let width = digits.strip_prefix('0')?;
-    width.parse().ok()
+    digits.strip_prefix('0')?.parse().ok()
 }

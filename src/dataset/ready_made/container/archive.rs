@@ -1,4 +1,4 @@
-//! A set in a ZIP file, which is not unpacked: [`Archive`].
+//! A set in a ZIP file, read without unpacking the whole file: [`Archive`].
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -10,42 +10,47 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tempfile::NamedTempFile;
 use zip::ZipArchive;
 
-use super::packed::most_unpacked;
+use super::decompress::max_decompressed_size;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::FrameId;
 
-/// The maximum number of entries; chosen.
-const MOST_ENTRIES: usize = 500_000;
+/// Maximum number of entries (chosen).
+const MAX_ENTRIES: usize = 500_000;
 
-/// The maximum length of the directory, in bytes; chosen. The shortest entry has 47 bytes there and takes half a kilobyte in memory.
-const MOST_DIRECTORY: u64 = 48 << 20;
+/// Maximum length of the directory, in bytes (chosen). The shortest entry has 47 bytes and takes half a kilobyte in memory.
+const MAX_DIRECTORY_BYTES: u64 = 48 << 20;
 
-/// The maximum length of an image, in bytes.
-const LONGEST_IMAGE: u64 = 1 << 30;
+/// Maximum length of an image, in bytes.
+const MAX_IMAGE_BYTES: u64 = 1 << 30;
 
-/// A ZIP file whose directory is read.
+/// Maximum length of a text file other than a table, in bytes.
+const MAX_TEXT_BYTES: u64 = 1 << 22;
+
+/// A ZIP file with its directory in memory.
 pub(crate) struct Archive {
     pub(in crate::dataset::ready_made) path: PathBuf,
-    /// The place of each file, by its name.
-    names: BTreeMap<String, usize>,
+    /// Index of each file, by its name.
+    indices: BTreeMap<String, usize>,
     zip: Mutex<ZipArchive<BufReader<BoundedFile>>>,
 }
 
-/// A file of which a bounded number of bytes is read while its directory is.
+/// A file with a limit for the bytes to read, to refuse huge directories.
 struct BoundedFile {
     file: File,
-    /// The bytes that may still be read.
-    left: Arc<AtomicU64>,
+    /// Number of bytes that may still be read.
+    remaining: Arc<AtomicU64>,
 }
 
 impl Read for BoundedFile {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.file.read(buffer)?;
-        let left = self.left.load(Ordering::Relaxed);
-        let left = left.saturating_sub(count as u64);
-        self.left.store(left, Ordering::Relaxed);
-        if left == 0 {
+        let remaining = self
+            .remaining
+            .load(Ordering::Relaxed)
+            .saturating_sub(count as u64);
+        self.remaining.store(remaining, Ordering::Relaxed);
+        if remaining == 0 {
             return Err(io::Error::other("the directory is too long"));
         }
         Ok(count)
@@ -65,55 +70,55 @@ impl std::fmt::Debug for Archive {
 }
 
 impl Archive {
-    /// The directory of a file.
+    /// Opens a ZIP file and reads its directory.
     ///
     /// # Errors
-    /// If it is no ZIP file, or a name in it is absolute, leads out of it or is a link.
+    /// If it is not a ZIP file, or an entry is a link or has a path that is absolute or leads outside.
     pub(super) fn open(path: &Path) -> Result<Self> {
         let wrong = |problem: String| Error::data(path.display(), problem);
         let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
-        let left = Arc::new(AtomicU64::new(MOST_DIRECTORY));
+        let remaining = Arc::new(AtomicU64::new(MAX_DIRECTORY_BYTES));
         let bounded = BoundedFile {
             file,
-            left: Arc::clone(&left),
+            remaining: Arc::clone(&remaining),
         };
         let opened = ZipArchive::new(BufReader::new(bounded));
         let count = opened.as_ref().map_or(0, ZipArchive::len);
-        if count > MOST_ENTRIES || left.load(Ordering::Relaxed) == 0 {
+        if count > MAX_ENTRIES || remaining.load(Ordering::Relaxed) == 0 {
             return Err(wrong(format!(
-                "more than {MOST_ENTRIES} entries, which are not read; unpack it, and name its folder"
+                "more than {MAX_ENTRIES} entries, which are not read; unpack it, and name its folder"
             )));
         }
         let mut zip = opened.map_err(|e| wrong(format!("not a whole ZIP file: {e}")))?;
-        left.store(u64::MAX, Ordering::Relaxed);
-        let mut names = BTreeMap::new();
-        for at in 0..zip.len() {
-            let entry = zip.by_index_raw(at).map_err(|e| wrong(e.to_string()))?;
+        remaining.store(u64::MAX, Ordering::Relaxed);
+        let mut indices = BTreeMap::new();
+        for index in 0..zip.len() {
+            let entry = zip.by_index_raw(index).map_err(|e| wrong(e.to_string()))?;
             let name = entry.name().to_owned();
-            if entry.is_symlink() || !stays_inside(&name) {
+            if entry.is_symlink() || !is_inside(&name) {
                 return Err(wrong(format!(
                     "the entry {name:?} leads out of the file, or is a link; such files are not read"
                 )));
             }
             if entry.is_file() {
-                names.insert(name, at);
+                indices.insert(name, index);
             }
         }
         Ok(Self {
             path: path.to_owned(),
-            names,
+            indices,
             zip: Mutex::new(zip),
         })
     }
 
-    /// The path of the file.
+    /// Path of the ZIP file.
     pub(in crate::dataset) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The paths of all files, without hidden ones.
+    /// Paths of all files that are not hidden.
     pub(super) fn files(&self) -> Vec<PathBuf> {
-        self.names
+        self.indices
             .keys()
             .filter(|name| {
                 !name
@@ -124,68 +129,80 @@ impl Archive {
             .collect()
     }
 
-    /// Whether there is a file of this name.
+    /// True if the archive has a file with this name.
     pub(in crate::dataset::ready_made) fn has(&self, name: &str) -> bool {
-        self.names.contains_key(name)
+        self.indices.contains_key(name)
     }
 
-    /// The bytes of an image.
+    /// Reads an image file.
     ///
     /// # Errors
-    /// If it cannot be read, or is longer than an image may be, whatever the directory states.
-    pub(in crate::dataset) fn image(&self, name: &str) -> Result<Vec<u8>> {
+    /// If it cannot be read or is longer than a gigabyte, whatever size the directory states.
+    pub(in crate::dataset) fn read_image(&self, name: &str) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
-        self.copy(name, LONGEST_IMAGE, &mut bytes)?;
+        self.copy(name, MAX_IMAGE_BYTES, &mut bytes)?;
         Ok(bytes)
     }
 
-    /// A file of rows, unpacked until it is closed.
-    pub(super) fn unpacked(&self, name: &str) -> Result<NamedTempFile> {
+    /// Decompresses a file to a temporary copy.
+    pub(super) fn decompress(&self, name: &str) -> Result<NamedTempFile> {
         let mut file =
             NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
-        let packed = self.packed(name)?;
-        self.copy(name, most_unpacked(packed), &mut file)?;
+        let max = max_decompressed_size(self.compressed_size(name)?);
+        self.copy(name, max, &mut file)?;
         Ok(file)
     }
 
-    /// The text of a file.
-    pub(in crate::dataset::ready_made) fn text(&self, name: &str) -> Result<String> {
+    /// Reads a short text file.
+    pub(in crate::dataset::ready_made) fn read_text(&self, name: &str) -> Result<String> {
         let mut bytes = Vec::new();
-        self.copy(name, 1 << 22, &mut bytes)?;
+        self.copy(name, MAX_TEXT_BYTES, &mut bytes)?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
-    /// The length of a file as it is packed.
-    fn packed(&self, name: &str) -> Result<u64> {
-        let place = format!("{}, {name}", self.path.display());
-        let at = self.names.get(name).copied();
-        let at = at.ok_or_else(|| Error::data(&place, "no such file in it"))?;
+    /// Path of a file in the archive, for messages.
+    fn place(&self, name: &str) -> String {
+        format!("{}, {name}", self.path.display())
+    }
+
+    /// Index of a file.
+    fn index(&self, name: &str) -> Result<usize> {
+        self.indices
+            .get(name)
+            .copied()
+            .ok_or_else(|| Error::data(self.place(name), "no such file in it"))
+    }
+
+    /// Compressed size of a file, in bytes.
+    fn compressed_size(&self, name: &str) -> Result<u64> {
+        let index = self.index(name)?;
         let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = zip.by_index_raw(at).map_err(|e| Error::data(&place, e))?;
+        let entry = zip
+            .by_index_raw(index)
+            .map_err(|e| Error::data(self.place(name), e))?;
         Ok(entry.compressed_size())
     }
 
-    fn copy(&self, name: &str, most: u64, to: &mut impl std::io::Write) -> Result<()> {
-        let place = format!("{}, {name}", self.path.display());
-        let at = self.names.get(name).copied();
-        let at = at.ok_or_else(|| Error::data(&place, "no such file in it"))?;
+    /// Decompresses a file of at most `max` bytes.
+    fn copy(&self, name: &str, max: u64, to: &mut impl std::io::Write) -> Result<()> {
+        let index = self.index(name)?;
         let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = zip.by_index(at).map_err(|e| Error::data(&place, e))?;
-        let copied = std::io::copy(&mut entry.take(most.saturating_add(1)), to);
-        let copied = copied.map_err(|e| Error::data(&place, e))?;
-        if copied > most {
-            return Err(Error::data(
-                &place,
-                format_args!("longer than {} MB", most >> 20),
-            ));
+        let entry = zip
+            .by_index(index)
+            .map_err(|e| Error::data(self.place(name), e))?;
+        let copied = std::io::copy(&mut entry.take(max.saturating_add(1)), to)
+            .map_err(|e| Error::data(self.place(name), e))?;
+        if copied > max {
+            let problem = format_args!("longer than {} MB", max >> 20);
+            return Err(Error::data(self.place(name), problem));
         }
         Ok(())
     }
 
-    /// The name of the image that data spell relative to a folder of the file.
+    /// Finds the image of a path in the data, relative to a folder of the archive. Returns its full name.
     ///
     /// # Errors
-    /// If it leads out of the file, or is not in it.
+    /// If the path leads outside the archive, or there is no such file.
     pub(in crate::dataset::ready_made) fn find(
         &self,
         base: &Path,
@@ -193,7 +210,7 @@ impl Archive {
     ) -> Result<FrameId, String> {
         let mut parts: Vec<String> = Vec::new();
         for part in base.join(spelled).components() {
-            let inside = match part {
+            let is_inside = match part {
                 Component::CurDir => true,
                 Component::Normal(name) => {
                     parts.push(name.to_string_lossy().into_owned());
@@ -202,20 +219,20 @@ impl Archive {
                 Component::ParentDir => parts.pop().is_some(),
                 Component::RootDir | Component::Prefix(_) => false,
             };
-            if !inside {
+            if !is_inside {
                 return Err(format!("{spelled:?} lies outside {}", self.path.display()));
             }
         }
         let name = parts.join("/");
-        if self.names.contains_key(&name) {
+        if self.has(&name) {
             return Ok(FrameId(name));
         }
         Err(format!("no such file: {name:?} in {}", self.path.display()))
     }
 }
 
-/// Whether a name is a path below the file.
-fn stays_inside(name: &str) -> bool {
+/// True if the name of an entry is a relative path that stays inside the archive.
+fn is_inside(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     !name.contains(['\\', '\0'])
         && parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))

@@ -1,8 +1,8 @@
-//! The configurations that the card of a repository names: [`configs`].
+//! Configurations in the dataset card of a repository: [`parse_configs`].
 //!
-//! A card is a `README.md` with YAML at its head. Of that YAML only `configs` is read, in the form in which hubs write it (Hugging Face,
-//! "Manual Configuration"): a list of mappings with `config_name`, `default`, `data_dir` and `data_files`. The last is a pattern, a list
-//! of patterns, a list of `split` and `path`, or a mapping of splits to patterns.
+//! A card is a `README.md` that starts with YAML. Only its field `configs` is used (Hugging Face, "Manual Configuration"): a list of
+//! mappings with `config_name`, `default`, `data_dir` and `data_files`. `data_files` is a pattern, a list of patterns, a list of `split`
+//! and `path`, or a mapping of splits to patterns.
 
 use super::yaml::{Yaml, value};
 
@@ -11,17 +11,25 @@ use super::yaml::{Yaml, value};
 pub(super) struct Config {
     pub(super) name: String,
     pub(super) is_default: bool,
-    /// The folder that the patterns start from; empty for that of the card.
+    /// Folder of the patterns; empty for the folder of the card.
     pub(super) folder: String,
-    /// The files: split (empty if none is named) and pattern. None for all files of the folder.
-    pub(super) files: Option<Vec<(String, String)>>,
+    /// Patterns of the files; `None` for all files of the folder.
+    pub(super) files: Option<Vec<SplitPattern>>,
 }
 
-/// The configurations in a card; empty if it names none.
+/// Pattern of the files of a split.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct SplitPattern {
+    /// Name of the split; empty if the card does not name it.
+    pub(super) split: String,
+    pub(super) pattern: String,
+}
+
+/// Parses the configurations of a card; empty if it has none.
 ///
 /// # Errors
-/// If it names some in a way that is not read.
-pub(super) fn configs(card: &str) -> Result<Vec<Config>, String> {
+/// If `configs` is not in a supported form.
+pub(super) fn parse_configs(card: &str) -> Result<Vec<Config>, String> {
     let card = card.trim_start_matches('\u{feff}').replace("\r\n", "\n");
     let head = card
         .strip_prefix("---\n")
@@ -29,28 +37,31 @@ pub(super) fn configs(card: &str) -> Result<Vec<Config>, String> {
     let mut lines = head
         .map_or("", |(head, _)| head)
         .lines()
-        .skip_while(|line| key(line) != Some("configs"));
+        .skip_while(|line| top_level_key(line) != Some("configs"));
     let Some(first) = lines.next() else {
         return Ok(Vec::new());
     };
-    let inside = lines.take_while(|line| key(line).is_none());
-    let text: Vec<&str> = std::iter::once(first).chain(inside).collect();
+    let text: Vec<&str> = std::iter::once(first)
+        .chain(lines.take_while(|line| top_level_key(line).is_none()))
+        .collect();
     let configs = value(&text.join("\n"))?;
     match configs.field("configs") {
         None | Some(Yaml::Nothing) => Ok(Vec::new()),
-        Some(Yaml::List(configs)) => configs.iter().map(config).collect(),
+        Some(Yaml::List(configs)) => configs.iter().map(parse_config).collect(),
         Some(_) => Err("configs is not a list".to_owned()),
     }
 }
 
-/// The name of the field at the left edge that a line begins.
-fn key(line: &str) -> Option<&str> {
-    let is_edge = !line.starts_with([' ', '\t', '-', '#']);
-    let (name, _) = line.split_once(':').filter(|_| is_edge)?;
+/// Key of a line without indentation; `None` for other lines.
+fn top_level_key(line: &str) -> Option<&str> {
+    if line.starts_with([' ', '\t', '-', '#']) {
+        return None;
+    }
+    let (name, _) = line.split_once(':')?;
     Some(name.trim_end())
 }
 
-fn config(config: &Yaml) -> Result<Config, String> {
+fn parse_config(config: &Yaml) -> Result<Config, String> {
     if !matches!(config, Yaml::Fields(_)) {
         return Err("configs holds something other than mappings".to_owned());
     }
@@ -63,55 +74,68 @@ fn config(config: &Yaml) -> Result<Config, String> {
         name if name.is_empty() => "default".to_owned(),
         name => name,
     };
-    let of_config = |problem: String| format!("configuration {name:?}: {problem}");
+    let with_name = |problem: String| format!("configuration {name:?}: {problem}");
     Ok(Config {
         is_default: text("default")
-            .map_err(of_config)?
+            .map_err(with_name)?
             .eq_ignore_ascii_case("true"),
-        folder: text("data_dir").map_err(of_config)?,
+        folder: text("data_dir").map_err(with_name)?,
         files: match config.field("data_files") {
             None | Some(Yaml::Nothing) => None,
-            Some(files) => Some(data_files(files).map_err(of_config)?),
+            Some(files) => Some(parse_data_files(files).map_err(with_name)?),
         },
         name,
     })
 }
 
-/// The splits and patterns of `data_files`.
-fn data_files(files: &Yaml) -> Result<Vec<(String, String)>, String> {
-    let of_split = |split: &str, files: &Yaml| -> Result<Vec<(String, String)>, String> {
-        let patterns = patterns(files)?.into_iter();
-        Ok(patterns
-            .map(|pattern| (split.to_owned(), pattern))
-            .collect())
-    };
+/// Parses the value of `data_files`.
+fn parse_data_files(files: &Yaml) -> Result<Vec<SplitPattern>, String> {
+    let mut found = Vec::new();
     match files {
         Yaml::Fields(splits) => {
-            let splits = splits.iter().map(|(split, files)| of_split(split, files));
-            Ok(splits.collect::<Result<Vec<_>, _>>()?.concat())
+            for (split, files) in splits {
+                add_patterns(split, files, &mut found)?;
+            }
         }
         Yaml::List(entries) => {
-            let entries = entries.iter().map(|entry| match entry {
-                Yaml::Fields(_) => {
-                    let Some(path) = entry.field("path") else {
-                        return Err("an entry of data_files has no path".to_owned());
-                    };
-                    match entry.field("split") {
-                        Some(Yaml::Text(split)) => of_split(split, path),
-                        None => of_split("", path),
-                        Some(_) => Err("a split of data_files is not a text".to_owned()),
-                    }
-                }
-                entry => of_split("", entry),
-            });
-            Ok(entries.collect::<Result<Vec<_>, _>>()?.concat())
+            for entry in entries {
+                let (split, files) = match entry {
+                    Yaml::Fields(_) => parse_split_entry(entry)?,
+                    files => ("", files),
+                };
+                add_patterns(split, files, &mut found)?;
+            }
         }
-        files => of_split("", files),
+        files => add_patterns("", files, &mut found)?,
+    }
+    Ok(found)
+}
+
+/// Parses a mapping of `split` and `path`: the split (empty if it is missing) and the patterns.
+fn parse_split_entry(entry: &Yaml) -> Result<(&str, &Yaml), String> {
+    let path = entry
+        .field("path")
+        .ok_or("an entry of data_files has no path")?;
+    match entry.field("split") {
+        Some(Yaml::Text(split)) => Ok((split.as_str(), path)),
+        None => Ok(("", path)),
+        Some(_) => Err("a split of data_files is not a text".to_owned()),
     }
 }
 
-/// One pattern, or a list of them.
-fn patterns(files: &Yaml) -> Result<Vec<String>, String> {
+/// Adds the patterns of a split.
+fn add_patterns(split: &str, files: &Yaml, found: &mut Vec<SplitPattern>) -> Result<(), String> {
+    for pattern in parse_patterns(files)? {
+        found.push(SplitPattern {
+            split: split.to_owned(),
+            pattern,
+        });
+    }
+    Ok(())
+}
+
+/// Parses a pattern or a list of patterns.
+fn parse_patterns(files: &Yaml) -> Result<Vec<String>, String> {
     match files {
         Yaml::Text(pattern) => Ok(vec![pattern.clone()]),
         Yaml::List(patterns) => patterns
@@ -129,11 +153,17 @@ fn patterns(files: &Yaml) -> Result<Vec<String>, String> {
 mod tests {
     use super::*;
 
+    fn file(split: &str, pattern: &str) -> SplitPattern {
+        SplitPattern {
+            split: split.to_owned(),
+            pattern: pattern.to_owned(),
+        }
+    }
+
     #[test]
-    fn the_forms_of_cards_are_read() {
+    fn configs_of_cards_are_parsed() {
         let card = "---\nlicense: mit\nconfigs:\n- config_name: Full\n  data_files:\n  - split: adversarial\n    path: Full/adversarial-*\n  - split: popular\n    path: \"Full/popular-*\"\n- config_name: default\n  default: true\n  data_files:\n  - split: test\n    path:\n    - data/a.parquet\n    - 'data/b: c.parquet'\n- config_name: one\n  data_files: one/*.csv\n- config_name: two\n  data_files: [\"x.csv\", y.csv]\ndataset_info:\n- config_name: none\n---\n# text\n- config_name: no\n";
-        let file = |split: &str, pattern: &str| (split.to_owned(), pattern.to_owned());
-        let config = |name: &str, is_default, files: Vec<(String, String)>| Config {
+        let config = |name: &str, is_default, files: Vec<SplitPattern>| Config {
             name: name.to_owned(),
             is_default,
             folder: String::new(),
@@ -159,34 +189,36 @@ mod tests {
             config("one", false, vec![file("", "one/*.csv")]),
             config("two", false, vec![file("", "x.csv"), file("", "y.csv")]),
         ];
-        assert_eq!(configs(card).unwrap(), expected);
-        assert_eq!(configs(&card.replace('\n', "\r\n")).unwrap(), expected);
+        assert_eq!(parse_configs(card).unwrap(), expected);
+        assert_eq!(
+            parse_configs(&card.replace('\n', "\r\n")).unwrap(),
+            expected
+        );
         for none in ["", "# text", "---\nlicense: mit\n---\n", "---\nconfigs:\n"] {
-            assert_eq!(configs(none).unwrap(), [], "{none:?}");
+            assert_eq!(parse_configs(none).unwrap(), [], "{none:?}");
         }
     }
 
     #[test]
-    fn splits_may_be_names_of_fields_and_a_folder_may_hold_the_files() {
-        let of = |config: &str| {
+    fn splits_may_be_field_names() {
+        let first = |config: &str| {
             let card = format!("---\nlicense: mit\nconfigs:\n{config}tags:\n- x\n---\n");
-            configs(&card).map(|mut configs| configs.remove(0))
+            parse_configs(&card).map(|mut configs| configs.remove(0))
         };
-        let file = |split: &str, pattern: &str| (split.to_owned(), pattern.to_owned());
-        let found = of("  - config_name: a\n    data_files:\n      test: data/test-*\n      train:\n      - x.csv\n      - y.csv\n").unwrap();
+        let found = first("  - config_name: a\n    data_files:\n      test: data/test-*\n      train:\n      - x.csv\n      - y.csv\n").unwrap();
         let files = vec![
             file("test", "data/test-*"),
             file("train", "x.csv"),
             file("train", "y.csv"),
         ];
         assert_eq!(found.files, Some(files));
-        let found = of("- data_files: {test: \"data/*.csv\"}\n  data_dir: inner\n").unwrap();
+        let found = first("- data_files: {test: \"data/*.csv\"}\n  data_dir: inner\n").unwrap();
         assert_eq!(
             (found.name.as_str(), found.folder.as_str()),
             ("default", "inner")
         );
         assert_eq!(found.files, Some(vec![file("test", "data/*.csv")]));
-        let found = of("- config_name: a\n  data_dir: inner\n").unwrap();
+        let found = first("- config_name: a\n  data_dir: inner\n").unwrap();
         assert_eq!(found.files, None);
         for wrong in [
             "- config_name: a\n  data_files:\n  - split: test\n",
@@ -195,7 +227,7 @@ mod tests {
             "- a\n",
             "  a: b\n",
         ] {
-            assert!(of(wrong).is_err(), "{wrong}");
+            assert!(first(wrong).is_err(), "{wrong}");
         }
     }
 }

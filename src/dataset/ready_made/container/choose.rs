@@ -1,65 +1,74 @@
-//! The files of a tree that hold the rows: [`chosen`].
+//! Choice of the files with the rows of a set: [`choose_files`].
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use glob::{MatchOptions, Pattern};
 
-use super::card::{Config, configs};
+use super::card::{Config, SplitPattern, parse_configs};
 use super::splits::Candidate;
 use super::tree::Tree;
-use super::{READ, ending, splits};
+use super::{SUPPORTED, extension, splits};
 use crate::dataset::ready_made::settings::SetArgs;
 use crate::error::{Error, Result};
 use crate::types::shell_word;
 
-/// The card of a repository.
+/// Dataset card of a repository.
 const CARD: &str = "README.md";
 
-/// The names of the tables of an image folder (Hugging Face, "ImageFolder").
+/// Names of the tables of an image folder (Hugging Face, "ImageFolder").
 const METADATA: [&str; 3] = ["metadata.jsonl", "metadata.csv", "metadata.parquet"];
 
-/// Whether some files of a tree look like a set.
+/// True if a tree with these files looks like a ready-made set.
 pub(super) fn is_set(tree: &Tree, files: &[PathBuf]) -> bool {
-    let is_arrow = tree.has("state.json") && tree.has("dataset_info.json");
-    is_arrow
-        || !named(tree).0.is_empty()
-        || files.iter().any(|path| is_metadata(path))
-        || files.iter().any(|path| is_rows(path))
+    is_arrow(tree)
+        || !card_configs(tree).0.is_empty()
+        || files
+            .iter()
+            .any(|path| is_metadata(path) || is_table(path) || extension(path) == "parquet")
 }
 
-/// The configurations that the card of a tree names; of a card that cannot be read, none, and why.
-fn named(tree: &Tree) -> (Vec<Config>, Option<String>) {
+/// True if the tree is a folder of Arrow files, as written by the Python package `datasets`.
+fn is_arrow(tree: &Tree) -> bool {
+    tree.has("state.json") && tree.has("dataset_info.json")
+}
+
+/// Configurations in the card of a tree. If the card cannot be parsed, there are none, and a note says why.
+fn card_configs(tree: &Tree) -> (Vec<Config>, Option<String>) {
     if !tree.has(CARD) {
         return (Vec::new(), None);
     }
-    let card = tree.text(CARD).map_err(|e| e.to_string());
-    match card.and_then(|card| configs(&card)) {
+    let configs = tree
+        .read_text(CARD)
+        .map_err(|e| e.to_string())
+        .and_then(|card| parse_configs(&card));
+    match configs {
         Ok(configs) => (configs, None),
         Err(problem) => {
             let note = format!(
                 "the configurations in {} cannot be read ({problem}), so the names of files decide",
-                tree.whole(Path::new(CARD)).display()
+                tree.full_path(Path::new(CARD)).display()
             );
             (Vec::new(), Some(note))
         }
     }
 }
 
-/// The files that are asked, and the faults of the card: those of a configuration of the card, else the metadata, else by their endings; of one split.
+/// Chooses the files of one split, and returns a note if the card cannot be parsed. Without a configuration in the card, metadata files
+/// are preferred, then Parquet files, then other tables.
 ///
 /// # Errors
-/// If there are none, or it is not clear which are meant; the error lists the files.
-pub(super) fn chosen(
+/// If there are no files, or it is not clear which to use; the error lists the files.
+pub(super) fn choose_files(
     tree: &Tree,
     files: Vec<PathBuf>,
     args: &SetArgs,
 ) -> Result<(Vec<Candidate>, Option<String>)> {
-    if tree.has("dataset_info.json") && tree.has("state.json") {
+    if is_arrow(tree) {
         let problem = "a folder of Arrow files, which are not read; write Parquet: python -c \"import datasets; datasets.load_from_disk('.').to_parquet('set.parquet')\" in it";
         return Err(Error::data(tree.place().display(), problem));
     }
-    let (configs, note) = named(tree);
+    let (configs, note) = card_configs(tree);
     let candidates = if configs.is_empty() {
         if let Some(name) = &args.config_name {
             let place = tree.place().display();
@@ -67,7 +76,7 @@ pub(super) fn chosen(
             let problem = format_args!("{place}: no configurations to choose {name:?} from{note}");
             return Err(Error::usage("--read config", problem));
         }
-        by_kind(tree, files)?
+        files_by_kind(tree, files)?
             .into_iter()
             .map(|path| Candidate {
                 split: splits::split_in_name(&path),
@@ -76,19 +85,21 @@ pub(super) fn chosen(
             })
             .collect()
     } else {
-        {
-            let wanted = args
-                .config_name
-                .as_deref()
-                .or(args.preset_config.as_deref());
-            files_by_card(tree, &configs, &files, wanted)?
-        }
+        let wanted = args
+            .config_name
+            .as_deref()
+            .or(args.preset_config.as_deref());
+        files_by_card(tree, &configs, &files, wanted)?
     };
-    let candidates = splits::chosen(tree, candidates, args.split.as_deref())?;
+    let candidates = splits::choose_split(tree, candidates, args.split.as_deref())?;
     Ok((candidates, note))
 }
 
-/// The files of the configuration that is asked, or of all.
+/// Files of the wanted configuration, or of all configurations for `all`. The default is the one marked so in the card, or named
+/// `default`, or the only one.
+///
+/// # Errors
+/// If there is no such configuration; the error lists them.
 fn files_by_card(
     tree: &Tree,
     configs: &[Config],
@@ -96,20 +107,21 @@ fn files_by_card(
     wanted: Option<&str>,
 ) -> Result<Vec<Candidate>> {
     let names: Vec<&str> = configs.iter().map(|config| config.name.as_str()).collect();
-    let of_name = |name: &str| configs.iter().find(|config| config.name == name);
-    let default = configs.iter().find(|config| config.is_default);
-    let only = if let [only] = configs {
-        Some(only)
-    } else {
-        None
+    let find_config = |name: &str| configs.iter().find(|config| config.name == name);
+    let default = || match configs {
+        [only] => Some(only),
+        _ => configs
+            .iter()
+            .find(|config| config.is_default)
+            .or_else(|| find_config("default")),
     };
     let chosen: Vec<&Config> = match wanted {
         Some("all") => configs.iter().collect(),
-        Some(name) => vec![of_name(name).ok_or_else(|| {
+        Some(name) => vec![find_config(name).ok_or_else(|| {
             let problem = format_args!("no configuration {name:?}; there are {}", names.join(", "));
             Error::usage("--read config", problem)
         })?],
-        None => vec![default.or_else(|| of_name("default")).or(only).ok_or_else(|| {
+        None => vec![default().ok_or_else(|| {
             let problem = format_args!(
                 "{} configurations, {}; --read config=NAME names one, --read config=all takes them together",
                 names.len(),
@@ -141,7 +153,7 @@ fn files_by_card(
     Ok(candidates)
 }
 
-/// The files of a configuration by the split that the card names.
+/// Files of a configuration with the name of their split in the card, which may be empty.
 fn files_of_config(
     tree: &Tree,
     config: &Config,
@@ -149,29 +161,34 @@ fn files_of_config(
 ) -> Result<Vec<(String, Vec<PathBuf>)>> {
     let folder = config.folder.trim_start_matches("./").trim_matches('/');
     let Some(patterns) = &config.files else {
-        let inside = files.iter().filter(|path| path.starts_with(folder));
-        let below = |path: &PathBuf| path.strip_prefix(folder).map(Path::to_owned).ok();
-        let found = by_kind(tree, inside.filter_map(below).collect())?;
-        let found = found.into_iter().map(|path| Path::new(folder).join(path));
-        return Ok(vec![(String::new(), found.collect())]);
+        let inside = files
+            .iter()
+            .filter_map(|path| path.strip_prefix(folder).ok())
+            .map(Path::to_owned)
+            .collect();
+        let found = files_by_kind(tree, inside)?
+            .into_iter()
+            .map(|path| Path::new(folder).join(path))
+            .collect();
+        return Ok(vec![(String::new(), found)]);
     };
     patterns
         .iter()
-        .map(|(split, pattern)| {
+        .map(|SplitPattern { split, pattern }| {
             let pattern = pattern.trim_start_matches("./");
             let pattern = if folder.is_empty() {
                 pattern.to_owned()
             } else {
                 format!("{folder}/{pattern}")
             };
-            Ok((split.clone(), matching(tree, &pattern, files)?))
+            Ok((split.clone(), matching_files(tree, &pattern, files)?))
         })
         .collect()
 }
 
-/// The files that fit a pattern of the card.
-fn matching(tree: &Tree, pattern: &str, files: &[PathBuf]) -> Result<Vec<PathBuf>> {
-    let wrong = |problem: String| Error::data(tree.whole(Path::new(CARD)).display(), problem);
+/// Files that match a pattern of the card.
+fn matching_files(tree: &Tree, pattern: &str, files: &[PathBuf]) -> Result<Vec<PathBuf>> {
+    let wrong = |problem: String| Error::data(tree.full_path(Path::new(CARD)).display(), problem);
     if pattern.split('/').any(|part| part == "..") || pattern.starts_with('/') {
         return Err(wrong(format!(
             "the files {pattern:?} lie outside the folder of the card"
@@ -183,16 +200,17 @@ fn matching(tree: &Tree, pattern: &str, files: &[PathBuf]) -> Result<Vec<PathBuf
         require_literal_separator: true,
         ..MatchOptions::default()
     };
-    let fitting = files
+    let matching: Vec<PathBuf> = files
         .iter()
-        .filter(|path| glob.matches_path_with(path, options));
-    let fitting: Vec<PathBuf> = fitting.cloned().collect();
-    if fitting.is_empty() {
+        .filter(|path| glob.matches_path_with(path, options))
+        .cloned()
+        .collect();
+    if matching.is_empty() {
         return Err(wrong(format!(
             "no file {pattern:?} beside it; download the whole repository"
         )));
     }
-    Ok(fitting)
+    Ok(matching)
 }
 
 fn is_metadata(path: &Path) -> bool {
@@ -200,43 +218,47 @@ fn is_metadata(path: &Path) -> bool {
     METADATA.iter().any(|known| name == *known)
 }
 
-/// The files of a tree without a card: metadata files, else Parquet, else the other tables, of one kind.
-fn by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
+/// Files of a tree without a card: metadata files, else Parquet files, else other tables.
+///
+/// # Errors
+/// If there are no files, or files of several kinds.
+fn files_by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     let (metadata, others): (Vec<PathBuf>, Vec<PathBuf>) =
         files.into_iter().partition(|path| is_metadata(path));
     if !metadata.is_empty() {
-        return one_kind(tree, metadata);
+        return require_one_kind(tree, metadata);
     }
     let (parquet, others): (Vec<PathBuf>, Vec<PathBuf>) = others
         .into_iter()
-        .partition(|path| ending(path) == "parquet");
+        .partition(|path| extension(path) == "parquet");
     if !parquet.is_empty() {
         return Ok(parquet);
     }
     let tables: Vec<PathBuf> = others.into_iter().filter(|path| is_table(path)).collect();
     if tables.is_empty() {
-        let problem = format_args!("no file of questions in it: {READ} expected");
+        let problem = format_args!("no file of questions in it: {SUPPORTED} expected");
         return Err(Error::data(tree.place().display(), problem));
     }
-    one_kind(tree, tables)
+    require_one_kind(tree, tables)
 }
 
-/// Whether a file can hold the rows of a tree without a card.
-fn is_rows(path: &Path) -> bool {
-    is_table(path) || ending(path) == "parquet"
-}
-
-/// Whether a file is a table of text at the top of a tree. Tables deeper in it may be anything.
+/// True if a file is a CSV, TSV or JSON table in the top folder. Tables in subfolders may be unrelated.
 fn is_table(path: &Path) -> bool {
-    let own = ["dataset.json", "classes.json", "info.json"];
-    let is_here = path.parent() == Some(Path::new(""));
-    let is_text = matches!(&*ending(path), "tsv" | "csv" | "jsonl" | "ndjson" | "json");
-    is_here && is_text && !own.iter().any(|own| path == Path::new(own))
+    const NO_TABLES: [&str; 3] = ["dataset.json", "classes.json", "info.json"];
+    let is_in_top_folder = path.parent() == Some(Path::new(""));
+    let is_text = matches!(
+        &*extension(path),
+        "tsv" | "csv" | "jsonl" | "ndjson" | "json"
+    );
+    is_in_top_folder && is_text && !NO_TABLES.iter().any(|name| path == Path::new(name))
 }
 
-/// The files, if they are of one kind.
-fn one_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
-    let kinds: BTreeSet<String> = files.iter().map(|path| ending(path)).collect();
+/// Returns the files if they are of one kind.
+///
+/// # Errors
+/// If they are of several kinds.
+fn require_one_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
+    let kinds: BTreeSet<String> = files.iter().map(|path| extension(path)).collect();
     if kinds.len() == 1 {
         return Ok(files);
     }
@@ -247,7 +269,7 @@ fn one_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     let problem = format!(
         "files of several kinds, {}; name the one that is meant: --data {}",
         names.join(", "),
-        shell_word(&tree.whole(&files[0]).display().to_string())
+        shell_word(&tree.full_path(&files[0]).display().to_string())
     );
     Err(Error::data(tree.place().display(), problem))
 }

@@ -1,68 +1,68 @@
-//! The files of a set in a folder, a repository of a hub on disk, a ZIP file, a pattern or a file: [`find`].
+//! Finds the files of a set in a folder, a downloaded repository, a ZIP file, a pattern or a file: [`find_files`].
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::archive::Archive;
-use super::choose::{chosen, is_set};
-use super::shards::{check_shards, shard_alone};
+use super::choose::{choose_files, is_set};
+use super::shards::{check_shards, single_shard_note};
 use super::tree::Tree;
-use super::{SetFile, ending};
+use super::{SetFile, extension};
 use crate::dataset::ready_made::settings::SetArgs;
 use crate::error::{Error, Result};
 
-/// The files of a set, and the folders that the files they name may lie in.
+/// Files of a set, and the folders that may have its images.
 #[derive(Debug)]
 pub(in crate::dataset::ready_made) struct FoundFiles {
     pub(in crate::dataset::ready_made) files: Vec<SetFile>,
-    /// The folder of the set.
+    /// Folder of the set.
     pub(in crate::dataset::ready_made) folder: PathBuf,
-    /// Folders outside it in which files may lie: into which the links of a hub's cache lead, or which hold further files of the user.
+    /// Further folders that paths may lead to: the files of a hub's cache, or the folders of further `--data` files.
     pub(in crate::dataset::ready_made) further: Vec<PathBuf>,
-    /// The ZIP file that holds the set.
+    /// ZIP file of the set.
     pub(in crate::dataset::ready_made) archive: Option<Arc<Archive>>,
-    /// Files that were left out, in words.
+    /// Notes about skipped or missing files.
     pub(in crate::dataset::ready_made) notes: Vec<String>,
     pub(in crate::dataset::ready_made) joined: Joined,
 }
 
-/// The relation of several files to each other.
+/// Relation of several files to each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) enum Joined {
-    /// Parts of one table, with the same columns.
+    /// Parts of one table, which must have the same columns.
     OneTable,
-    /// Files of a folder, as its makers laid them.
+    /// Files of a folder or a ZIP file, which may have different columns.
     Folder,
 }
 
-/// Whether a folder holds a set of other tools.
-pub(in crate::dataset) fn holds_files(folder: &Path) -> bool {
+/// True if a folder has a ready-made set, or cannot be scanned.
+pub(in crate::dataset) fn is_set_folder(folder: &Path) -> bool {
     let Ok(tree) = Tree::from_folder(folder) else {
         return true;
     };
     tree.files().is_ok_and(|(files, _)| is_set(&tree, &files))
 }
 
-/// The files at a place.
+/// Finds the files of a set.
 ///
 /// # Errors
-/// If there are none, or it is not clear which are meant; the error lists the files.
-pub(in crate::dataset::ready_made) fn find(
+/// If there are none, or it is not clear which to use; the error lists the files.
+pub(in crate::dataset::ready_made) fn find_files(
     places: &[PathBuf],
     args: &SetArgs,
 ) -> Result<FoundFiles> {
     match places {
-        [place] => at_place(place, args),
+        [place] => files_at(place, args),
         places => named_files(places, args),
     }
 }
 
-/// Several files that the user names, in this order.
+/// Opens several files given by the user, in this order.
 fn named_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
     refuse_choice("several files", args)?;
     let mut files = Vec::with_capacity(places.len());
     for place in places {
-        if !place.is_file() || ending(place) == "zip" {
+        if !place.is_file() || extension(place) == "zip" {
             let problem = format_args!(
                 "{}: no file of questions; several --data name the files of one set",
                 place.display()
@@ -90,7 +90,7 @@ fn named_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
     })
 }
 
-/// The folder of a file, which may be the current one.
+/// Folder of a file; `.` for a bare file name.
 fn folder_of(file: &Path) -> PathBuf {
     match file.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
@@ -98,7 +98,7 @@ fn folder_of(file: &Path) -> PathBuf {
     }
 }
 
-/// Refuses flags that choose among the files of a folder.
+/// Refuses the flags that choose files of a folder.
 fn refuse_choice(text: &str, args: &SetArgs) -> Result<()> {
     for (flag, value) in [
         ("--read config", &args.config_name),
@@ -113,7 +113,8 @@ fn refuse_choice(text: &str, args: &SetArgs) -> Result<()> {
     Ok(())
 }
 
-fn at_place(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
+/// Finds the files of a folder, a ZIP file, a file or a pattern.
+fn files_at(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
     if place.is_dir() {
         return files_in_tree(&Tree::from_folder(place)?, args);
     }
@@ -122,7 +123,7 @@ fn at_place(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
         let problem = format_args!("{text}: no such file or folder");
         return Err(Error::usage("--data", problem));
     }
-    if place.is_file() && ending(place) == "zip" {
+    if place.is_file() && extension(place) == "zip" {
         let archive = Arc::new(Archive::open(place)?);
         return files_in_tree(&Tree::Archive(archive), args);
     }
@@ -134,13 +135,13 @@ fn at_place(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
             further: Vec::new(),
             archive: None,
             joined: Joined::OneTable,
-            notes: shard_alone(place).into_iter().collect(),
+            notes: single_shard_note(place).into_iter().collect(),
         });
     }
     matching_files(place, &text)
 }
 
-/// The files whose names fit a pattern.
+/// Files that match a pattern.
 fn matching_files(place: &Path, text: &str) -> Result<FoundFiles> {
     let wrong = |problem: String| Error::usage("--data", format_args!("{text}: {problem}"));
     let paths = glob::glob(text).map_err(|e| wrong(format!("not a pattern: {e}")))?;
@@ -152,13 +153,15 @@ fn matching_files(place: &Path, text: &str) -> Result<FoundFiles> {
         return Err(wrong("no file has such a name".to_owned()));
     }
     check_shards(&files)?;
-    let wild = |part: &&std::ffi::OsStr| part.to_string_lossy().contains(['*', '?', '[']);
-    let folder = place.iter().take_while(|part| !wild(part)).collect();
-    let files = files
-        .into_iter()
-        .map(|path| SetFile::open(path, String::new()));
+    let folder = place
+        .iter()
+        .take_while(|part| !part.to_string_lossy().contains(['*', '?', '[']))
+        .collect();
     Ok(FoundFiles {
-        files: files.collect::<Result<_>>()?,
+        files: files
+            .into_iter()
+            .map(|path| SetFile::open(path, String::new()))
+            .collect::<Result<_>>()?,
         folder,
         further: Vec::new(),
         archive: None,
@@ -167,24 +170,27 @@ fn matching_files(place: &Path, text: &str) -> Result<FoundFiles> {
     })
 }
 
-/// The files of a tree.
+/// Files of a folder or a ZIP file.
 fn files_in_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
     let (all, outside) = tree.files()?;
-    let (chosen, card) = chosen(tree, all, args)?;
-    let paths: Vec<PathBuf> = chosen.iter().map(|file| tree.whole(&file.path)).collect();
+    let (chosen, card_note) = choose_files(tree, all, args)?;
+    let paths: Vec<PathBuf> = chosen
+        .iter()
+        .map(|file| tree.full_path(&file.path))
+        .collect();
     check_shards(&paths)?;
     let files = chosen
         .into_iter()
         .map(|file| tree.open(&file.path, file.config))
         .collect::<Result<_>>()?;
-    let notes = outside.first().map(|first| {
+    let link_note = outside.first().map(|first| {
         format!(
             "links that lead out of the folder or nowhere, and were skipped: {}, as {}",
             outside.len(),
             first.display()
         )
     });
-    let notes = notes.into_iter().chain(card).collect();
+    let notes = link_note.into_iter().chain(card_note).collect();
     Ok(match tree {
         Tree::Folder { folder, blobs } => FoundFiles {
             files,

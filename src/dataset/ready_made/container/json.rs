@@ -1,4 +1,4 @@
-//! JSON files: one object a line, an array of objects, or objects inside another one (`--read rows`).
+//! Reader of JSON files: one object per line, a list of objects, or a list inside another object (`--read rows`).
 
 use std::fs::File;
 use std::io::{BufRead as _, BufReader, Read as _, Seek as _, SeekFrom};
@@ -8,33 +8,31 @@ use std::sync::Arc;
 use serde_json::{Map, Value};
 
 use super::super::cells::{Cell, JsonUnit, RowPlace, Table};
-use super::json_scan::{Found, JsonScan, Kind, LONGEST_ROW};
+use super::json_scan::{JsonScanner, JsonValue, MAX_ROW_BYTES, ValueKind};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::shell_word;
 
-type Scan = JsonScan<BufReader<File>>;
+type FileScanner = JsonScanner<BufReader<File>>;
 
 fn open(path: &Path) -> Result<BufReader<File>> {
     let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
-/// The maximum number of values in a row. Each takes tens of bytes, however short it is written.
-const MOST_VALUES: usize = 1 << 20;
+/// Maximum number of values in a row (chosen). A value takes tens of bytes in memory, however short its text is.
+const MAX_VALUES: usize = 1 << 20;
 
-/// Refuses a row of more values than a question can have.
+/// Checks that a row has at most [`MAX_VALUES`] values.
 fn check_values(bytes: &[u8]) -> Result<(), String> {
-    let signs = |bytes: &[u8]| {
-        bytes
-            .iter()
-            .filter(|byte| matches!(byte, b',' | b'['))
-            .count()
-    };
-    if signs(bytes) <= MOST_VALUES {
+    let separators = bytes
+        .iter()
+        .filter(|byte| matches!(byte, b',' | b'['))
+        .count();
+    if separators <= MAX_VALUES {
         return Ok(());
     }
-    // Commas in texts are no values.
+    // Count again without the commas in strings.
     let (mut count, mut in_text, mut is_escaped) = (0, false, false);
     for byte in bytes {
         match byte {
@@ -45,34 +43,34 @@ fn check_values(bytes: &[u8]) -> Result<(), String> {
             _ => {}
         }
     }
-    if count <= MOST_VALUES {
+    if count <= MAX_VALUES {
         return Ok(());
     }
-    Err(format!("more than {MOST_VALUES} values in a row"))
+    Err(format!("more than {MAX_VALUES} values in a row"))
 }
 
-/// Adds the objects of a file of one object a line. Empty lines and a byte order mark are skipped.
+/// Appends the rows of a file with one object per line. Empty lines and a byte order mark are skipped.
 pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
     let mut reader = open(path)?;
     let mut offset = 0;
     for number in 1.. {
         let mut line = Vec::new();
-        let taken = (&mut reader)
-            .take(LONGEST_ROW as u64 + 2)
+        let length = (&mut reader)
+            .take(MAX_ROW_BYTES as u64 + 2)
             .read_until(b'\n', &mut line)
             .map_err(|e| Error::file(path, "read", e))?;
-        if taken == 0 {
+        if length == 0 {
             break;
         }
-        if taken > LONGEST_ROW {
-            let problem = format_args!("a line of more than {} MB", LONGEST_ROW >> 20);
+        if length > MAX_ROW_BYTES {
+            let problem = format_args!("a line of more than {} MB", MAX_ROW_BYTES >> 20);
             return Err(Error::line(path, number, problem));
         }
         let bytes = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&line);
         if !bytes.trim_ascii().is_empty() {
             check_values(bytes).map_err(|problem| Error::line(path, number, problem))?;
-            let value = serde_json::from_slice(bytes);
-            let value = value.map_err(|e| Error::json_line(path, number, &e))?;
+            let value =
+                serde_json::from_slice(bytes).map_err(|e| Error::json_line(path, number, &e))?;
             let Value::Object(fields) = value else {
                 return Err(Error::line(
                     path,
@@ -81,34 +79,27 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
                 ));
             };
             let place = RowPlace::Json {
-                offset: offset + (taken - bytes.len()) as u64,
+                offset: offset + (length - bytes.len()) as u64,
                 length: bytes.len(),
                 number: number as u64,
                 unit: JsonUnit::Line,
                 inner: None,
             };
-            let pushed = push(table, place, fields, None);
-            pushed.map_err(|problem| Error::line(path, number, problem))?;
+            push_row(table, place, fields, None)
+                .map_err(|problem| Error::line(path, number, problem))?;
         }
-        offset += taken as u64;
+        offset += length as u64;
     }
     Ok(())
 }
 
-/// Adds the rows of a JSON file. `rows` is the way to the list that holds them, as `items` or `images.*.qa`.
+/// Appends the rows of a JSON file. `rows` is the path to their list, such as `items` or `images.*.qa`.
 pub(super) fn read(path: &Path, rows: Option<&str>, table: &mut Table) -> Result<()> {
-    let mut scan = JsonScan::new(open(path)?);
     let steps: Vec<&str> = rows.iter().flat_map(|rows| rows.split('.')).collect();
     let before = table.rows.len();
-    let mut walk = || {
-        match (scan.kind()?, &*steps) {
-            (Kind::Other, _) => Err("neither a list nor an object".to_owned()),
-            (Kind::Object, []) => return rows_by_id(path, table),
-            _ => walk_to(&mut scan, &steps, table),
-        }?;
-        scan.end()
-    };
-    walk().map_err(|problem| Error::data(path.display(), problem))?;
+    let scanner = JsonScanner::new(open(path)?);
+    read_rows_at(scanner, path, &steps, table)
+        .map_err(|problem| Error::data(path.display(), problem))?;
     if table.rows.len() == before && !steps.is_empty() {
         let problem = format_args!("{}: no list of objects there", steps.join("."));
         return Err(Error::usage("--read rows", problem).at("--read rows"));
@@ -116,107 +107,124 @@ pub(super) fn read(path: &Path, rows: Option<&str>, table: &mut Table) -> Result
     Ok(())
 }
 
-/// Walks to the list of rows, and adds them.
-fn walk_to(scan: &mut Scan, steps: &[&str], table: &mut Table) -> Result<(), String> {
-    match (steps, scan.kind()?) {
-        ([] | ["*", _], Kind::List) => {
+/// Appends the rows of the list at the end of a path.
+fn read_rows_at(
+    mut scanner: FileScanner,
+    path: &Path,
+    steps: &[&str],
+    table: &mut Table,
+) -> Result<(), String> {
+    match (scanner.next_kind()?, steps) {
+        (ValueKind::Other, _) => return Err("neither a list nor an object".to_owned()),
+        (ValueKind::Object, []) => return read_rows_by_id(path, table),
+        _ => scan_to_rows(&mut scanner, steps, table)?,
+    }
+    scanner.expect_end()
+}
+
+/// Scans to the list of rows and appends them.
+fn scan_to_rows(
+    scanner: &mut FileScanner,
+    steps: &[&str],
+    table: &mut Table,
+) -> Result<(), String> {
+    match (steps, scanner.next_kind()?) {
+        ([] | ["*", _], ValueKind::List) => {
             let inner = steps.get(1).copied();
             let mut number = 0;
-            scan.list(|scan| {
+            scanner.for_each_item(|scanner| {
                 number += 1;
-                let found = scan.value(LONGEST_ROW)?;
-                add(&found, number, inner, table)
+                let value = scanner.read_value(MAX_ROW_BYTES)?;
+                push_value(&value, number, inner, table)
             })
         }
-        ([name, rest @ ..], Kind::Object) => scan.object(|scan, field| {
+        ([name, rest @ ..], ValueKind::Object) => scanner.for_each_field(|scanner, field| {
             if field == *name {
-                walk_to(scan, rest, table)
+                scan_to_rows(scanner, rest, table)
             } else {
-                scan.skip_value()
+                scanner.skip_value()
             }
         }),
-        _ => scan.skip_value(),
+        _ => scanner.skip_value(),
     }
 }
 
-/// Adds a value as a row, or the list in it as rows that see the fields around it.
-fn add(found: &Found, number: u64, inner: Option<&str>, table: &mut Table) -> Result<(), String> {
-    let fields = object(found, number)?;
+/// Appends an object as a row. With `inner`, appends the objects in its list of this name, each with the other fields of the object.
+fn push_value(
+    value: &JsonValue,
+    number: u64,
+    inner: Option<&str>,
+    table: &mut Table,
+) -> Result<(), String> {
+    let fields = parse_object(value, number)?;
     let place = |inner| RowPlace::Json {
-        offset: found.offset,
-        length: found.bytes.len(),
+        offset: value.offset,
+        length: value.bytes.len(),
         number,
         unit: JsonUnit::Object,
         inner,
     };
     let Some(list) = inner else {
-        return push(table, place(None), fields, None);
+        return push_row(table, place(None), fields, None);
     };
     let name: Arc<str> = list.into();
     let mut outer = fields;
     let Some(Value::Array(rows)) = outer.remove(list) else {
         return Err(format!("object {number} has no list {list:?}"));
     };
-    for (at, row) in rows.into_iter().enumerate() {
+    for (index, row) in rows.into_iter().enumerate() {
         let Value::Object(row) = row else {
             return Err(format!(
                 "object {number}: {list:?} is not a list of objects"
             ));
         };
-        push(
-            table,
-            place(Some(Box::new((at, Arc::clone(&name))))),
-            row,
-            Some(&outer),
-        )?;
+        let place = place(Some(Box::new((index, Arc::clone(&name)))));
+        push_row(table, place, row, Some(&outer))?;
     }
     Ok(())
 }
 
-fn object(found: &Found, number: u64) -> Result<Map<String, Value>, String> {
-    check_values(&found.bytes).map_err(|problem| format!("object {number}: {problem}"))?;
-    match serde_json::from_slice(&found.bytes) {
+/// Parses a value that must be an object; `number` is its position, counted from 1.
+fn parse_object(value: &JsonValue, number: u64) -> Result<Map<String, Value>, String> {
+    check_values(&value.bytes).map_err(|problem| format!("object {number}: {problem}"))?;
+    match serde_json::from_slice(&value.bytes) {
         Ok(Value::Object(fields)) => Ok(fields),
         Ok(_) => Err(format!("value {number} of the list is not an object")),
         Err(e) => Err(format!(
             "object {number}, at byte {}: {e}",
-            found.offset + 1
+            value.offset + 1
         )),
     }
 }
 
-/// Adds the rows of an object of objects, by id. An object of lists is refused with the names of these.
-fn rows_by_id(path: &Path, table: &mut Table) -> Result<(), String> {
-    let mut scan = JsonScan::new(open(path).map_err(|e| e.to_string())?);
+/// Appends the rows of an object whose fields are the rows by id.
+///
+/// # Errors
+/// If the fields are not objects. If they are lists, the error lists them with their columns.
+fn read_rows_by_id(path: &Path, table: &mut Table) -> Result<(), String> {
+    let mut scanner = JsonScanner::new(open(path).map_err(|e| e.to_string())?);
     let (mut lists, mut number, mut others) = (Vec::new(), 0, 0);
     let (before, mut keys) = (table.rows.len(), Vec::new());
-    scan.object(|scan, name| {
-        match scan.kind()? {
-            Kind::Object => {
+    scanner.for_each_field(|scanner, name| {
+        match scanner.next_kind()? {
+            ValueKind::Object => {
                 number += 1;
-                let found = scan.value(LONGEST_ROW)?;
-                add(&found, number, None, table)?;
+                let value = scanner.read_value(MAX_ROW_BYTES)?;
+                push_value(&value, number, None, table)?;
                 keys.push(name);
-                return Ok(());
             }
-            Kind::List => {
-                let mut columns = None;
-                scan.list(|scan| {
-                    if columns.is_some() || scan.kind()? != Kind::Object {
-                        return scan.skip_value();
-                    }
-                    let names = object(&scan.value(LONGEST_ROW)?, 1)?;
-                    columns = Some(names.keys().cloned().collect::<Vec<String>>());
-                    Ok(())
-                })?;
+            ValueKind::List => {
+                let columns = first_object_keys(scanner)?;
                 lists.extend(columns.map(|columns| (name, columns)));
-                return Ok(());
             }
-            Kind::Other => others += 1,
+            ValueKind::Other => {
+                others += 1;
+                scanner.skip_value()?;
+            }
         }
-        scan.skip_value()
+        Ok(())
     })?;
-    scan.end()?;
+    scanner.expect_end()?;
     let Some((name, columns)) = lists.first() else {
         return match (number, others) {
             (1.., 0) => table.add_ids(before, keys),
@@ -232,29 +240,44 @@ fn rows_by_id(path: &Path, table: &mut Table) -> Result<(), String> {
     ))
 }
 
-/// Adds a row. Fields of the object around it are seen where it has none of the name.
-fn push(
+/// Keys of the first object in a list; `None` if it has no object.
+fn first_object_keys(scanner: &mut FileScanner) -> Result<Option<Vec<String>>, String> {
+    let mut keys = None;
+    scanner.for_each_item(|scanner| {
+        if keys.is_some() || scanner.next_kind()? != ValueKind::Object {
+            return scanner.skip_value();
+        }
+        let fields = parse_object(&scanner.read_value(MAX_ROW_BYTES)?, 1)?;
+        keys = Some(fields.keys().cloned().collect());
+        Ok(())
+    })?;
+    Ok(keys)
+}
+
+/// Appends a row. It inherits the fields of `outer` that it does not have.
+fn push_row(
     table: &mut Table,
     place: RowPlace,
     fields: Map<String, Value>,
-    around: Option<&Map<String, Value>>,
+    outer: Option<&Map<String, Value>>,
 ) -> Result<(), String> {
     let mut cells = Vec::new();
-    for (name, value) in around.into_iter().flatten() {
+    for (name, value) in outer.into_iter().flatten() {
         if !fields.contains_key(name) {
-            cells.push((table.column(name)?, Cell::from(value.clone())));
+            cells.push((table.add_column(name)?, Cell::from(value.clone())));
         }
     }
     for (name, value) in fields {
-        cells.push((table.column(&name)?, Cell::from(value)));
+        cells.push((table.add_column(&name)?, Cell::from(value)));
     }
     table.push(place, cells)
 }
 
-/// The cell of a row in a column, whole.
+/// Reads one whole cell of the object at an offset. For nested rows, `inner` is the index of the row and the name of its list.
 pub(super) fn cell(
     path: &Path,
-    (offset, length): (u64, usize),
+    offset: u64,
+    length: usize,
     inner: Option<(usize, &str)>,
     column: &str,
 ) -> Result<Cell> {
@@ -269,7 +292,8 @@ pub(super) fn cell(
             format_args!("changed while it was read: {e}"),
         )
     })?;
-    let own = inner.and_then(|(at, list)| value.get(list)?.get(at)?.get(column));
-    let found = own.or_else(|| value.get(column));
-    Ok(found.cloned().map_or(Cell::Absent, Cell::from))
+    let cell = inner
+        .and_then(|(index, list)| value.get(list)?.get(index)?.get(column))
+        .or_else(|| value.get(column));
+    Ok(cell.cloned().map_or(Cell::Absent, Cell::from))
 }

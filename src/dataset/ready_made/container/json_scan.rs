@@ -1,40 +1,44 @@
-//! The rows of a JSON file, found without holding the file: [`JsonScan`].
+//! Scanner for the rows of a large JSON file: [`JsonScanner`].
 //!
-//! The skeleton of the file (the list of rows, and the objects around it) is walked byte by byte; only one row at a time is in memory,
-//! and parsed by `serde_json`.
+//! The scanner walks over the list of rows and the objects around it byte by byte. Only one row at a time is in memory, to be parsed by
+//! `serde_json`.
 
 use std::io::{self, BufRead};
 
-/// The maximum length of a row, in bytes: an image of 48 MB in base64.
-pub(super) const LONGEST_ROW: usize = 64 << 20;
+/// Maximum length of a row, in bytes: enough for an image of 48 MB in base64.
+pub(super) const MAX_ROW_BYTES: usize = 64 << 20;
 
-/// A reader of JSON that knows its place.
-pub(super) struct JsonScan<R> {
+/// Maximum length of a field name, in bytes.
+const MAX_FIELD_NAME_BYTES: usize = 1 << 20;
+
+/// Scanner over the values of a JSON text.
+pub(super) struct JsonScanner<R> {
     reader: R,
+    /// Number of bytes read.
     offset: u64,
 }
 
-/// The value at the place of a reader, by its first byte.
+/// Kind of the next value, from its first byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ValueKind {
     List,
     Object,
     Other,
 }
 
-/// A value in the bytes of a file.
-pub(super) struct Found {
-    /// The place of its first byte.
+/// Text of a value.
+pub(super) struct JsonValue {
+    /// Offset of its first byte in the file.
     pub(super) offset: u64,
     pub(super) bytes: Vec<u8>,
 }
 
-impl<R: BufRead> JsonScan<R> {
+impl<R: BufRead> JsonScanner<R> {
     pub(super) fn new(reader: R) -> Self {
         Self { reader, offset: 0 }
     }
 
-    /// The next byte, which stays.
+    /// Returns the next byte without consuming it.
     fn peek(&mut self) -> Result<Option<u8>, String> {
         loop {
             match self.reader.fill_buf() {
@@ -45,13 +49,14 @@ impl<R: BufRead> JsonScan<R> {
         }
     }
 
+    /// Consumes one byte.
     fn skip(&mut self) {
         self.reader.consume(1);
         self.offset += 1;
     }
 
-    /// The next byte that is no space, which stays.
-    fn next_sign(&mut self) -> Result<u8, String> {
+    /// Skips space, and returns the next byte without consuming it.
+    fn peek_token(&mut self) -> Result<u8, String> {
         loop {
             match self.peek()? {
                 Some(b' ' | b'\t' | b'\r' | b'\n') => self.skip(),
@@ -62,10 +67,10 @@ impl<R: BufRead> JsonScan<R> {
         }
     }
 
-    /// Takes this sign.
-    fn take(&mut self, sign: u8) -> Result<(), String> {
-        let found = self.next_sign()?;
-        if found == sign {
+    /// Consumes the expected byte after space.
+    fn expect(&mut self, expected: u8) -> Result<(), String> {
+        let found = self.peek_token()?;
+        if found == expected {
             self.skip();
             return Ok(());
         }
@@ -73,73 +78,73 @@ impl<R: BufRead> JsonScan<R> {
             "{:?} at byte {}, where {:?} is expected",
             char::from(found),
             self.offset + 1,
-            char::from(sign)
+            char::from(expected)
         ))
     }
 
-    /// The kind of the next value.
-    pub(super) fn kind(&mut self) -> Result<Kind, String> {
-        Ok(match self.next_sign()? {
-            b'[' => Kind::List,
-            b'{' => Kind::Object,
-            _ => Kind::Other,
+    /// Kind of the next value.
+    pub(super) fn next_kind(&mut self) -> Result<ValueKind, String> {
+        Ok(match self.peek_token()? {
+            b'[' => ValueKind::List,
+            b'{' => ValueKind::Object,
+            _ => ValueKind::Other,
         })
     }
 
-    /// Walks the elements of a list; `each` must read or skip each.
-    pub(super) fn list(
+    /// Scans a list. `visit` must read or skip each item.
+    pub(super) fn for_each_item(
         &mut self,
-        mut each: impl FnMut(&mut Self) -> Result<(), String>,
+        mut visit: impl FnMut(&mut Self) -> Result<(), String>,
     ) -> Result<(), String> {
-        self.take(b'[')?;
-        if self.next_sign()? == b']' {
+        self.expect(b'[')?;
+        if self.peek_token()? == b']' {
             self.skip();
             return Ok(());
         }
         loop {
-            each(self)?;
-            match self.next_sign()? {
+            visit(self)?;
+            match self.peek_token()? {
                 b',' => self.skip(),
-                _ => return self.take(b']'),
+                _ => return self.expect(b']'),
             }
         }
     }
 
-    /// Walks the fields of an object; `each` must read or skip the value of each.
-    pub(super) fn object(
+    /// Scans an object. `visit` gets the name of each field, and must read or skip its value.
+    pub(super) fn for_each_field(
         &mut self,
-        mut each: impl FnMut(&mut Self, String) -> Result<(), String>,
+        mut visit: impl FnMut(&mut Self, String) -> Result<(), String>,
     ) -> Result<(), String> {
-        self.take(b'{')?;
-        if self.next_sign()? == b'}' {
+        self.expect(b'{')?;
+        if self.peek_token()? == b'}' {
             self.skip();
             return Ok(());
         }
         loop {
-            if self.next_sign()? != b'"' {
+            if self.peek_token()? != b'"' {
                 return Err(format!(
                     "byte {} is not the name of a field",
                     self.offset + 1
                 ));
             }
-            let name = self.value(1 << 20)?;
+            let name = self.read_value(MAX_FIELD_NAME_BYTES)?;
             let name = serde_json::from_slice(&name.bytes).map_err(|e| e.to_string())?;
-            self.take(b':')?;
-            each(self, name)?;
-            match self.next_sign()? {
+            self.expect(b':')?;
+            visit(self, name)?;
+            match self.peek_token()? {
                 b',' => self.skip(),
-                _ => return self.take(b'}'),
+                _ => return self.expect(b'}'),
             }
         }
     }
 
-    /// The next value, of at most so many bytes.
-    pub(super) fn value(&mut self, longest: usize) -> Result<Found, String> {
-        self.next_sign()?;
+    /// Reads the next value, of at most `max` bytes.
+    pub(super) fn read_value(&mut self, max: usize) -> Result<JsonValue, String> {
+        self.peek_token()?;
         let (offset, mut bytes) = (self.offset, Vec::new());
         let mut too_long = false;
-        self.walk(|chunk| {
-            too_long |= bytes.len() + chunk.len() > longest;
+        self.consume_value(|chunk| {
+            too_long |= bytes.len() + chunk.len() > max;
             if !too_long {
                 bytes.extend_from_slice(chunk);
             }
@@ -147,22 +152,22 @@ impl<R: BufRead> JsonScan<R> {
         if too_long {
             return Err(format!(
                 "a value of more than {} MB begins at byte {}",
-                longest >> 20,
+                max >> 20,
                 offset + 1
             ));
         }
-        Ok(Found { offset, bytes })
+        Ok(JsonValue { offset, bytes })
     }
 
     /// Skips the next value.
     pub(super) fn skip_value(&mut self) -> Result<(), String> {
-        self.next_sign()?;
-        self.walk(|_| ())
+        self.peek_token()?;
+        self.consume_value(|_| ())
     }
 
-    /// Walks to the end of the value that begins here, and hands out its bytes.
-    fn walk(&mut self, mut each: impl FnMut(&[u8])) -> Result<(), String> {
-        let mut state = Walk::default();
+    /// Consumes the value that begins at the next byte, and passes its bytes to `visit` in chunks.
+    fn consume_value(&mut self, mut visit: impl FnMut(&[u8])) -> Result<(), String> {
+        let mut state = ValueState::default();
         loop {
             let buffer = match self.reader.fill_buf() {
                 Ok(buffer) => buffer,
@@ -171,25 +176,25 @@ impl<R: BufRead> JsonScan<R> {
             };
             if buffer.is_empty() {
                 return match state.depth {
-                    0 if state.begun && !state.in_text => Ok(()),
+                    0 if state.has_started && !state.in_string => Ok(()),
                     _ => Err(format!(
                         "the file ends at byte {} inside a value",
                         self.offset
                     )),
                 };
             }
-            let (taken, is_end) = state.take(buffer);
-            each(&buffer[..taken]);
-            self.reader.consume(taken);
-            self.offset += taken as u64;
+            let (length, is_end) = state.advance(buffer);
+            visit(&buffer[..length]);
+            self.reader.consume(length);
+            self.offset += length as u64;
             if is_end {
                 return Ok(());
             }
         }
     }
 
-    /// Checks that nothing but space follows.
-    pub(super) fn end(&mut self) -> Result<(), String> {
+    /// Checks that only space follows.
+    pub(super) fn expect_end(&mut self) -> Result<(), String> {
         while let Some(byte) = self.peek()? {
             if !byte.is_ascii_whitespace() {
                 return Err(format!(
@@ -204,25 +209,26 @@ impl<R: BufRead> JsonScan<R> {
     }
 }
 
-/// The state of a walk over one value.
+/// State of a scan over one value.
 #[derive(Default)]
-struct Walk {
-    begun: bool,
+struct ValueState {
+    has_started: bool,
+    /// Number of open brackets and braces.
     depth: usize,
-    in_text: bool,
+    in_string: bool,
     is_escaped: bool,
 }
 
-impl Walk {
-    /// How many bytes of a buffer belong to the value, and whether it ends there.
-    fn take(&mut self, buffer: &[u8]) -> (usize, bool) {
+impl ValueState {
+    /// Number of bytes in the buffer that belong to the value, and whether the value ends there.
+    fn advance(&mut self, buffer: &[u8]) -> (usize, bool) {
         for (at, &byte) in buffer.iter().enumerate() {
-            if self.in_text {
+            if self.in_string {
                 match byte {
                     _ if self.is_escaped => self.is_escaped = false,
                     b'\\' => self.is_escaped = true,
                     b'"' => {
-                        self.in_text = false;
+                        self.in_string = false;
                         if self.depth == 0 {
                             return (at + 1, true);
                         }
@@ -231,10 +237,10 @@ impl Walk {
                 }
                 continue;
             }
-            let is_first = !self.begun;
-            self.begun = true;
+            let is_first = !self.has_started;
+            self.has_started = true;
             match byte {
-                b'"' => self.in_text = true,
+                b'"' => self.in_string = true,
                 b'[' | b'{' => self.depth += 1,
                 b']' | b'}' if self.depth > 0 => {
                     self.depth -= 1;
@@ -243,7 +249,7 @@ impl Walk {
                     }
                 }
                 b',' | b']' | b'}' | b' ' | b'\t' | b'\r' | b'\n' if self.depth == 0 => {
-                    // A sign where a value is expected is taken, so that its parser refuses it.
+                    // Take an invalid first byte as the value, so that its parser reports it.
                     return (at + usize::from(is_first), true);
                 }
                 _ => {}
@@ -259,26 +265,26 @@ mod tests {
 
     use super::*;
 
-    /// The elements of the list `items` in a text, read through a buffer of so many bytes.
+    /// Items of the list `items` in a text, read with a buffer of this size.
     fn items(text: &str, buffer: usize) -> Result<Vec<(u64, String)>, String> {
         let mut found = Vec::new();
-        let mut scan = JsonScan::new(BufReader::with_capacity(buffer, text.as_bytes()));
-        scan.object(|scan, name| {
+        let mut scanner = JsonScanner::new(BufReader::with_capacity(buffer, text.as_bytes()));
+        scanner.for_each_field(|scanner, name| {
             if name != "items" {
-                return scan.skip_value();
+                return scanner.skip_value();
             }
-            scan.list(|scan| {
-                let value = scan.value(40)?;
+            scanner.for_each_item(|scanner| {
+                let value = scanner.read_value(40)?;
                 found.push((value.offset, String::from_utf8(value.bytes).unwrap()));
                 Ok(())
             })
         })?;
-        scan.end()?;
+        scanner.expect_end()?;
         Ok(found)
     }
 
     #[test]
-    fn values_are_found_whole_at_any_buffer() {
+    fn values_are_complete_at_any_buffer_size() {
         let text =
             r#" {"a": [1, {"b": "}]"}], "items" : [ {"x": "\"]}"} ,3,"a,b",[] ], "z": null} "#;
         let values = [r#"{"x": "\"]}"}"#, "3", r#""a,b""#, "[]"];
@@ -293,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_files_are_refused() {
+    fn invalid_json_is_refused() {
         for (text, says) in [
             (r#"{"items": [1, 2"#, "the file ends at byte"),
             (r#"{"items": ["abc"#, "inside a value"),

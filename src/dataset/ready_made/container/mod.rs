@@ -1,12 +1,12 @@
-//! The files of a ready-made set: [`SetFile`].
+//! Files of a ready-made set: [`SetFile`].
 
 mod archive;
 mod card;
 mod choose;
+mod decompress;
 mod find;
 mod json;
 mod json_scan;
-mod packed;
 mod parquet;
 mod shards;
 mod splits;
@@ -17,32 +17,32 @@ mod yaml;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use super::cells::{Cell, FileLabel, RowPlace, Step, Table};
 use tempfile::NamedTempFile;
 
+use super::cells::{Cell, FileLabel, RowPlace, Step, Table};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
 pub(in crate::dataset) use archive::Archive;
-pub(in crate::dataset) use find::holds_files;
-pub(super) use find::{FoundFiles, Joined, find};
+pub(in crate::dataset) use find::is_set_folder;
+pub(super) use find::{FoundFiles, Joined, find_files};
 
-/// The endings of the files that are read.
-pub(super) const READ: &str =
+/// Supported file types, for messages.
+const SUPPORTED: &str =
     ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the texts also as .gz), or a .zip of these";
 
-/// One file of rows.
+/// One file of a table.
 #[derive(Debug)]
 pub(in crate::dataset) struct SetFile {
     pub(super) label: FileLabel,
     kind: FileKind,
-    /// The unpacked copy of a compressed file, gone when the file is closed.
-    unpacked: Option<NamedTempFile>,
-    /// Of a Parquet file, once it is read.
+    /// Decompressed copy of a compressed file, deleted when dropped.
+    decompressed: Option<NamedTempFile>,
+    /// Footer of a Parquet file.
     footer: parquet::Footer,
 }
 
-/// How rows stand in a file.
+/// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FileKind {
     Table { delimiter: u8 },
@@ -52,46 +52,42 @@ enum FileKind {
 }
 
 impl SetFile {
-    /// The file at a path, whose ending tells its kind.
+    /// Opens a file. Its extension decides its format.
     pub(super) fn open(path: PathBuf, config: String) -> Result<Self> {
-        check_content(&path)?;
-        let unpacked = if ending(&path) == "gz" {
-            Some(packed::unpacked(&path)?)
+        refuse_lfs_pointer(&path)?;
+        let decompressed = if extension(&path) == "gz" {
+            Some(decompress::decompress_gzip(&path)?)
         } else {
             None
         };
-        Self::new(path, unpacked, config)
+        Self::new(path, decompressed, config)
     }
 
-    /// A file of an archive.
+    /// Opens a file of an archive.
     pub(super) fn from_member(archive: &Archive, name: &Path, config: String) -> Result<Self> {
-        let unpacked = archive.unpacked(&name.to_string_lossy())?;
-        let file = Self::new(archive.path.join(name), Some(unpacked), config)?;
-        let inner = Some(name.parent().unwrap_or(Path::new("")).to_owned());
-        let label = FileLabel {
-            inner,
-            ..file.label
-        };
-        Ok(Self { label, ..file })
+        let decompressed = archive.decompress(&name.to_string_lossy())?;
+        let mut file = Self::new(archive.path.join(name), Some(decompressed), config)?;
+        file.label.inner = Some(name.parent().unwrap_or(Path::new("")).to_owned());
+        Ok(file)
     }
 
-    fn new(path: PathBuf, unpacked: Option<NamedTempFile>, config: String) -> Result<Self> {
-        let bare = match &*ending(&path) {
+    fn new(path: PathBuf, decompressed: Option<NamedTempFile>, config: String) -> Result<Self> {
+        let uncompressed_name = match &*extension(&path) {
             "gz" => path.with_extension(""),
             _ => path.clone(),
         };
-        let read = unpacked
+        let content = decompressed
             .as_ref()
             .map_or(path.as_path(), NamedTempFile::path);
-        let kind = match &*ending(&bare) {
+        let kind = match &*extension(&uncompressed_name) {
             name @ ("tsv" | "csv") => FileKind::Table {
-                delimiter: table::delimiter(read, name)?,
+                delimiter: table::delimiter(content, name)?,
             },
             "jsonl" | "ndjson" => FileKind::JsonLines,
             "json" => FileKind::Json,
             "parquet" => FileKind::Parquet,
             _ => {
-                let problem = format_args!("not a file of questions: {READ} expected");
+                let problem = format_args!("not a file of questions: {SUPPORTED} expected");
                 return Err(Error::data(path.display(), problem));
             }
         };
@@ -103,19 +99,19 @@ impl SetFile {
         Ok(Self {
             label,
             kind,
-            unpacked,
+            decompressed,
             footer: parquet::Footer::default(),
         })
     }
 
-    /// The file that is read: the unpacked copy of a compressed one.
-    fn read_path(&self) -> &Path {
-        self.unpacked
+    /// Path of the content: the decompressed copy of a compressed file, else the file.
+    fn content_path(&self) -> &Path {
+        self.decompressed
             .as_ref()
             .map_or(&self.label.path, NamedTempFile::path)
     }
 
-    /// Adds the rows of the file to a table.
+    /// Appends the rows of the file to a table. In a JSON file, `rows` is the path to the list of rows.
     pub(super) fn read(&self, rows: Option<&str>, table: &mut Table) -> Result<()> {
         if let Some(rows) = rows.filter(|_| self.kind != FileKind::Json) {
             let problem = format_args!(
@@ -125,35 +121,35 @@ impl SetFile {
             return Err(Error::usage("--read rows", problem));
         }
         table.begin_file(self.label.clone());
-        let path = self.read_path();
-        let read = match self.kind {
+        let path = self.content_path();
+        let result = match self.kind {
             FileKind::Table { delimiter } => table::read(path, delimiter, table),
             FileKind::JsonLines => json::read_lines(path, table),
             FileKind::Json => json::read(path, rows, table),
             FileKind::Parquet => parquet::read(path, &self.footer, table),
         };
-        // The unpacked copy has a name that nobody knows.
-        let named = |place: &str| {
-            place.replace(
-                &path.display().to_string(),
-                &self.label.path.display().to_string(),
-            )
-        };
-        read.map_err(|error| match error {
-            Error::Data { place, problem } => Error::data(named(&place), problem),
+        // Name the compressed file instead of its temporary copy.
+        result.map_err(|error| match error {
+            Error::Data { place, problem } => {
+                let place = place.replace(
+                    &path.display().to_string(),
+                    &self.label.path.display().to_string(),
+                );
+                Error::data(place, problem)
+            }
             error => error,
         })
     }
 
-    /// The bytes or the text of a value: in a row, in a column, at the steps inside its cell.
+    /// Reads the bytes or the text of one value: the end of the path `steps` in the cell of `column` in a row.
     pub(super) fn value(&self, row: &RowPlace, column: &str, steps: &[Step]) -> Result<Vec<u8>> {
         let cell = match (row, self.kind) {
             (RowPlace::Parquet { group, row, .. }, _) => {
-                let file = (self.read_path(), &self.footer);
-                return parquet::bytes(file, (*group, *row), column, steps);
+                let path = self.content_path();
+                return parquet::bytes(path, &self.footer, *group, *row, column, steps);
             }
             (RowPlace::Record(position), FileKind::Table { delimiter }) => {
-                table::cell(self.read_path(), delimiter, position, column)?
+                table::cell(self.content_path(), delimiter, position, column)?
             }
             (
                 RowPlace::Json {
@@ -164,12 +160,12 @@ impl SetFile {
                 },
                 _,
             ) => {
-                let inner = inner.as_ref().map(|inner| (inner.0, &*inner.1));
-                json::cell(self.read_path(), (*offset, *length), inner, column)?
+                let inner = inner.as_deref().map(|(index, list)| (*index, &**list));
+                json::cell(self.content_path(), *offset, *length, inner, column)?
             }
             (RowPlace::Record(_), _) => Cell::Absent,
         };
-        match cell.at(steps) {
+        match cell.value_at(steps) {
             Some(Cell::Bytes(bytes)) => Ok(bytes.into_vec()),
             Some(Cell::Text(text)) => Ok(text.into_bytes()),
             _ => {
@@ -181,14 +177,16 @@ impl SetFile {
     }
 }
 
-/// The ending of a name, in lower case.
-fn ending(path: &Path) -> String {
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    ending.unwrap_or_default().to_ascii_lowercase()
+/// Extension of a file name, in lower case.
+fn extension(path: &Path) -> String {
+    path.extension()
+        .and_then(|extension| extension.to_str())
+        .unwrap_or_default()
+        .to_ascii_lowercase()
 }
 
-/// Refuses a pointer of Git LFS, which stands where a file was not downloaded.
-fn check_content(path: &Path) -> Result<()> {
+/// Refuses a Git LFS pointer, the placeholder of a file that was not downloaded.
+fn refuse_lfs_pointer(path: &Path) -> Result<()> {
     const POINTER: &[u8] = b"version https://git-lfs.github.com/spec";
     let mut file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut head = [0; POINTER.len()];

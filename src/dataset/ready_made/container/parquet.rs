@@ -17,8 +17,8 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
 
-use super::super::cells::{Cell, MOST_ROWS, RowPlace, Step, Table, list, too_many_rows};
-use super::json_scan::LONGEST_ROW;
+use super::super::cells::{Cell, MAX_ROWS, RowPlace, Step, Table, parse_list, too_many_rows};
+use super::json_scan::MAX_ROW_BYTES;
 use crate::error::{Error, Result};
 use crate::files::guarded::guarded;
 use crate::files::reading;
@@ -72,10 +72,11 @@ pub(super) fn count(path: &Path) -> Result<u64> {
 /// # Errors
 /// If the file is corrupt, a compression codec is not supported, or there are too many rows or too many bytes in a row.
 pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()> {
-    check_codecs(path, &*footer.metadata(path)?)?;
+    let metadata = footer.metadata(path)?;
+    check_codecs(path, &metadata)?;
     // The footer has the number of rows: reject a large file before reading any row.
-    let stated = footer.metadata(path)?.file_metadata().num_rows();
-    if usize::try_from(stated).is_ok_and(|rows| rows > MOST_ROWS) {
+    let stated = metadata.file_metadata().num_rows();
+    if usize::try_from(stated).is_ok_and(|rows| rows > MAX_ROWS) {
         return Err(Error::data(path.display(), too_many_rows()));
     }
     let file = open(path)?;
@@ -86,19 +87,19 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
             .get_column_iter()
             .map(|(_, field)| byte_length(field))
             .sum();
-        if size > LONGEST_ROW {
-            let problem = format!("more than {} MB in a row", LONGEST_ROW >> 20);
+        if size > MAX_ROW_BYTES {
+            let problem = format!("more than {} MB in a row", MAX_ROW_BYTES >> 20);
             too_long = Some((place, problem.clone()));
             return Err(problem);
         }
         let mut cells = Vec::new();
-        for (at, (name, field)) in record.into_columns().into_iter().enumerate() {
-            if columns.get(at).is_none_or(|(known, _)| *known != name) {
-                let column = table.column(&name)?;
-                columns.truncate(at);
+        for (index, (name, field)) in record.into_columns().into_iter().enumerate() {
+            if columns.get(index).is_none_or(|(known, _)| *known != name) {
+                let column = table.add_column(&name)?;
+                columns.truncate(index);
                 columns.push((name, column));
             }
-            cells.push((columns[at].1, cell_of(field)));
+            cells.push((columns[index].1, convert_field(field)));
         }
         table.push(place, cells)
     };
@@ -173,7 +174,7 @@ fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
 }
 
 /// Converts a Parquet value to a cell. NaN is an absent cell; types without a cell of their own become text.
-fn cell_of(field: Field) -> Cell {
+fn convert_field(field: Field) -> Cell {
     let number = |text: String| Cell::Number(text.into());
     match field {
         Field::Null => Cell::Absent,
@@ -196,11 +197,11 @@ fn cell_of(field: Field) -> Cell {
             record
                 .into_columns()
                 .into_iter()
-                .map(|(name, field)| (name.into(), cell_of(field)))
+                .map(|(name, field)| (name.into(), convert_field(field)))
                 .collect(),
         ),
         Field::ListInternal(list) => {
-            Cell::List(list.elements().iter().cloned().map(cell_of).collect())
+            Cell::List(list.elements().iter().cloned().map(convert_field).collect())
         }
         other => Cell::Text(other.to_string()),
     }
@@ -303,8 +304,10 @@ impl Cursor {
 /// # Errors
 /// If the file is corrupt or does not have this value.
 pub(super) fn bytes(
-    (path, footer): (&Path, &Footer),
-    (group, row): (usize, usize),
+    path: &Path,
+    footer: &Footer,
+    group: usize,
+    row: usize,
     column: &str,
     steps: &[Step],
 ) -> Result<Vec<u8>> {
@@ -336,7 +339,7 @@ pub(super) fn bytes(
         // The column has no list: the value is a list as text.
         std::str::from_utf8(&value)
             .ok()
-            .and_then(list)
+            .and_then(parse_list)
             .and_then(|items| items.into_iter().nth(item))
             .map(String::into_bytes)
             .ok_or_else(|| "the value is gone".to_owned())

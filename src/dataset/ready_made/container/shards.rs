@@ -1,33 +1,49 @@
-//! The shards of a set: [`check_shards`].
+//! Shards of a set: [`check_shards`], [`single_shard_note`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// The name, the number of a shard and that of all shards in a path, as `test-00000-of-00003.parquet`.
-fn shard(path: &Path) -> Option<(String, usize, usize)> {
-    let stem = path.file_stem()?.to_str()?;
-    let (head, all) = stem.rsplit_once("-of-")?;
-    let (name, number) = head.rsplit_once('-')?;
-    let all = all
-        .chars()
-        .take_while(char::is_ascii_digit)
-        .collect::<String>();
-    let name = path.with_file_name(name).display().to_string();
-    Some((name, number.parse().ok()?, all.parse().ok()?))
+/// Parts of the path of a shard, such as `test-00000-of-00003.parquet`.
+struct ShardPath {
+    /// Path up to the number of the shard.
+    name: String,
+    /// Number of the shard, counted from 0.
+    number: usize,
+    /// Number of all shards.
+    count: usize,
 }
 
-/// Refuses shards of which one is missing.
+impl ShardPath {
+    /// Parses a path; `None` if it is not the path of a shard.
+    fn parse(path: &Path) -> Option<Self> {
+        let stem = path.file_stem()?.to_str()?;
+        let (head, count) = stem.rsplit_once("-of-")?;
+        let (name, number) = head.rsplit_once('-')?;
+        // The extension `.jsonl.gz` leaves `.jsonl` in the stem.
+        let count: String = count.chars().take_while(char::is_ascii_digit).collect();
+        Some(Self {
+            name: path.with_file_name(name).display().to_string(),
+            number: number.parse().ok()?,
+            count: count.parse().ok()?,
+        })
+    }
+}
+
+/// Checks that no shard is missing.
 pub(super) fn check_shards(files: &[PathBuf]) -> Result<()> {
     let mut found: BTreeMap<(String, usize), BTreeSet<usize>> = BTreeMap::new();
-    for (name, number, all) in files.iter().filter_map(|path| shard(path)) {
-        found.entry((name, all)).or_default().insert(number);
+    for shard in files.iter().filter_map(|path| ShardPath::parse(path)) {
+        found
+            .entry((shard.name, shard.count))
+            .or_default()
+            .insert(shard.number);
     }
-    for ((name, all), numbers) in found {
-        if let Some(missing) = (0..all).find(|number| !numbers.contains(number)) {
+    for ((name, count), numbers) in found {
+        if let Some(missing) = (0..count).find(|number| !numbers.contains(number)) {
             let problem = format_args!(
-                "{} of {all} shards are there; number {missing} is missing: download it, or name the files that are meant",
+                "{} of {count} shards are there; number {missing} is missing: download it, or name the files that are meant",
                 numbers.len()
             );
             return Err(Error::data(name, problem));
@@ -36,10 +52,10 @@ pub(super) fn check_shards(files: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Words for a file that is one of several shards.
-pub(super) fn shard_alone(path: &Path) -> Option<String> {
-    let (_, number, all) = shard(path)?;
-    (all > 1).then(|| format!("shard {number} of {all} alone is read, as it was named"))
+/// Note about a file that is one of several shards.
+pub(super) fn single_shard_note(path: &Path) -> Option<String> {
+    let ShardPath { number, count, .. } = ShardPath::parse(path)?;
+    (count > 1).then(|| format!("shard {number} of {count} alone is read, as it was named"))
 }
 
 #[cfg(test)]
@@ -47,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_missing_shard_is_named() {
+    fn missing_shard_is_an_error() {
         let files = |numbers: &[usize]| {
             numbers
                 .iter()
@@ -60,7 +76,10 @@ mod tests {
             problem.contains("2 of 3 shards are there; number 1 is missing"),
             "{problem}"
         );
-        assert_eq!(shard_alone(Path::new("a-00000-of-00001.parquet")), None);
-        assert!(shard_alone(Path::new("a-00000-of-00002.parquet")).is_some());
+        assert_eq!(
+            single_shard_note(Path::new("a-00000-of-00001.parquet")),
+            None
+        );
+        assert!(single_shard_note(Path::new("a-00000-of-00002.parquet")).is_some());
     }
 }

@@ -1,10 +1,10 @@
-//! Splits of a data set: the split that a path names ([`split_in_name`]), and the files of the chosen split ([`chosen`]).
+//! Splits of a data set: the split that a path names ([`split_in_name`]), and the files of the chosen split ([`choose_split`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::tree::Tree;
-use super::{ending, parquet};
+use super::{extension, parquet};
 use crate::error::{Error, Result};
 
 /// File of rows, with its split and configuration.
@@ -50,7 +50,7 @@ fn usual_word(name: &str) -> &str {
 ///
 /// # Errors
 /// If the wanted split does not exist, or if no split is wanted and several exist without `test`. The error lists the splits.
-pub(super) fn chosen(
+pub(super) fn choose_split(
     tree: &Tree,
     files: Vec<Candidate>,
     wanted: Option<&str>,
@@ -65,7 +65,10 @@ pub(super) fn chosen(
         // `val` names the split that a file `val.parquet` has.
         Some(name) if splits.contains_key(usual_word(name)) => Some(usual_word(name)),
         Some(name) => {
-            let problem = format_args!("no split {name:?}; there are {}", listed(tree, &splits));
+            let problem = format_args!(
+                "no split {name:?}; there are {}",
+                list_splits(tree, &splits)
+            );
             return Err(Error::usage("--read split", problem));
         }
         None if splits.len() == 1 => None,
@@ -73,7 +76,7 @@ pub(super) fn chosen(
         None => {
             let problem = format_args!(
                 "the splits {}; --read split=NAME names one, --read split=all takes them together",
-                listed(tree, &splits)
+                list_splits(tree, &splits)
             );
             return Err(Error::data(tree.place().display(), problem));
         }
@@ -87,9 +90,9 @@ pub(super) fn chosen(
 
 /// Lists the splits with their numbers of rows, such as `test (rows: 1000)`. Rows are counted for Parquet files in a folder, which have
 /// the count in their footer; other splits get the number of files.
-fn listed(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
-    let rows = |file: &&Path| match (tree, &*ending(file)) {
-        (Tree::Folder { .. }, "parquet") => parquet::count(&tree.whole(file)).ok(),
+fn list_splits(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
+    let rows = |file: &&Path| match (tree, &*extension(file)) {
+        (Tree::Folder { .. }, "parquet") => parquet::count(&tree.full_path(file)).ok(),
         _ => None,
     };
     splits
@@ -139,7 +142,7 @@ mod tests {
                 path: split.into(),
             })
             .collect();
-        let files = chosen(&tree, files, wanted)?;
+        let files = choose_split(&tree, files, wanted)?;
         Ok(files.into_iter().map(|file| file.path).collect())
     }
 

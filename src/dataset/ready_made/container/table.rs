@@ -89,7 +89,7 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
             return Err(Error::line(path, 1, problem));
         }
         let column = table
-            .column(name)
+            .add_column(name)
             .map_err(|problem| Error::line(path, 1, problem))?;
         columns.push((name.to_owned(), column));
     }

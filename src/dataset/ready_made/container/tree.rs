@@ -1,4 +1,4 @@
-//! The files below a folder or inside a ZIP file: [`Tree`].
+//! Files in a folder or a ZIP file: [`Tree`].
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::SetFile;
 use super::archive::Archive;
-use crate::dataset::root::{LeadsTo, Root};
+use crate::dataset::root::{Location, Root};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
@@ -14,28 +14,31 @@ use crate::files::reading;
 pub(super) enum Tree {
     Folder {
         folder: PathBuf,
-        /// The folder of a hub's cache into which the links of a snapshot lead.
+        /// Folder of a hub's cache with the files that the links in a snapshot lead to.
         blobs: Option<PathBuf>,
     },
     Archive(Arc<Archive>),
 }
 
-/// The deepest folder that is looked into, counted from the first.
-const DEEPEST: usize = 4;
+/// Maximum depth of subfolders to scan (chosen).
+const MAX_DEPTH: usize = 4;
 
 impl Tree {
-    /// The tree at a folder; of a repository in a hub's cache, its newest snapshot.
+    /// The tree of a folder, or the newest snapshot if the folder is a repository in a hub's cache.
     ///
     /// # Errors
-    /// If the cache names no snapshot.
+    /// If the cache does not name a snapshot.
     pub(super) fn from_folder(place: &Path) -> Result<Self> {
-        let name = place.canonicalize().unwrap_or_else(|_| place.to_owned());
-        let is_cached = |path: &Path| {
+        let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
+        let is_cached_repository = |path: &Path| {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             name.starts_with("datasets--")
         };
-        if !(is_cached(&name) && place.join("snapshots").is_dir()) {
-            let repository = name.ancestors().nth(2).filter(|path| is_cached(path));
+        if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
+            let repository = canonical
+                .ancestors()
+                .nth(2)
+                .filter(|path| is_cached_repository(path));
             return Ok(Self::Folder {
                 folder: place.to_owned(),
                 blobs: repository.map(|path| path.join("blobs")),
@@ -53,7 +56,7 @@ impl Tree {
         })
     }
 
-    /// The place, for messages.
+    /// Path of the folder or the ZIP file.
     pub(super) fn place(&self) -> &Path {
         match self {
             Self::Folder { folder, .. } => folder,
@@ -61,28 +64,33 @@ impl Tree {
         }
     }
 
-    /// All files, sorted, without hidden ones; and the links that lead out of the tree, which are passed over.
+    /// All files that are not hidden, and the links that lead outside the tree, which are skipped.
     pub(super) fn files(&self) -> Result<(Vec<PathBuf>, Vec<PathBuf>)> {
         match self {
             Self::Archive(archive) => Ok((archive.files(), Vec::new())),
             Self::Folder { folder, blobs } => {
-                let blobs = blobs.iter().filter(|blobs| blobs.is_dir()).cloned();
+                let blobs: Vec<PathBuf> = blobs
+                    .iter()
+                    .filter(|blobs| blobs.is_dir())
+                    .cloned()
+                    .collect();
                 let mut scan = Scan {
-                    root: Root::new(folder, &blobs.collect::<Vec<_>>())?,
+                    root: Root::new(folder, &blobs)?,
                     files: Vec::new(),
                     outside: Vec::new(),
                 };
-                scan.folder(folder, 0)?;
-                let below = |path: PathBuf| {
-                    path.strip_prefix(folder)
-                        .map_or_else(|_| path.clone(), Path::to_owned)
-                };
-                Ok((scan.files.into_iter().map(below).collect(), scan.outside))
+                scan.add_folder(folder, 0)?;
+                let files = scan
+                    .files
+                    .iter()
+                    .map(|path| path.strip_prefix(folder).unwrap_or(path).to_owned())
+                    .collect();
+                Ok((files, scan.outside))
             }
         }
     }
 
-    /// Whether there is a file of this path.
+    /// True if the tree has a file with this path.
     pub(super) fn has(&self, path: &str) -> bool {
         match self {
             Self::Folder { folder, .. } => folder.join(path).is_file(),
@@ -90,15 +98,15 @@ impl Tree {
         }
     }
 
-    /// The text of a file.
-    pub(super) fn text(&self, path: &str) -> Result<String> {
+    /// Reads the text of a file.
+    pub(super) fn read_text(&self, path: &str) -> Result<String> {
         match self {
             Self::Folder { folder, .. } => reading::text(&folder.join(path)),
-            Self::Archive(archive) => archive.text(path),
+            Self::Archive(archive) => archive.read_text(path),
         }
     }
 
-    /// A file of rows.
+    /// Opens a file of a table.
     pub(super) fn open(&self, path: &Path, config: String) -> Result<SetFile> {
         match self {
             Self::Folder { folder, .. } => SetFile::open(folder.join(path), config),
@@ -106,33 +114,34 @@ impl Tree {
         }
     }
 
-    /// The whole path of a file, for messages.
-    pub(super) fn whole(&self, path: &Path) -> PathBuf {
+    /// Full path of a file in the tree.
+    pub(super) fn full_path(&self, path: &Path) -> PathBuf {
         self.place().join(path)
     }
 }
 
-/// A walk over a folder.
+/// Scan of a folder and its subfolders.
 struct Scan {
-    /// The folders that links may lead into.
+    /// Folders that links may lead into.
     root: Root,
     files: Vec<PathBuf>,
+    /// Links that lead outside the folders or nowhere.
     outside: Vec<PathBuf>,
 }
 
 impl Scan {
-    fn folder(&mut self, folder: &Path, depth: usize) -> Result<()> {
+    fn add_folder(&mut self, folder: &Path, depth: usize) -> Result<()> {
         for path in reading::entries(folder)? {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             if name.starts_with('.') {
                 continue;
             }
-            let is_link = fs::symlink_metadata(&path).is_ok_and(|facts| facts.is_symlink());
-            if is_link && self.root.leads_to(&path) != LeadsTo::Within {
+            let is_link = fs::symlink_metadata(&path).is_ok_and(|metadata| metadata.is_symlink());
+            if is_link && self.root.locate(&path) != Location::Inside {
                 self.outside.push(path);
             } else if path.is_dir() && !is_link {
-                if depth < DEEPEST {
-                    self.folder(&path, depth + 1)?;
+                if depth < MAX_DEPTH {
+                    self.add_folder(&path, depth + 1)?;
                 }
             } else if path.is_file() {
                 self.files.push(path);
@@ -148,7 +157,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_that_lead_out_are_passed_over() {
+    fn links_out_are_skipped() {
         let outer = tempfile::tempdir().unwrap();
         let at = |name: &str| outer.path().join(name);
         fs::create_dir_all(at("set/inner")).unwrap();
@@ -165,7 +174,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_into_the_cache_of_a_hub_are_followed() {
+    fn links_into_hub_cache_are_followed() {
         let outer = tempfile::tempdir().unwrap();
         let at = |name: &str| outer.path().join("datasets--a--b").join(name);
         fs::create_dir_all(at("snapshots/1")).unwrap();
@@ -174,7 +183,7 @@ mod tests {
             let tree = Tree::from_folder(&at("snapshots/1")).unwrap();
             tree.files().unwrap()
         };
-        // What was not downloaded leads nowhere.
+        // The link leads nowhere until its file is downloaded.
         assert_eq!(found(), (Vec::new(), vec![at("snapshots/1/a.csv")]));
         fs::create_dir(at("blobs")).unwrap();
         fs::write(at("blobs/f00"), "a").unwrap();

@@ -1,80 +1,82 @@
-//! Questions that differ in their answers alone: [`contradictory`], [`leave_out`].
+//! Questions that are equal except for their answers: [`find_contradictions`], [`omit_contradictions`].
 
 use std::collections::{BTreeSet, HashMap};
 
 use super::left_out::{OmissionReason, Omissions};
 use crate::dataset::ready_made::cells::Table;
-use crate::dataset::ready_made::choices::Answered;
+use crate::dataset::ready_made::choices::ParsedQuestion;
 use crate::dataset::ready_made::settings::SetArgs;
 use crate::types::Digest;
 
-/// The pairs of questions whose digests are equal and whose answers differ, by their places. Each question that another contradicts is
-/// in a pair.
-pub(in crate::dataset::ready_made) fn contradictory(
-    answered: &[Answered],
+/// Pairs of indices of questions with equal digests and different answers. Every contradicted question is in at least one pair.
+pub(in crate::dataset::ready_made) fn find_contradictions(
+    questions: &[ParsedQuestion],
     digests: &[Digest],
 ) -> Vec<[usize; 2]> {
-    let truth = |at: usize| answered[at].choices.truth();
+    let truth = |index: usize| questions[index].choices.truth();
     let mut first: HashMap<&Digest, usize> = HashMap::new();
     let mut opposed: HashMap<&Digest, usize> = HashMap::new();
     let mut pairs = Vec::new();
-    for (at, digest) in digests.iter().enumerate() {
-        let first = *first.entry(digest).or_insert(at);
-        if truth(first) != truth(at) {
-            opposed.entry(digest).or_insert(at);
-            pairs.push([first, at]);
+    for (index, digest) in digests.iter().enumerate() {
+        let first = *first.entry(digest).or_insert(index);
+        if truth(first) != truth(index) {
+            opposed.entry(digest).or_insert(index);
+            pairs.push([first, index]);
         }
     }
-    if !opposed.is_empty() {
-        for (at, digest) in digests.iter().enumerate() {
-            let other = opposed
-                .get(digest)
-                .copied()
-                .filter(|_| first[digest] != at && truth(first[digest]) == truth(at));
-            pairs.extend(other.map(|other| [at, other]));
+    if opposed.is_empty() {
+        return pairs;
+    }
+    // Repeats of the first question of a digest contradict the first question with another answer.
+    for (index, digest) in digests.iter().enumerate() {
+        let first = first[digest];
+        if let Some(other) = opposed.get(digest)
+            && first != index
+            && truth(first) == truth(index)
+        {
+            pairs.push([index, *other]);
         }
     }
     pairs
 }
 
-/// Leaves out both questions of each pair that differs in its answers alone, if the user allows it.
+/// Leaves out both questions of each contradictory pair, if the user allows it.
 ///
 /// # Errors
-/// If the user does not; the error names the first pair.
-pub(in crate::dataset::ready_made) fn leave_out(
+/// If the user does not allow it; the error names the first pair.
+pub(in crate::dataset::ready_made) fn omit_contradictions(
     table: &Table,
     args: &SetArgs,
-    answered: &mut Vec<Answered>,
-    left: &mut Omissions,
+    questions: &mut Vec<ParsedQuestion>,
+    omissions: &mut Omissions,
     pairs: &[[usize; 2]],
 ) -> Result<(), String> {
-    let mut wrong = BTreeSet::new();
+    let mut omitted = BTreeSet::new();
     for pair in pairs {
-        for at in pair {
-            let is_new = wrong.insert(*at);
-            if is_new {
-                left.add(OmissionReason::Bad, || {
-                    contradiction(table, answered, *pair)
+        for index in pair {
+            if omitted.insert(*index) {
+                omissions.add(OmissionReason::Bad, || {
+                    describe_contradiction(table, questions, *pair)
                 });
             }
         }
     }
-    left.check(table.rows.len(), args)?;
-    let mut at = 0;
-    answered.retain(|_| {
-        at += 1;
-        !wrong.contains(&(at - 1))
+    omissions.check(table.rows.len(), args)?;
+    let mut index = 0;
+    questions.retain(|_| {
+        index += 1;
+        !omitted.contains(&(index - 1))
     });
-    if answered.is_empty() {
+    if questions.is_empty() {
         return Err("no row is left to ask".to_owned());
     }
     Ok(())
 }
 
-/// Two questions that differ in their answers alone, in words.
-fn contradiction(table: &Table, answered: &[Answered], pair: [usize; 2]) -> String {
-    let [one, other] = pair.map(|at| {
-        let Answered { row, choices, .. } = &answered[at];
+/// Message about two questions that are equal except for their answers.
+fn describe_contradiction(table: &Table, questions: &[ParsedQuestion], pair: [usize; 2]) -> String {
+    let [one, other] = pair.map(|index| {
+        let ParsedQuestion { row, choices, .. } = &questions[index];
         let truth = choices.truth().map_or("", |truth| &choices.texts()[truth]);
         format!("{} ({truth:?})", table.place(*row))
     });

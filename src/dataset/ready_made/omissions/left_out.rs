@@ -1,24 +1,26 @@
-//! Rows that cannot be asked, by the reason: [`Omissions`].
+//! Rows that cannot be asked, by reason: [`Omissions`].
 
 use std::collections::BTreeMap;
 
 use super::skip_bad::SkipBad;
 use crate::dataset::ready_made::settings::{SetArgs, SeveralImages};
 
-/// Why a row cannot be asked.
+/// Reason why a row is not asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(in crate::dataset::ready_made) enum OmissionReason {
     SeveralImages,
     NoImage,
+    /// The question has no options.
     Open,
     SeveralTruths,
+    /// The row is broken.
     Bad,
-    /// A copy of a question in another order of its options, which a preset leaves out.
+    /// A copy of another question with its options in another order, left out by a preset.
     Rotation,
 }
 
 impl OmissionReason {
-    /// The name in the manifest and in messages.
+    /// Name in the manifest and in messages.
     pub(in crate::dataset::ready_made) fn name(self) -> &'static str {
         match self {
             Self::SeveralImages => "several images",
@@ -30,7 +32,7 @@ impl OmissionReason {
         }
     }
 
-    /// The flag that leaves such rows out.
+    /// Flag that leaves such rows out.
     fn flag(self) -> &'static str {
         match self {
             Self::SeveralImages => "--multi-image skip",
@@ -41,7 +43,8 @@ impl OmissionReason {
         }
     }
 
-    fn is_left_out(self, args: &SetArgs) -> bool {
+    /// True if the user allows to leave out such rows.
+    fn is_allowed(self, args: &SetArgs) -> bool {
         match self {
             Self::SeveralImages => args.multi_image == Some(SeveralImages::Skip),
             Self::NoImage => args.no_image.is_some(),
@@ -53,7 +56,7 @@ impl OmissionReason {
     }
 }
 
-/// The rows that are not asked: how many, and the place and problem of the first.
+/// Number of rows that are not asked, with a description of the first, by reason.
 #[derive(Debug, Default)]
 pub(in crate::dataset::ready_made) struct Omissions {
     counts: BTreeMap<OmissionReason, (usize, String)>,
@@ -63,39 +66,41 @@ impl Omissions {
     /// Adds a row with its problem.
     pub(in crate::dataset::ready_made) fn add(
         &mut self,
-        why: OmissionReason,
+        reason: OmissionReason,
         problem: impl FnOnce() -> String,
     ) {
-        let entry = self.counts.entry(why).or_insert_with(|| (0, problem()));
-        entry.0 += 1;
+        let (count, _) = self.counts.entry(reason).or_insert_with(|| (0, problem()));
+        *count += 1;
     }
 
-    /// How many rows are left out, by the reason.
+    /// Number of rows left out, by reason.
     pub(in crate::dataset::ready_made) fn counts(
         &self,
     ) -> impl Iterator<Item = (OmissionReason, usize)> {
-        self.counts.iter().map(|(why, (count, _))| (*why, *count))
+        self.counts
+            .iter()
+            .map(|(reason, (count, _))| (*reason, *count))
     }
 
-    /// The number of broken rows, and the problem of the first; `None` if there are none.
+    /// Number of broken rows, and the problem of the first; `None` if there are none.
     pub(in crate::dataset::ready_made) fn bad(&self) -> Option<(usize, &str)> {
         let (count, first) = self.counts.get(&OmissionReason::Bad)?;
         Some((*count, first))
     }
 
-    /// Checks that the user allows all of it.
+    /// Checks that the user allows all omissions; `rows` is the number of rows of the set.
     ///
     /// # Errors
-    /// One line for each reason that no flag allows: the count, the first row, and the flag.
+    /// One line for each reason that is not allowed, with the number of rows, the first row, and the flag that allows it.
     pub(in crate::dataset::ready_made) fn check(
         &self,
         rows: usize,
         args: &SetArgs,
     ) -> Result<(), String> {
         let mut problems = Vec::new();
-        for (why, (count, first)) in &self.counts {
-            let (why, head) = (*why, format!("{count} of {rows} rows"));
-            let head = match why {
+        for (&reason, (count, first)) in &self.counts {
+            let head = format!("{count} of {rows} rows");
+            let head = match reason {
                 OmissionReason::SeveralImages => format!("{head} show {first}"),
                 OmissionReason::NoImage => format!("no image in {head}"),
                 OmissionReason::Open => {
@@ -108,19 +113,19 @@ impl Omissions {
                     format!("{head} are broken; the first: {first}")
                 }
             };
-            let skip = args.bad.filter(|_| why == OmissionReason::Bad);
+            let skip = args.bad.filter(|_| reason == OmissionReason::Bad);
             if let Some(Err(problem)) = skip.map(|skip| skip.check(*count, rows, "rows", first)) {
                 problems.push(problem);
-            } else if !why.is_left_out(args) {
+            } else if !reason.is_allowed(args) {
                 let verb = match count {
                     1 => "leaves it out",
                     _ => "leaves them out",
                 };
-                let flag = match why {
-                    OmissionReason::Bad => SkipBad::enough(*count, rows).flag(),
-                    why => why.flag().to_owned(),
+                let flag = match reason {
+                    OmissionReason::Bad => SkipBad::allowing(*count, rows).flag(),
+                    reason => reason.flag().to_owned(),
                 };
-                let other = match why {
+                let other = match reason {
                     OmissionReason::SeveralImages => {
                         ", --multi-image send shows all of them in one request"
                     }
@@ -142,7 +147,7 @@ mod tests {
     use crate::dataset::ready_made::settings::LeaveOut;
 
     #[test]
-    fn nothing_is_left_out_without_a_word_of_the_user() {
+    fn rows_are_left_out_only_with_flags() {
         let mut left = Omissions::default();
         assert!(left.check(40, &SetArgs::default()).is_ok());
         left.add(OmissionReason::NoImage, String::new);
@@ -160,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn many_bad_rows_are_never_left_out() {
+    fn too_many_bad_rows_are_an_error() {
         let args = SetArgs {
             bad: Some(SkipBad::default()),
             ..SetArgs::default()

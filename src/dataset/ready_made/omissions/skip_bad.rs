@@ -1,23 +1,22 @@
-//! The share of a set that may be left out because it is broken: [`SkipBad`].
+//! Maximum share of broken rows and images to leave out: [`SkipBad`].
 
 use std::fmt;
 use std::str::FromStr;
 
-/// The largest share of a set that is left out if the user names none, in percent (chosen).
-const USUAL_PERCENT: f64 = 5.0;
+/// Default maximum share, in percent (chosen).
+const DEFAULT_PERCENT: f64 = 5.0;
 
-/// Broken rows and unusable images are left out, up to a share of all.
+/// Value of `--skip bad`: leave out broken rows and unusable images, up to a share of all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkipBad {
-    /// The largest share, in percent.
-    most: f64,
+    max_percent: f64,
 }
 
 impl SkipBad {
-    /// Checks that a number of broken rows or images of a set may be left out. `first` is the problem of the first of them.
+    /// Checks that `bad` of `all` rows or images may be left out. `noun` names them, and `first` is the problem of the first.
     ///
     /// # Errors
-    /// If they are more than the share. The error names the flag that allows as many.
+    /// If their share is too large. The error names the flag that allows it.
     pub(crate) fn check(
         self,
         bad: usize,
@@ -25,42 +24,41 @@ impl SkipBad {
         noun: &str,
         first: &str,
     ) -> Result<(), String> {
-        if share(bad, all) <= self.most {
+        if percent(bad, all) <= self.max_percent {
             return Ok(());
         }
         Err(format!(
             "{bad} of {all} {noun} are broken; the first: {first}; {} leaves out at most {} %: repair the data, or raise the limit with {}",
             self.flag(),
-            self.most,
-            Self::enough(bad, all).flag()
+            self.max_percent,
+            Self::allowing(bad, all).flag()
         ))
     }
 
-    /// The flag with the share, as it is typed.
+    /// The flag as typed by the user.
     pub(crate) fn flag(self) -> String {
         if self == Self::default() {
             return "--skip bad".to_owned();
         }
-        format!("--skip bad={}%", self.most)
+        format!("--skip bad={}%", self.max_percent)
     }
 
-    /// The usual share, or one in whole percent that allows a number of broken rows of a set.
-    pub(crate) fn enough(bad: usize, all: usize) -> Self {
+    /// The default share, or the lowest larger one in whole percent that allows `bad` of `all`.
+    pub(crate) fn allowing(bad: usize, all: usize) -> Self {
         Self {
-            most: share(bad, all).ceil().max(USUAL_PERCENT),
+            max_percent: percent(bad, all).ceil().max(DEFAULT_PERCENT),
         }
     }
 }
 
-/// A share in percent.
-fn share(part: usize, all: usize) -> f64 {
+fn percent(part: usize, all: usize) -> f64 {
     100.0 * part as f64 / all.max(1) as f64
 }
 
 impl Default for SkipBad {
     fn default() -> Self {
         Self {
-            most: USUAL_PERCENT,
+            max_percent: DEFAULT_PERCENT,
         }
     }
 }
@@ -70,7 +68,7 @@ impl fmt::Display for SkipBad {
         if *self == Self::default() {
             return f.write_str("skip");
         }
-        write!(f, "skip:{}%", self.most)
+        write!(f, "skip:{}%", self.max_percent)
     }
 }
 
@@ -92,7 +90,7 @@ impl FromStr for SkipBad {
         if !(0.0..=100.0).contains(&share) {
             return Err("a share from 0% to 100% expected".to_owned());
         }
-        Ok(Self { most: share })
+        Ok(Self { max_percent: share })
     }
 }
 
@@ -101,8 +99,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_share_is_read_and_written() {
-        for (text, most) in [
+    fn share_is_parsed_and_printed() {
+        for (text, max_percent) in [
             ("skip", 5.0),
             ("skip:20%", 20.0),
             ("20%", 20.0),
@@ -110,7 +108,7 @@ mod tests {
             ("skip:100", 100.0),
         ] {
             let skip: SkipBad = text.parse().unwrap();
-            assert_eq!(skip, SkipBad { most }, "{text}");
+            assert_eq!(skip, SkipBad { max_percent }, "{text}");
             assert_eq!(skip.to_string().parse(), Ok(skip));
         }
         for wrong in [
@@ -127,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn more_than_the_share_is_refused_with_the_flag_that_allows_it() {
+    fn larger_share_is_refused_with_the_flag_that_allows_it() {
         let usual = SkipBad::default();
         assert_eq!(usual.check(1, 20, "rows", "a"), Ok(()));
         let problem = usual.check(3, 40, "rows", "line 3").unwrap_err();

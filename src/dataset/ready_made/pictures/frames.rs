@@ -1,15 +1,16 @@
-//! The frames of the questions of a set: [`Frames`].
+//! Frames of the questions of a set: [`Frames`].
 
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::hash::Hash;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::images::{CellPart, EmbeddedImage, ImageForm, RowImage, images};
 use crate::dataset::Root;
 use crate::dataset::image_source::ImageSource;
-use crate::dataset::ready_made::cells::{Cell, FileFacts, LONGEST_NAME, Step, Table};
-use crate::dataset::ready_made::choices::Answered;
-use crate::dataset::ready_made::columns::map::flag;
+use crate::dataset::ready_made::cells::{Cell, FileFacts, MAX_NAME_LENGTH, Step, Table};
+use crate::dataset::ready_made::choices::ParsedQuestion;
+use crate::dataset::ready_made::columns::map::map_flag;
 use crate::dataset::ready_made::columns::names::Role;
 use crate::dataset::ready_made::columns::{Column, Roles};
 use crate::dataset::ready_made::container::{Archive, SetFile};
@@ -18,8 +19,8 @@ use crate::error::{Error, Result};
 use crate::types::text::excerpt;
 use crate::types::{Digest, FrameId};
 
-/// The image of a question, found.
-pub(super) enum Found {
+/// Image of a question.
+pub(super) enum LocatedImage {
     /// In a cell of a row.
     Cell {
         row: usize,
@@ -27,34 +28,34 @@ pub(super) enum Found {
         steps: Vec<Step>,
         facts: FileFacts,
     },
-    /// In a file: the name of its frame and its path.
+    /// An image file: the name of its frame and its path.
     File(FrameId, PathBuf),
-    /// In a file of the archive.
+    /// An image file in the archive.
     Member(FrameId),
     /// A frame of other data.
     Frame(FrameId),
 }
 
-/// The frames of a set. Equal bytes in cells are one frame, with one noise.
+/// Names and collects the frames of a set. Equal image data in several cells are one frame, with one noise seed.
 pub(in crate::dataset::ready_made) struct Frames<'a> {
     pub(super) table: &'a Table,
     root: &'a Root,
-    /// The ZIP file that holds the set.
+    /// ZIP file of the set.
     pub(super) archive: Option<&'a Arc<Archive>>,
     files: &'a [Arc<SetFile>],
-    /// The row of each file and id whose own cell holds an image.
-    holders: HashMap<(usize, String), usize>,
+    /// Row with the embedded image that other rows refer to, by file and row id.
+    image_rows: HashMap<(usize, String), usize>,
     pub(super) roles: &'a Roles,
-    kind: ImageForm,
-    /// The part of the row that holds the image, by the column and the steps in its cell.
+    form: ImageForm,
+    /// Shared parts of rows, by column and path in its cell.
     parts: HashMap<(usize, Vec<Step>), Arc<CellPart>>,
-    /// The name of each image in a cell.
+    /// Names of embedded images.
     names: HashMap<Digest, FrameId>,
     sources: BTreeMap<FrameId, ImageSource>,
     series: Series,
 }
 
-/// The images of each row that shows several, by the name of all of them together.
+/// Images of each row with several, by the name that stands for all of them.
 pub(in crate::dataset) type Series = BTreeMap<FrameId, Vec<FrameId>>;
 
 impl<'a> Frames<'a> {
@@ -64,7 +65,7 @@ impl<'a> Frames<'a> {
         archive: Option<&'a Arc<Archive>>,
         files: &'a [Arc<SetFile>],
         roles: &'a Roles,
-        kind: ImageForm,
+        form: ImageForm,
         several: Option<SeveralImages>,
     ) -> Self {
         let mut frames = Self {
@@ -72,9 +73,9 @@ impl<'a> Frames<'a> {
             root,
             archive,
             files,
-            holders: HashMap::new(),
+            image_rows: HashMap::new(),
             roles,
-            kind,
+            form,
             parts: HashMap::new(),
             names: HashMap::new(),
             sources: BTreeMap::new(),
@@ -84,35 +85,24 @@ impl<'a> Frames<'a> {
         frames
     }
 
-    /// Names the images in cells: by the least id of the rows that hold one, so that the order of rows does not matter; without ids
-    /// that differ, by their content. The images of a row that shows several are numbered behind its id: `7#1`, `7#2`.
+    /// Names embedded images by the lowest id of the rows that have them, so that the order of rows does not matter, or by their content
+    /// if no id column is unique. Several images of a row get its id and a number: `7#1`, `7#2`.
     fn name_embedded(&mut self, several: Option<SeveralImages>) {
-        let mut ids = self.roles.ids.iter().filter(|column| {
-            let mut seen = HashSet::new();
-            let texts = self.table.rows.iter().map(|row| column.text(row));
-            texts
-                .into_iter()
-                .all(|text| text.is_some_and(|text| seen.insert(text.trim().to_owned())))
-        });
-        let unique = ids.next();
-        // Within a file, rows are named by the first column whose values differ there.
-        let differs = |column: &&Column| {
-            let mut seen = HashSet::new();
-            self.table.rows.iter().all(|row| {
-                let text = column.text(row);
-                text.is_some_and(|text| seen.insert((row.file, text.trim().to_owned())))
-            })
-        };
-        let named = unique.or_else(|| self.roles.ids.iter().find(differs));
-        let mut name_rows = false;
+        let id_column = self
+            .roles
+            .ids
+            .iter()
+            .find(|column| self.is_unique(column, |_, text| text));
+        let mut has_row_references = false;
         for row in &self.table.rows {
             let found = images(row, self.roles);
-            let is_name = |image: &RowImage| matches!(image, RowImage::RowOrFile(_));
-            name_rows |= found.iter().any(is_name);
+            has_row_references |= found
+                .iter()
+                .any(|image| matches!(image, RowImage::RowOrFile(_)));
             if found.len() > 1 && several != Some(SeveralImages::Send) {
                 continue;
             }
-            let id = unique.and_then(|column| column.text(row));
+            let id = id_column.and_then(|column| column.text(row));
             for (number, image) in (1..).zip(&found) {
                 let RowImage::Embedded { facts, .. } = image else {
                     continue;
@@ -126,52 +116,74 @@ impl<'a> Frames<'a> {
                     .names
                     .entry(facts.digest)
                     .or_insert_with(|| FrameId(name.clone()));
-                if order(&name) < order(&known.0) {
+                if id_order(&name) < id_order(&known.0) {
                     *known = FrameId(name);
                 }
             }
         }
-        self.tell_apart();
-        if name_rows && let Some(column) = named {
-            self.find_holders(column);
+        self.resolve_name_clashes();
+        if !has_row_references {
+            return;
+        }
+        // A row id need only be unique in its file.
+        let row_id_column = id_column.or_else(|| {
+            self.roles
+                .ids
+                .iter()
+                .find(|column| self.is_unique(column, |file, text| (file, text)))
+        });
+        if let Some(column) = row_id_column {
+            self.index_image_rows(column);
         }
     }
 
-    /// Finds the rows that others may name by their ids, in this column.
-    fn find_holders(&mut self, column: &Column) {
-        for (at, row) in self.table.rows.iter().enumerate() {
+    /// True if every row has a text in the column and the keys made of its file and text are unique.
+    fn is_unique<K: Eq + Hash>(&self, column: &Column, key: impl Fn(usize, String) -> K) -> bool {
+        let mut seen = HashSet::new();
+        self.table.rows.iter().all(|row| {
+            column
+                .text(row)
+                .is_some_and(|text| seen.insert(key(row.file, text.trim().to_owned())))
+        })
+    }
+
+    /// Finds the rows whose images other rows may refer to by their ids in this column.
+    fn index_image_rows(&mut self, column: &Column) {
+        for (index, row) in self.table.rows.iter().enumerate() {
             let found = images(row, self.roles);
             if let ([RowImage::Embedded { .. }], Some(id)) = (&*found, column.text(row)) {
                 let key = (row.file, id.trim().to_owned());
-                self.holders.entry(key).or_insert(at);
+                self.image_rows.entry(key).or_insert(index);
             }
         }
     }
 
-    /// Names images by their content where an id ends as the number of an image does, so that two images had one name.
-    fn tell_apart(&mut self) {
-        let mut holders = HashMap::<FrameId, usize>::new();
+    /// Names images by their content if they share a name, such as an id `7#1` and the first image of the row `7`.
+    fn resolve_name_clashes(&mut self) {
+        let mut counts = HashMap::<FrameId, usize>::new();
         for name in self.names.values() {
-            *holders.entry(name.clone()).or_default() += 1;
+            *counts.entry(name.clone()).or_default() += 1;
         }
         for (digest, name) in &mut self.names {
-            if holders[name] > 1 {
+            if counts[name] > 1 {
                 *name = FrameId(content_name(digest));
             }
         }
     }
 
-    /// The images of a row, in order.
-    pub(super) fn in_row(&self, row: usize) -> impl Iterator<Item = Result<Found>> {
-        let images = self.kind.in_row(&self.table.rows[row], self.roles);
-        images.into_iter().map(move |image| self.find(row, image))
+    /// Images of a row, in order.
+    pub(super) fn in_row(&self, row: usize) -> impl Iterator<Item = Result<LocatedImage>> {
+        self.form
+            .in_row(&self.table.rows[row], self.roles)
+            .into_iter()
+            .map(move |image| self.locate(row, image))
     }
 
-    /// Why an image of a row cannot be used; `None` if all are there. Files are not opened.
+    /// Error for the first unusable image of a row; `None` if all exist. Files are not opened.
     pub(in crate::dataset::ready_made) fn problem(&self, row: usize) -> Option<Error> {
-        self.in_row(row).find_map(|found| match found {
+        self.in_row(row).find_map(|image| match image {
             Err(problem) => Some(problem),
-            Ok(Found::Cell { row, facts, .. }) if facts.format.is_none() => {
+            Ok(LocatedImage::Cell { row, facts, .. }) if facts.format.is_none() => {
                 let problem = "the cell of its image holds bytes that are no image";
                 Some(Error::data(self.table.place(row), problem))
             }
@@ -179,15 +191,15 @@ impl<'a> Frames<'a> {
         })
     }
 
-    /// An image of a row.
-    fn find(&self, row: usize, image: RowImage) -> Result<Found> {
-        let at = |problem| Error::data(self.table.place(row), problem);
+    /// Finds an image that a row refers to.
+    fn locate(&self, row: usize, image: RowImage) -> Result<LocatedImage> {
+        let row_error = |problem| Error::data(self.table.place(row), problem);
         match image {
             RowImage::Embedded {
                 column,
                 steps,
                 facts,
-            } => Ok(Found::Cell {
+            } => Ok(LocatedImage::Cell {
                 row,
                 column,
                 steps,
@@ -195,14 +207,14 @@ impl<'a> Frames<'a> {
             }),
             RowImage::File(path) => self
                 .file(row, &path)
-                .map_err(|problem| at(self.with_other(row, no_path(&path, problem)))),
-            RowImage::Frame(name) => Ok(Found::Frame(FrameId(name))),
-            RowImage::RowOrFile(text) => match self.holder(row, &text) {
-                Some(found) => Ok(found),
+                .map_err(|problem| row_error(self.explain_path_error(row, &path, problem))),
+            RowImage::Frame(name) => Ok(LocatedImage::Frame(FrameId(name))),
+            RowImage::RowOrFile(text) => match self.image_of_row(row, &text) {
+                Some(image) => Ok(image),
                 None => self.file(row, &text).map_err(|problem| {
-                    let problem = self.with_other(row, no_path(&text, problem));
+                    let problem = self.explain_path_error(row, &text, problem);
                     let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
-                    at(if is_number {
+                    row_error(if is_number {
                         format!("{problem}; and no row with an image has the id {text}")
                     } else {
                         problem
@@ -212,84 +224,92 @@ impl<'a> Frames<'a> {
         }
     }
 
-    /// A problem of the path in a row, with the column that holds an image in its place.
-    fn with_other(&self, row: usize, problem: String) -> String {
+    /// Improves the error for a path in a row: says if the text is not a path, and suggests a column of the row that has an image.
+    fn explain_path_error(&self, row: usize, text: &str, problem: String) -> String {
+        let problem = explain_non_path(text, problem);
         let row = &self.table.rows[row];
-        let columns = self.table.columns.iter().enumerate();
-        let holds_image = |at: usize| match row.cell(at) {
-            Cell::File(facts) => facts.format.is_some(),
-            Cell::Fields(_) => matches!(row.cell(at).field("bytes"), Some(Cell::File(_))),
-            _ => false,
-        };
-        let mut holders = columns.filter(|(at, _)| holds_image(*at));
-        match holders.next() {
+        let image_column =
+            self.table
+                .columns
+                .iter()
+                .enumerate()
+                .find(|(index, _)| match row.cell(*index) {
+                    Cell::File(facts) => facts.format.is_some(),
+                    cell @ Cell::Fields(_) => matches!(cell.field("bytes"), Some(Cell::File(_))),
+                    _ => false,
+                });
+        match image_column {
             Some((_, name)) => format!(
                 "{problem}; the column {name:?} holds images: {}",
-                flag(Role::Image, name, None)
+                map_flag(Role::Image, name, None)
             ),
             None => problem,
         }
     }
 
-    /// The image in the cell of the row with this id.
-    fn holder(&self, row: usize, id: &str) -> Option<Found> {
+    /// Embedded image of another row, found by its id.
+    fn image_of_row(&self, row: usize, id: &str) -> Option<LocatedImage> {
         let file = self.table.rows[row].file;
-        let holder = *self.holders.get(&(file, id.trim().to_owned()))?;
-        let own = images(&self.table.rows[holder], self.roles);
+        let other = *self.image_rows.get(&(file, id.trim().to_owned()))?;
+        let found = images(&self.table.rows[other], self.roles);
         let [
             RowImage::Embedded {
                 column,
                 steps,
                 facts,
             },
-        ] = &*own
+        ] = &*found
         else {
             return None;
         };
-        (holder != row).then(|| Found::Cell {
-            row: holder,
+        (other != row).then(|| LocatedImage::Cell {
+            row: other,
             column: *column,
             steps: steps.clone(),
             facts: facts.clone(),
         })
     }
 
-    /// The file that a row names: below the folder of its table, or below that of the set.
-    fn file(&self, row: usize, path: &str) -> Result<Found, String> {
+    /// File of a path in a row, relative to the folder of its table, or else to the folder of the set.
+    fn file(&self, row: usize, path: &str) -> Result<LocatedImage, String> {
         let file = &self.table.files[self.table.rows[row].file];
         if let (Some(archive), Some(inner)) = (self.archive, &file.inner) {
-            return member(archive, inner, path).map(Found::Member);
+            return find_member(archive, inner, path).map(LocatedImage::Member);
         }
-        let table = &file.path;
-        let base = table.parent().unwrap_or(Path::new(""));
-        let found = self.root.image(base, path);
-        let found = match found {
+        let base = file.path.parent().unwrap_or(Path::new(""));
+        let (name, path) = match self.root.image(base, path) {
             Err(problem) if base != self.root.folder() => self
                 .root
                 .image(self.root.folder(), path)
-                .map_err(|_| problem),
-            found => found,
+                .map_err(|_| problem)?,
+            found => found?,
         };
-        found.map(|(name, path)| Found::File(name, path))
+        Ok(LocatedImage::File(name, path))
     }
 
-    /// The frame of a question; of a question about several images the name of all of them together. The sources are kept.
-    pub(in crate::dataset::ready_made) fn frame(&mut self, answered: &Answered) -> Result<FrameId> {
-        let found: Vec<Found> = self.in_row(answered.row).collect::<Result<_>>()?;
-        let shown: Vec<FrameId> = found.into_iter().map(|found| self.keep(found)).collect();
-        if let [only] = &*shown {
+    /// Frame of a question, or the name that stands for all frames of a question with several images. Adds their sources.
+    pub(in crate::dataset::ready_made) fn frame(
+        &mut self,
+        question: &ParsedQuestion,
+    ) -> Result<FrameId> {
+        let images: Vec<LocatedImage> = self.in_row(question.row).collect::<Result<_>>()?;
+        let frames: Vec<FrameId> = images
+            .into_iter()
+            .map(|image| self.add_source(image))
+            .collect();
+        if let [only] = &*frames {
             return Ok(only.clone());
         }
-        let name = series_name(&shown);
-        self.series.insert(name.clone(), shown);
+        let name = series_name(&frames);
+        self.series.insert(name.clone(), frames);
         Ok(name)
     }
 
-    /// The name of an image. Its source is kept.
-    fn keep(&mut self, found: Found) -> FrameId {
-        match found {
-            Found::Frame(name) => name,
-            Found::Member(name) => {
+    /// Adds the source of an image, and returns the name of its frame.
+    fn add_source(&mut self, image: LocatedImage) -> FrameId {
+        match image {
+            LocatedImage::Frame(name) => name,
+            LocatedImage::Member(name) => {
                 if let Some(archive) = self.archive {
                     let archive = Arc::clone(archive);
                     self.sources
@@ -298,29 +318,34 @@ impl<'a> Frames<'a> {
                 }
                 name
             }
-            Found::File(name, path) => {
+            LocatedImage::File(name, path) => {
                 self.sources
                     .entry(name.clone())
                     .or_insert_with(|| ImageSource::image(path));
                 name
             }
-            Found::Cell {
+            LocatedImage::Cell {
                 row,
                 column,
                 steps,
                 facts,
             } => {
-                let name = self.names.get(&facts.digest).cloned();
-                let name = name.unwrap_or_else(|| FrameId(content_name(&facts.digest)));
+                let name = self
+                    .names
+                    .get(&facts.digest)
+                    .cloned()
+                    .unwrap_or_else(|| FrameId(content_name(&facts.digest)));
                 let row = &self.table.rows[row];
                 let columns = &self.table.columns;
-                let part = self.parts.entry((column, steps));
-                let part = part.or_insert_with_key(|(column, steps)| {
-                    Arc::new(CellPart {
-                        column: columns[*column].clone(),
-                        steps: steps.clone(),
-                    })
-                });
+                let part =
+                    self.parts
+                        .entry((column, steps))
+                        .or_insert_with_key(|(column, steps)| {
+                            Arc::new(CellPart {
+                                column: columns[*column].clone(),
+                                steps: steps.clone(),
+                            })
+                        });
                 self.sources.entry(name.clone()).or_insert_with(|| {
                     ImageSource::Embedded(EmbeddedImage {
                         file: Arc::clone(&self.files[row.file]),
@@ -334,7 +359,7 @@ impl<'a> Frames<'a> {
         }
     }
 
-    /// The sources of all frames that were asked for, and the images of rows that show several.
+    /// Takes out the sources of all added frames, and the images of questions with several.
     pub(in crate::dataset::ready_made) fn take_sources(
         &mut self,
     ) -> (BTreeMap<FrameId, ImageSource>, Series) {
@@ -345,20 +370,20 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// The length from which on a text is hardly a path; chosen.
-const LONG: usize = 200;
+/// Maximum length of a path in error messages, in characters (chosen).
+const MAX_PATH_LENGTH: usize = 200;
 
-/// The problem of a text that leads to no image: that of its path, or what it is if it is hardly a path. Long texts are not repeated.
-fn no_path(text: &str, problem: String) -> String {
+/// Replaces the error for a path if the text is damaged base64 or too long for a path. Long texts are not repeated in the message.
+fn explain_non_path(text: &str, problem: String) -> String {
     let is_base64 = |c: char| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace();
     let length = text.chars().count();
     let start = excerpt(text, 24);
-    let is_long = length > LONGEST_NAME && text.chars().all(is_base64);
+    let is_long = length > MAX_NAME_LENGTH && text.chars().all(is_base64);
     if text.starts_with("data:") || is_long {
         format!(
             "its image is base64 that is cut or damaged ({length} characters, {start:?}); --skip bad leaves such rows out"
         )
-    } else if length > LONG {
+    } else if length > MAX_PATH_LENGTH {
         format!(
             "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file; --skip bad leaves such rows out"
         )
@@ -367,11 +392,11 @@ fn no_path(text: &str, problem: String) -> String {
     }
 }
 
-/// The file of an archive that a row names: below the folder of its table, or from the top.
+/// Finds the file of a path in the archive, relative to the folder of the table, or else to the top folder.
 ///
 /// # Errors
-/// If there is none, or both are there.
-fn member(archive: &Archive, folder: &Path, path: &str) -> Result<FrameId, String> {
+/// If there is no such file, or both paths lead to different files.
+fn find_member(archive: &Archive, folder: &Path, path: &str) -> Result<FrameId, String> {
     let top = archive.find(Path::new(""), path);
     match (archive.find(folder, path), top) {
         (Ok(near), Ok(top)) if near != top => Err(format!(
@@ -385,12 +410,12 @@ fn member(archive: &Archive, folder: &Path, path: &str) -> Result<FrameId, Strin
     }
 }
 
-/// The name of a frame by the content of its image.
+/// Name of a frame by the content of its image.
 fn content_name(digest: &Digest) -> String {
     format!("image-{}", &digest.to_string()[..12])
 }
 
-/// The name of several images in this order: that of the first, how many follow, and a digest of all names.
+/// Name for several images in this order: the name of the first, the number of others, and a digest of all names.
 fn series_name(frames: &[FrameId]) -> FrameId {
     let digest = Digest::from_parts(frames.iter().map(|frame| frame.0.as_bytes()));
     let first = frames.first().map_or("", |frame| &frame.0);
@@ -398,7 +423,7 @@ fn series_name(frames: &[FrameId]) -> FrameId {
     FrameId(format!("{first} +{more} ({})", &digest.to_string()[..12]))
 }
 
-/// The order of ids: shorter ones first, so that numbers are in the order of their values.
-fn order(id: &str) -> (usize, &str) {
+/// Sort key of ids: shorter ones first, so that numbers are in numerical order.
+fn id_order(id: &str) -> (usize, &str) {
     (id.len(), id)
 }

@@ -1,88 +1,73 @@
-//! The ids of the questions of a set: [`Ids`].
+//! Ids of the questions of a set: [`Ids`].
 
 use std::collections::{HashMap, HashSet};
 
-use super::frames::{Found, Frames};
-use crate::dataset::ready_made::choices::Answered;
+use super::frames::{Frames, LocatedImage};
+use crate::dataset::ready_made::choices::ParsedQuestion;
 use crate::dataset::ready_made::columns::Column;
-use crate::dataset::ready_made::omissions::contradictory;
+use crate::dataset::ready_made::omissions::find_contradictions;
 use crate::error::Result;
 use crate::files::reading;
 use crate::types::{Digest, FrameId, QuestionId};
 
-/// The ids of questions.
+/// Ids of the questions of a set.
 #[derive(Debug)]
 pub(in crate::dataset::ready_made) struct Ids {
     texts: Vec<String>,
-    /// The column, or that they follow from the content.
-    name: String,
+    source: String,
     note: Option<String>,
-    /// The places of two questions that differ in their answers alone.
-    contradictory: Vec<[usize; 2]>,
+    contradictions: Vec<[usize; 2]>,
 }
 
 impl Ids {
-    /// The pairs of questions that differ in their answers alone, by their places.
-    pub(in crate::dataset::ready_made) fn contradictory(&self) -> &[[usize; 2]] {
-        &self.contradictory
+    /// Pairs of indices of questions that are equal except for their answers.
+    pub(in crate::dataset::ready_made) fn contradictions(&self) -> &[[usize; 2]] {
+        &self.contradictions
     }
 
-    pub(in crate::dataset::ready_made) fn id(&self, question: usize) -> QuestionId {
-        QuestionId(self.texts[question].clone())
+    /// Id of the question with this index.
+    pub(in crate::dataset::ready_made) fn id(&self, index: usize) -> QuestionId {
+        QuestionId(self.texts[index].clone())
     }
 
-    /// The column, or `content`.
-    pub(in crate::dataset::ready_made) fn name(&self) -> String {
-        self.name.clone()
+    /// Name of the column of ids, or `content`.
+    pub(in crate::dataset::ready_made) fn source(&self) -> &str {
+        &self.source
     }
 
-    /// A note to the user about the identifiers.
+    /// Note for the user about repeated questions.
     pub(in crate::dataset::ready_made) fn note(&self) -> Option<String> {
         self.note.clone()
     }
 }
 
-/// Ids by content, and the number of repeats.
-type ContentIds = (Vec<String>, usize);
-
-/// By what images are told apart.
+/// How images are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ImagesBy {
-    /// The bytes of each; every file is read.
+enum ImageIdentity {
+    /// By their bytes. Every file is read.
     Content,
-    /// The bytes of those in cells, of which the digests are known, and the names of files. Nothing is read.
+    /// Embedded images by digest, image files by name. No file is opened.
     Name,
 }
 
 impl Frames<'_> {
-    /// The ids of the questions: those of the first column in which all differ, or by content.
-    pub(in crate::dataset::ready_made) fn ids(&self, answered: &[Answered]) -> Result<Ids> {
-        let texts = |column: &Column| -> Option<Vec<String>> {
-            answered
-                .iter()
-                .map(|answered| &self.table.rows[answered.row])
-                .map(|row| Some(column.text(row)?.trim().to_owned()))
-                .collect()
-        };
+    /// Makes ids for the questions: from the first column with a different value for each, else from their content.
+    pub(in crate::dataset::ready_made) fn ids(&self, questions: &[ParsedQuestion]) -> Result<Ids> {
         for column in &self.roles.ids {
-            let Some(texts) = texts(column) else {
+            let Some(texts) = self.unique_texts(column, questions) else {
                 continue;
             };
-            let mut seen = HashSet::new();
-            if texts.iter().all(|text| seen.insert(text)) {
-                drop(seen);
-                let digests = self.digests(answered, ImagesBy::Name)?;
-                return Ok(Ids {
-                    texts,
-                    name: column.name.clone(),
-                    note: None,
-                    contradictory: contradictory(answered, &digests),
-                });
-            }
+            let digests = self.digests(questions, ImageIdentity::Name)?;
+            return Ok(Ids {
+                texts,
+                source: column.name.clone(),
+                note: None,
+                contradictions: find_contradictions(questions, &digests),
+            });
         }
-        let digests = self.digests(answered, ImagesBy::Content)?;
+        let digests = self.digests(questions, ImageIdentity::Content)?;
         let (texts, repeats) = ids_by_content(&digests);
-        let name = match &*self.roles.ids {
+        let source = match &*self.roles.ids {
             [] => "content".to_owned(),
             [column, ..] => format!("content ({} does not tell all rows apart)", column.name),
         };
@@ -91,25 +76,45 @@ impl Frames<'_> {
         });
         Ok(Ids {
             texts,
-            name,
+            source,
             note,
-            contradictory: contradictory(answered, &digests),
+            contradictions: find_contradictions(questions, &digests),
         })
     }
 
-    /// The digest of each question over its images, its text and its options.
-    fn digests(&self, answered: &[Answered], by: ImagesBy) -> Result<Vec<Digest>> {
+    /// Texts of the questions in a column; `None` if one is missing or two are equal.
+    fn unique_texts(&self, column: &Column, questions: &[ParsedQuestion]) -> Option<Vec<String>> {
+        let mut seen = HashSet::new();
+        questions
+            .iter()
+            .map(|question| {
+                let text = column
+                    .text(&self.table.rows[question.row])?
+                    .trim()
+                    .to_owned();
+                seen.insert(text.clone()).then_some(text)
+            })
+            .collect()
+    }
+
+    /// Digest of each question over its images, its text and its options.
+    fn digests(
+        &self,
+        questions: &[ParsedQuestion],
+        identity: ImageIdentity,
+    ) -> Result<Vec<Digest>> {
         let mut files: HashMap<FrameId, Digest> = HashMap::new();
-        answered
+        questions
             .iter()
             .map(|question| {
                 let images: Vec<Digest> = self
                     .in_row(question.row)
-                    .map(|found| match (found?, by) {
-                        (Found::Member(name) | Found::File(name, _), ImagesBy::Name) => {
-                            Ok(Digest::from_bytes(name.0.as_bytes()))
-                        }
-                        (found, _) => self.image_digest(found, &mut files),
+                    .map(|image| match (image?, identity) {
+                        (
+                            LocatedImage::Member(name) | LocatedImage::File(name, _),
+                            ImageIdentity::Name,
+                        ) => Ok(Digest::from_bytes(name.0.as_bytes())),
+                        (image, _) => self.image_digest(image, &mut files),
                     })
                     .collect::<Result<_>>()?;
                 let options = question.choices.texts().iter().map(String::as_bytes);
@@ -120,20 +125,28 @@ impl Frames<'_> {
             .collect()
     }
 
-    /// The digest of an image. Files that were read are kept in `files`.
-    fn image_digest(&self, found: Found, files: &mut HashMap<FrameId, Digest>) -> Result<Digest> {
-        let (name, digest) = match found {
-            Found::Cell { facts, .. } => return Ok(facts.digest),
-            Found::Frame(name) => return Ok(Digest::from_bytes(name.0.as_bytes())),
-            Found::Member(name) | Found::File(name, _) if files.contains_key(&name) => {
+    /// Digest of an image. `files` caches the digests of files.
+    fn image_digest(
+        &self,
+        image: LocatedImage,
+        files: &mut HashMap<FrameId, Digest>,
+    ) -> Result<Digest> {
+        let (name, digest) = match image {
+            LocatedImage::Cell { facts, .. } => return Ok(facts.digest),
+            LocatedImage::Frame(name) => return Ok(Digest::from_bytes(name.0.as_bytes())),
+            LocatedImage::Member(name) | LocatedImage::File(name, _)
+                if files.contains_key(&name) =>
+            {
                 return Ok(files[&name]);
             }
-            Found::Member(name) => {
-                let image = self.archive.map(|archive| archive.image(&name.0));
-                let digest = Digest::from_bytes(&image.transpose()?.unwrap_or_default());
-                (name, digest)
+            LocatedImage::Member(name) => {
+                let bytes = match self.archive {
+                    Some(archive) => archive.read_image(&name.0)?,
+                    None => Vec::new(),
+                };
+                (name, Digest::from_bytes(&bytes))
             }
-            Found::File(name, path) => {
+            LocatedImage::File(name, path) => {
                 let digest = Digest::from_bytes(&reading::bytes(&path)?);
                 (name, digest)
             }
@@ -143,20 +156,25 @@ impl Frames<'_> {
     }
 }
 
-/// The first 12 hexadecimal digits of the digest of each question over images, text and options. The k-th repeat gets `-k`. So an id
-/// depends neither on the order of rows nor on the name of a file.
-fn ids_by_content(digests: &[Digest]) -> ContentIds {
-    let mut seen: HashMap<String, usize> = HashMap::new();
+/// Makes ids from the digests of the questions: 12 hexadecimal digits, and `-k` for the k-th repeat. Returns the ids and the number of
+/// repeats. The ids depend neither on the order of rows nor on file names.
+fn ids_by_content(digests: &[Digest]) -> (Vec<String>, usize) {
+    let mut counts: HashMap<String, usize> = HashMap::new();
     let mut repeats = 0;
-    let texts = digests.iter().map(|digest| {
-        let id = digest.to_string()[..12].to_owned();
-        let count = seen.entry(id.clone()).or_insert(0);
-        *count += 1;
-        repeats += usize::from(*count > 1);
-        match *count - 1 {
-            0 => id,
-            earlier => format!("{id}-{earlier}"),
-        }
-    });
-    (texts.collect(), repeats)
+    let ids = digests
+        .iter()
+        .map(|digest| {
+            let id = digest.to_string()[..12].to_owned();
+            let count = counts.entry(id.clone()).or_insert(0);
+            *count += 1;
+            match *count - 1 {
+                0 => id,
+                repeat => {
+                    repeats += 1;
+                    format!("{id}-{repeat}")
+                }
+            }
+        })
+        .collect();
+    (ids, repeats)
 }

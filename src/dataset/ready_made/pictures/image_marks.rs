@@ -1,4 +1,4 @@
-//! The marks of images in the texts of a row, as `<image 2>`: [`ImageMarks`].
+//! Image marks in the texts of a row, such as `<image 2>`: [`ImageMarks`].
 
 use std::sync::LazyLock;
 
@@ -7,17 +7,18 @@ use regex::{Captures, Regex};
 use crate::types::text::excerpt;
 use crate::types::text::image_mark::mark;
 
-/// A mark with the space behind it: `<image>`, `<image 2>` or `<image2>`.
+/// Mark with the space after it: `<image>`, `<image 2>` or `<image2>`.
 static MARK: LazyLock<Option<Regex>> =
     LazyLock::new(|| Regex::new(r"<image(?: ?(\d+))?>(\s*)").ok());
 
-/// The marks of a row. With one image they are cut. With several, the texts of the row are read in their order: the k-th mark without
-/// a number is the place of the k-th image.
+/// Normalizes the image marks of a row. With one image, marks are removed. With several, the texts of the row must be read in order,
+/// because the k-th mark without a number refers to the k-th image.
 #[derive(Debug)]
 pub(in crate::dataset::ready_made) struct ImageMarks {
-    /// The number of images.
+    /// Number of images.
     images: usize,
-    without_number: usize,
+    /// Number of marks without a number so far.
+    unnumbered: usize,
     has_numbers: bool,
 }
 
@@ -25,32 +26,32 @@ impl ImageMarks {
     pub(in crate::dataset::ready_made) fn new(images: usize) -> Self {
         Self {
             images,
-            without_number: 0,
+            unnumbered: 0,
             has_numbers: false,
         }
     }
 
-    /// The text with all its marks in one form.
+    /// Rewrites all marks of a text in one form.
     ///
     /// # Errors
-    /// If a mark names an image that the row does not show, or only some marks have numbers.
+    /// If a mark refers to an image that the row does not have, or only some marks have numbers.
     pub(in crate::dataset::ready_made) fn read(&mut self, text: &str) -> Result<String, String> {
-        let Some(form) = &*MARK else {
+        let Some(pattern) = &*MARK else {
             return Ok(text.to_owned());
         };
         if self.images == 1 {
-            return Ok(form.replace_all(text, "").trim().to_owned());
+            return Ok(pattern.replace_all(text, "").trim().to_owned());
         }
         let mut problem = None;
-        let read = form.replace_all(text, |found: &Captures<'_>| {
+        let read = pattern.replace_all(text, |found: &Captures<'_>| {
             let number = if let Some(number) = found.get(1) {
                 self.has_numbers = true;
                 number.as_str().parse().unwrap_or(usize::MAX)
             } else {
-                self.without_number += 1;
-                self.without_number
+                self.unnumbered += 1;
+                self.unnumbered
             };
-            if self.has_numbers && self.without_number > 0 {
+            if self.has_numbers && self.unnumbered > 0 {
                 problem =
                     Some("of the marks <image …> some have numbers and some have none".to_owned());
             } else if number == 0 || number > self.images {
@@ -68,7 +69,7 @@ impl ImageMarks {
         }
     }
 
-    /// An option with all its marks in one form; with one image it stays as it is.
+    /// Rewrites all marks of an option in one form. With one image, the option is not changed.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -88,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn marks_get_one_form() {
+    fn marks_are_normalized() {
         for (images, texts, expected) in [
             (
                 2,
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_of_a_single_image_are_cut() {
+    fn marks_of_a_single_image_are_removed() {
         let mut marks = ImageMarks::new(1);
         let read = marks.read("<image 1>\nWhat is <image> this?").unwrap();
         assert_eq!(read, "What is this?");

@@ -1,17 +1,17 @@
-//! The images of a row: [`images`], and the place of one inside a file of rows: [`EmbeddedImage`].
+//! Images of a row: [`images`], and the location of an image inside a table: [`EmbeddedImage`].
 
 use std::sync::Arc;
 
 use crate::dataset::ready_made::cells::{
-    Cell, FileFacts, LONGEST_NAME, Row, RowPlace, Step, decoded, list,
+    Cell, FileFacts, MAX_NAME_LENGTH, Row, RowPlace, Step, decode_base64, parse_list,
 };
-use crate::dataset::ready_made::columns::{Images, Roles};
+use crate::dataset::ready_made::columns::{Column, ImageColumns, Roles};
 use crate::dataset::ready_made::container::SetFile;
 use crate::error::{Error, Result};
 use crate::picture::image_file::format::FileFormat;
 use crate::picture::{ImageFile, ReadingRule};
 
-/// An image of a row.
+/// Reference to an image of a row.
 #[derive(Debug, Clone)]
 pub(in crate::dataset::ready_made) enum RowImage {
     /// Bytes or base64 in a cell.
@@ -20,73 +20,80 @@ pub(in crate::dataset::ready_made) enum RowImage {
         steps: Vec<Step>,
         facts: FileFacts,
     },
-    /// A file, by the path in a cell.
+    /// Path of a file.
     File(String),
-    /// A short text that may be the id of another row, or a path.
+    /// Short text that may be the id of another row, or a path.
     RowOrFile(String),
-    /// The name of a frame of other data.
+    /// Name of a frame of other data.
     Frame(String),
 }
 
-/// The content of the image columns.
+/// Content of the image columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::dataset::ready_made) enum ImageForm {
     /// Images, or the paths of files.
     Files,
-    /// The names of frames of other data.
+    /// Names of frames of other data.
     Frames,
 }
 
-/// The frames that a row names.
-fn named_frames(row: &Row, roles: &Roles) -> Vec<RowImage> {
-    let (Images::First(columns) | Images::All(columns)) = &roles.images else {
-        return Vec::new();
+/// Frame of other data that a row is about, if it has one.
+fn named_frame(row: &Row, roles: &Roles) -> Option<RowImage> {
+    let (ImageColumns::First(columns) | ImageColumns::All(columns)) = &roles.images else {
+        return None;
     };
-    let names = columns.iter().filter_map(|column| column.text(row));
-    names.take(1).map(RowImage::Frame).collect()
+    columns
+        .iter()
+        .find_map(|column| column.text(row))
+        .map(RowImage::Frame)
 }
 
 impl ImageForm {
-    /// The images of a row, in order.
+    /// Images of a row, in order.
     pub(in crate::dataset::ready_made) fn in_row(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
         match self {
             Self::Files => images(row, roles),
-            Self::Frames => named_frames(row, roles),
+            Self::Frames => named_frame(row, roles).into_iter().collect(),
         }
     }
 }
 
-/// The images of a row, in order. Of columns that hold the same image, the first with the image itself goes before paths.
+/// Images of a row, in order. If several columns may have the image, the first with image data is preferred to paths.
 pub(in crate::dataset::ready_made) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
     let mut found = Vec::new();
     match &roles.images {
-        Images::First(columns) => {
+        ImageColumns::First(columns) => {
             for column in columns {
-                let steps = field_steps(column.field.as_deref());
-                let mut own = Vec::new();
-                collect(column.cell(row), column.at, &steps, &mut own);
+                let mut in_column = Vec::new();
+                add_column_images(row, column, &mut in_column);
                 let is_embedded = |image: &RowImage| matches!(image, RowImage::Embedded { .. });
-                if own.iter().any(is_embedded) {
-                    return own;
+                if in_column.iter().any(is_embedded) {
+                    return in_column;
                 }
                 if found.is_empty() {
-                    found = own;
+                    found = in_column;
                 }
             }
         }
-        Images::All(columns) => {
+        ImageColumns::All(columns) => {
             for column in columns {
-                let steps = field_steps(column.field.as_deref());
-                collect(column.cell(row), column.at, &steps, &mut found);
+                add_column_images(row, column, &mut found);
             }
         }
-        Images::Template(template) => {
-            found.extend(template.filled(row).map(RowImage::File));
+        ImageColumns::Template(template) => {
+            found.extend(template.fill(row).map(RowImage::File));
         }
     }
     found
 }
 
+/// Adds the images of a row in a column.
+fn add_column_images(row: &Row, column: &Column, found: &mut Vec<RowImage>) {
+    let steps = field_steps(column.field.as_deref());
+    add_images(column.cell(row), column.index, &steps, found);
+}
+
+/// Steps to a field, given as a path with dots.
 fn field_steps(field: Option<&str>) -> Vec<Step> {
     field
         .into_iter()
@@ -95,8 +102,8 @@ fn field_steps(field: Option<&str>) -> Vec<Step> {
         .collect()
 }
 
-/// Adds the images of a cell.
-fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
+/// Adds the images in a cell, or in a part of a cell at the end of `steps`.
+fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
     if cell.is_absent() {
         return;
     }
@@ -108,8 +115,8 @@ fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>
             facts: (**facts).clone(),
         }),
         Cell::List(cells) => {
-            for (at, cell) in cells.iter().enumerate() {
-                collect(cell, column, &with(Step::Item(at)), found);
+            for (index, cell) in cells.iter().enumerate() {
+                add_images(cell, column, &with(Step::Item(index)), found);
             }
         }
         Cell::Fields(_) => {
@@ -118,46 +125,40 @@ fn collect(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>
                 .filter_map(|name| Some((name, cell.field(name)?)))
                 .find(|(_, cell)| !cell.is_absent());
             if let Some((name, cell)) = field {
-                collect(cell, column, &with(Step::Field(name.to_owned())), found);
+                add_images(cell, column, &with(Step::Field(name.to_owned())), found);
             }
         }
-        Cell::Text(text) => text_image(text, column, steps, found),
+        Cell::Text(text) => add_text_images(text, column, steps, found),
         Cell::Number(text) => found.push(RowImage::RowOrFile(text.to_string())),
         Cell::Absent | Cell::Bool(_) | Cell::Bytes(_) => {}
     }
 }
 
-/// Adds the images of a text: a file in base64, a list of such texts, a path, or the id of a row.
-fn text_image(text: &str, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
-    if let Some(bytes) = decoded(text) {
-        let (steps, facts) = (steps.to_vec(), FileFacts::from_bytes(&bytes));
+/// Adds the images in a text: a file in base64, a list of texts, a path, or the id of a row.
+fn add_text_images(text: &str, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
+    if let Some(bytes) = decode_base64(text) {
         found.push(RowImage::Embedded {
             column,
-            steps,
-            facts,
+            steps: steps.to_vec(),
+            facts: FileFacts::from_bytes(&bytes),
         });
         return;
     }
-    if let Some(items) = text
-        .trim_start()
-        .starts_with('[')
-        .then(|| list(text))
-        .flatten()
-    {
-        for (at, item) in items.into_iter().enumerate() {
-            let steps = [steps, &[Step::Item(at)]].concat();
-            collect(&Cell::Text(item), column, &steps, found);
+    if let Some(items) = parse_list(text) {
+        for (index, item) in items.into_iter().enumerate() {
+            let steps = [steps, &[Step::Item(index)]].concat();
+            add_images(&Cell::Text(item), column, &steps, found);
         }
         return;
     }
-    found.push(if text.len() <= LONGEST_NAME {
+    found.push(if text.len() <= MAX_NAME_LENGTH {
         RowImage::RowOrFile(text.trim().to_owned())
     } else {
         RowImage::File(text.trim().to_owned())
     });
 }
 
-/// The place of an image inside a file of rows. It is read when needed, so that files of gigabytes are never in memory.
+/// Location of an image inside a table. The image is read when needed, so that a large file is never in memory as a whole.
 #[derive(Debug, Clone)]
 pub(crate) struct EmbeddedImage {
     pub(super) file: Arc<SetFile>,
@@ -166,37 +167,37 @@ pub(crate) struct EmbeddedImage {
     pub(super) facts: FileFacts,
 }
 
-/// The part of a row that holds an image; all images of a set are mostly in the same.
+/// Part of a row that has an image. Most images of a set share it.
 #[derive(Debug)]
 pub(super) struct CellPart {
     pub(super) column: String,
-    /// From the cell to the image.
+    /// Path from the cell to the image.
     pub(super) steps: Vec<Step>,
 }
 
 impl EmbeddedImage {
-    /// The name of the format, by its first bytes.
+    /// Name of the image format, or `other`.
     pub(in crate::dataset::ready_made) fn format(&self) -> &'static str {
         self.facts.format.map_or("other", FileFormat::name)
     }
 
-    /// The image file in the cell.
+    /// Reads the image file from the cell.
     ///
     /// # Errors
-    /// If the file of rows cannot be read, or has changed since it was opened.
-    pub(in crate::dataset) fn image(&self, rule: ReadingRule) -> Result<ImageFile> {
+    /// If the table cannot be read, or has changed since it was opened.
+    pub(in crate::dataset) fn read_image(&self, rule: ReadingRule) -> Result<ImageFile> {
         let place = format!("{}, {}", self.file.label.path.display(), self.row);
         let value = self
             .file
             .value(&self.row, &self.part.column, &self.part.steps)?;
-        let value = match std::str::from_utf8(&value).ok().and_then(decoded) {
-            Some(bytes) => bytes,
-            None => value,
-        };
-        if FileFacts::from_bytes(&value) != self.facts {
+        let bytes = std::str::from_utf8(&value)
+            .ok()
+            .and_then(decode_base64)
+            .unwrap_or(value);
+        if FileFacts::from_bytes(&bytes) != self.facts {
             let problem = "the image has changed since the file was opened; start again";
             return Err(Error::data(place, problem));
         }
-        Ok(ImageFile::new(value, place, rule))
+        Ok(ImageFile::new(bytes, place, rule))
     }
 }

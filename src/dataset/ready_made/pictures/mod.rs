@@ -1,4 +1,4 @@
-//! Pictures of a row, and the frames, ids and scenes made of them.
+//! Images of the rows, and the frames, question ids and scenes that depend on them.
 
 mod frames;
 mod ids;

@@ -1,11 +1,11 @@
-//! The scenes of the frames of a set: [`Scenes`].
+//! Scenes of the frames of a set: [`Scenes`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::dataset::ready_made::cells::Table;
-use crate::dataset::ready_made::choices::is_own;
+use crate::dataset::ready_made::choices::is_native_format;
 use crate::dataset::ready_made::columns::Column;
-use crate::dataset::ready_made::columns::map::{Map, flag};
+use crate::dataset::ready_made::columns::map::{ColumnMap, map_flag};
 use crate::dataset::ready_made::columns::names::Role;
 use crate::dataset::ready_made::summary::count;
 use crate::error::{Error, Result};
@@ -14,15 +14,16 @@ use crate::types::FrameId;
 /// Scene of each frame that has one.
 pub(in crate::dataset) type SceneNames = BTreeMap<FrameId, String>;
 
-/// The column of scenes and what it says of the frames.
+/// Collects the scenes of the frames from the column of scenes.
 #[derive(Debug)]
 pub(in crate::dataset::ready_made) struct Scenes<'a> {
     column: Option<&'a Column>,
-    /// True if the user named the column, or wrote this program's own form. Otherwise a column that contradicts itself is not used.
-    is_meant: bool,
+    /// True if the user gave the column, or the table is in this program's own format. Then a frame with two scenes is an error;
+    /// otherwise the column is ignored.
+    is_required: bool,
     names: SceneNames,
     frames: BTreeSet<FrameId>,
-    /// First frame with two scenes, and both of them.
+    /// Message about the first frame with two scenes.
     contradiction: Option<String>,
 }
 
@@ -30,12 +31,12 @@ impl<'a> Scenes<'a> {
     /// No frames yet.
     pub(in crate::dataset::ready_made) fn new(
         table: &Table,
-        map: &Map,
+        map: &ColumnMap,
         column: Option<&'a Column>,
     ) -> Self {
         Self {
             column,
-            is_meant: map.entry(Role::Scene).is_some() || is_own(table),
+            is_required: map.entry(Role::Scene).is_some() || is_native_format(table),
             names: SceneNames::new(),
             frames: BTreeSet::new(),
             contradiction: None,
@@ -45,7 +46,7 @@ impl<'a> Scenes<'a> {
     /// Adds the frame of a row.
     ///
     /// # Errors
-    /// If the user named the column and gives the frame a second scene.
+    /// If the frame already has another scene and the column is required.
     pub(in crate::dataset::ready_made) fn add(
         &mut self,
         table: &Table,
@@ -61,8 +62,10 @@ impl<'a> Scenes<'a> {
         if scene.is_empty() {
             return Ok(());
         }
-        let known = self.names.entry(frame.clone());
-        let known = known.or_insert_with(|| scene.to_owned());
+        let known = self
+            .names
+            .entry(frame.clone())
+            .or_insert_with(|| scene.to_owned());
         if known == scene {
             return Ok(());
         }
@@ -70,8 +73,8 @@ impl<'a> Scenes<'a> {
             "the image {:?} is of the scene {scene:?} here and of {known:?} before",
             frame.0
         );
-        if self.is_meant {
-            let remedy = flag(Role::Scene, "", None);
+        if self.is_required {
+            let remedy = map_flag(Role::Scene, "", None);
             let problem = format!("{problem}; an image has one scene ({remedy} ignores scenes)");
             return Err(Error::data(table.place(row), problem));
         }
@@ -79,7 +82,7 @@ impl<'a> Scenes<'a> {
         Ok(())
     }
 
-    /// The scenes; none if the column contradicts itself.
+    /// Takes the scenes out; none if the column has contradictions.
     pub(in crate::dataset::ready_made) fn take(&mut self) -> SceneNames {
         match self.contradiction {
             None => std::mem::take(&mut self.names),
@@ -87,7 +90,7 @@ impl<'a> Scenes<'a> {
         }
     }
 
-    /// Column and number of scenes in words; `None` without a column.
+    /// Note about the column and the number of scenes; `None` without a column.
     pub(in crate::dataset::ready_made) fn note(&self) -> Option<String> {
         let name = &self.column?.name;
         if let Some(problem) = &self.contradiction {

@@ -1,4 +1,4 @@
-//! Broken files and rows are named, and nothing breaks down.
+//! Broken files and rows: errors name them, and nothing panics.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use super::{open, refusal};
 use crate::dataset::ready_made::SetArgs;
 use crate::types::FrameId;
 
-/// Values that stand where something else is expected.
+/// Values of unexpected types.
 fn damages() -> Vec<Value> {
     vec![
         Value::Null,
@@ -27,7 +27,7 @@ fn damages() -> Vec<Value> {
 }
 
 #[test]
-fn a_row_damaged_in_each_column_is_named_or_asked() {
+fn row_with_any_damaged_column_is_handled() {
     let good = |id: i64| {
         row(
             json!({"id": id, "question": "What is it?", "options": ["x", "y"], "answer": "x", "category": "c", "hint": "h", "image": base64(1)}),
@@ -68,7 +68,7 @@ fn a_row_damaged_in_each_column_is_named_or_asked() {
 }
 
 #[test]
-fn a_cut_or_damaged_parquet_file_is_an_error() {
+fn damaged_parquet_file_is_an_error() {
     let rows: Vec<_> = (0..20).map(|id| row(json!({"id": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": {"bytes": base64(id as u8), "path": null}}))).collect();
     let (_folder, path) = set("set.parquet", &rows);
     let whole = fs::read(&path).unwrap();
@@ -86,7 +86,7 @@ fn a_cut_or_damaged_parquet_file_is_an_error() {
         let mut bytes = whole.clone();
         bytes[at] ^= 0x55;
         fs::write(&copy, &bytes).unwrap();
-        // Any outcome but a breakdown: a byte of a picture is found when that is decoded.
+        // Any result is allowed, but no panic. A damaged byte of an image is found only when it is decoded.
         if let Ok(dataset) = open(&copy, &SetArgs::default()) {
             for frame in dataset.frames() {
                 let _ = dataset.picture(frame).and_then(|picture| picture.decode());
@@ -96,7 +96,7 @@ fn a_cut_or_damaged_parquet_file_is_an_error() {
 }
 
 #[test]
-fn broken_text_files_name_their_place() {
+fn errors_in_text_files_name_the_line() {
     let (folder, _) = set("set.json", &[]);
     for (name, content, says) in [
         ("a.jsonl", &b"{\"id\": 1}\n{\n"[..], "a.jsonl, line 2: EOF"),
@@ -134,7 +134,7 @@ fn broken_text_files_name_their_place() {
 }
 
 #[test]
-fn unusable_images_are_left_out_if_the_user_allows_it() {
+fn unusable_images_are_left_out_with_skip_bad() {
     let question = |id: usize, image: &str| {
         row(
             json!({"id": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": image}),
@@ -192,7 +192,7 @@ fn columns_by_index_and_in_lists_are_read() {
 }
 
 #[test]
-fn paths_that_lead_out_and_images_that_are_none_are_named() {
+fn outside_paths_and_invalid_images_are_errors() {
     let question = |image: &str| {
         row(json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": image}))
     };
@@ -227,7 +227,7 @@ fn paths_that_lead_out_and_images_that_are_none_are_named() {
 }
 
 #[test]
-fn a_file_that_changes_after_it_was_opened_is_not_shown() {
+fn changed_file_is_an_error() {
     let question = |colour| {
         row(
             json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(colour)}),
@@ -247,7 +247,7 @@ fn a_file_that_changes_after_it_was_opened_is_not_shown() {
 }
 
 #[test]
-fn an_archive_that_climbs_or_lies_is_refused() {
+fn malicious_archives_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let line = |image: &str| {
         json!({"file_name": image, "question": "?", "options": ["x", "y"], "answer": "x"})

@@ -1,4 +1,4 @@
-//! Two columns that may hold the answers, and columns whose names a shell would change.
+//! Sets with several answer columns, and column names that need quotes in a shell.
 
 use serde_json::{Value, json};
 
@@ -18,7 +18,7 @@ fn skipping() -> SetArgs {
     }
 }
 
-/// Forty rows whose answer is x, with the label of the number of each.
+/// Forty rows with the answer x, and a label made from the number of the row.
 fn labelled(label: impl Fn(usize) -> Value) -> Vec<Value> {
     (0..40).map(|at| {
         json!({"id": at, "question": "?", "options": ["x", "y"], "answer": "x", "label": label(at), "image": base64(1)})
@@ -26,7 +26,7 @@ fn labelled(label: impl Fn(usize) -> Value) -> Vec<Value> {
 }
 
 #[test]
-fn a_gap_does_not_make_a_column_give_way_to_another() {
+fn answer_column_with_a_gap_is_kept() {
     for gap in [json!(""), Value::Null, json!("z")] {
         let mut rows = labelled(|_| json!("B"));
         rows[7]["answer"] = gap.clone();
@@ -36,7 +36,7 @@ fn a_gap_does_not_make_a_column_give_way_to_another() {
             problem.contains("object 1: the answers of \"answer\" and \"label\" differ, \"x\" and \"B\"; --map answer=answer or --map answer=label"),
             "{gap}: {problem}"
         );
-        // The first column is taken where both agree, and its gap is left out.
+        // If both columns agree, the first is used, and the row without its answer is left out.
         let mut rows = labelled(|_| json!("A"));
         rows[7]["answer"] = gap.clone();
         let (_folder, path) = with(rows);
@@ -48,7 +48,7 @@ fn a_gap_does_not_make_a_column_give_way_to_another() {
         let questions = read(&open(&path, &skipping()).unwrap());
         assert_eq!(questions.len(), 39);
         assert!(questions.iter().all(|question| question.4 == "x"));
-        // The command in the problem names the other column, which has no gap.
+        // The flag in the message names the other column, which has no gap.
         assert_eq!(
             open(&path, &map("answer=label")).unwrap().questions().len(),
             40
@@ -57,14 +57,14 @@ fn a_gap_does_not_make_a_column_give_way_to_another() {
 }
 
 #[test]
-fn a_gap_in_the_second_column_hides_no_difference() {
+fn gap_in_second_column_hides_no_difference() {
     let rows = labelled(|at| if at == 3 { Value::Null } else { json!("B") });
     let (_folder, path) = with(rows);
     assert!(refusal(&path, &skipping()).contains("\"label\" differ"));
 }
 
 #[test]
-fn yes_and_no_in_two_columns_are_compared_where_both_say_something() {
+fn yes_no_columns_are_compared_where_both_have_answers() {
     let rows = |other: &str, gap: Value| -> Vec<Value> {
         (0..40).map(|at| {
             let answer = if at == 5 { gap.clone() } else { json!("yes") };
@@ -73,12 +73,12 @@ fn yes_and_no_in_two_columns_are_compared_where_both_say_something() {
     };
     let (_folder, path) = with(rows("no", json!("")));
     assert!(refusal(&path, &skipping()).contains("\"answer\" and \"label\" differ"));
-    // Numbers mean no and yes where the other column states so.
+    // Numbers mean no and yes if they agree with the other column.
     let (_folder, path) = with(rows("1", json!("yes")));
     assert_eq!(read(&open(&path, &skipping()).unwrap())[0].4, "yes");
     let (_folder, path) = with(rows("0", json!("yes")));
     assert!(refusal(&path, &skipping()).contains("differ"));
-    // Whether somebody was right is no answer of theirs.
+    // A column of correctness is not an answer column.
     let (_folder, path) = with(vec![
         json!({"question": "What?", "answer": "a chair", "correct": true, "image": base64(1)}),
     ]);
@@ -86,7 +86,7 @@ fn yes_and_no_in_two_columns_are_compared_where_both_say_something() {
 }
 
 #[test]
-fn a_printed_command_can_be_pasted_whatever_the_name_of_a_column() {
+fn printed_flags_are_quoted_for_the_shell() {
     for name in [
         "Correct Answer",
         "correct answer's",
@@ -113,7 +113,7 @@ fn a_printed_command_can_be_pasted_whatever_the_name_of_a_column() {
             "{pasted}"
         );
     }
-    // A name with a comma is one column, and not two.
+    // A name with a comma is one column.
     let (_folder, path) = with(vec![
         json!({"question": "?", "the, options": ["x", "y"], "answer": "y", "image": base64(1)}),
     ]);

@@ -1,4 +1,4 @@
-//! Sets that tests make: rows as JSON values, written in each form.
+//! Test sets: rows as JSON values, written in each format.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{Type, TypePtr};
 use serde_json::{Map, Value, json};
 
-/// The bytes of a PNG of one colour, large enough for its base64 to be longer than any name.
+/// A PNG of one colour, large enough that its base64 is longer than a name.
 pub(super) fn png(colour: u8) -> Vec<u8> {
     let image = RgbImage::from_fn(8, 8, |x, y| {
         image::Rgb([colour, (x * 9) as u8, (y * 17) as u8])
@@ -24,17 +24,17 @@ pub(super) fn png(colour: u8) -> Vec<u8> {
     file.into_inner()
 }
 
-/// The base64 of a PNG.
+/// A PNG in base64.
 pub(super) fn base64(colour: u8) -> String {
     STANDARD.encode(png(colour))
 }
 
-/// A PNG as hubs hold it: its bytes and its path in one value.
+/// A PNG in the format of hubs: its bytes and its path in one value.
 pub(super) fn bytes(colour: u8) -> Value {
     json!({"bytes": base64(colour), "path": null})
 }
 
-/// A row from its fields.
+/// A row with these fields.
 pub(super) fn row(fields: Value) -> Map<String, Value> {
     match fields {
         Value::Object(fields) => fields,
@@ -42,7 +42,7 @@ pub(super) fn row(fields: Value) -> Map<String, Value> {
     }
 }
 
-/// A temporary folder with a file of rows, whose ending decides the form. Images in `bytes` of an object are base64.
+/// A temporary folder with a table. The extension of `name` decides its format. `bytes` in an object are base64.
 pub(super) fn set(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -51,7 +51,7 @@ pub(super) fn set(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir
     (folder, path)
 }
 
-/// Writes rows in the form that the ending names.
+/// Writes rows in the format of the extension.
 pub(super) fn write(path: &Path, rows: &[Map<String, Value>]) {
     let text = match path.extension().unwrap().to_str().unwrap() {
         "json" => serde_json::to_string_pretty(rows).unwrap(),
@@ -94,7 +94,7 @@ fn table(rows: &[Map<String, Value>], delimiter: u8) -> String {
     String::from_utf8(writer.into_inner().unwrap()).unwrap()
 }
 
-/// The form of a column of Parquet, from its first value.
+/// Type of a Parquet column, from its first value.
 #[derive(Clone, Copy, PartialEq)]
 enum Form {
     Text,
@@ -161,7 +161,7 @@ fn image(name: &str) -> TypePtr {
     group(name, Repetition::OPTIONAL, None, fields)
 }
 
-/// The values of a leaf with their definition and repetition levels.
+/// Values of a leaf with their definition and repetition levels.
 #[derive(Default)]
 struct Levels {
     values: Vec<ByteArray>,
@@ -178,7 +178,7 @@ impl Levels {
     }
 }
 
-/// Writes a Parquet file of two row groups, with columns in the forms in which hubs ship them.
+/// Writes a Parquet file of two row groups, with the column types that hubs use.
 fn parquet(path: &Path, rows: &[Map<String, Value>]) {
     let columns = columns(rows);
     let text = || Some(LogicalType::String);
@@ -240,7 +240,7 @@ fn parquet(path: &Path, rows: &[Map<String, Value>]) {
     writer.close().unwrap();
 }
 
-/// The leaves of a column of texts, lists or images.
+/// Leaves of a column of texts, lists or images.
 fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> {
     let bytes = |value: &Value| {
         let text = value["bytes"].as_str()?;

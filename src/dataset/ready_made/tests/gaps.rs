@@ -1,4 +1,4 @@
-//! Rows in which something is missing or stands twice do not change how the others are read.
+//! Rows with missing or repeated values do not change how other rows are read.
 
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ fn skipping() -> SetArgs {
 }
 
 #[test]
-fn a_broken_row_does_not_decide_between_two_readings() {
+fn broken_row_does_not_decide_the_answer_format() {
     let question = |answer: i64| json!({"question": "?", "options": ["a", "b", "c", "d"], "answer": answer, "image": base64(answer as u8)});
     let rows = (0..39).map(|n| question(1 + n % 3)).chain([question(9)]);
     let (_folder, path) = with(rows.collect());
@@ -30,7 +30,7 @@ fn a_broken_row_does_not_decide_between_two_readings() {
 }
 
 #[test]
-fn yes_or_no_without_an_answer_is_broken_and_not_open() {
+fn yes_no_question_without_answer_is_bad() {
     let question =
         |answer: Value| json!({"question": "Is it?", "answer": answer, "image": base64(1)});
     let (_folder, path) = with(vec![question(json!("yes")), question(Value::Null)]);
@@ -45,7 +45,7 @@ fn yes_or_no_without_an_answer_is_broken_and_not_open() {
 }
 
 #[test]
-fn an_empty_list_of_options_is_none_and_the_word_none_is_one() {
+fn empty_option_list_is_no_options_but_none_is_one() {
     let (_folder, path) = with(vec![
         json!({"question": "Which?", "options": "['x', 'y']", "answer": "B", "image": base64(1)}),
         json!({"question": "How many?", "options": "[]", "answer": "7", "image": base64(2)}),
@@ -58,7 +58,7 @@ fn an_empty_list_of_options_is_none_and_the_word_none_is_one() {
 }
 
 #[test]
-fn a_picture_beside_numbered_ones_is_one_of_several() {
+fn unnumbered_image_column_joins_numbered_ones() {
     let (_folder, path) = with(vec![
         json!({"question": "?", "options": ["x", "y"], "answer": "x", "image": base64(1), "image_2": base64(2)}),
     ]);
@@ -66,7 +66,7 @@ fn a_picture_beside_numbered_ones_is_one_of_several() {
 }
 
 #[test]
-fn another_row_s_image_is_that_of_the_same_file() {
+fn row_reference_stays_in_the_same_file() {
     let question = |id: i64, image: &str| {
         row(
             json!({"index": id, "question": format!("{id}?"), "options": ["x", "y"], "answer": "x", "image": image}),
@@ -83,7 +83,7 @@ fn another_row_s_image_is_that_of_the_same_file() {
 }
 
 #[test]
-fn ids_that_differ_in_space_alone_are_no_ids() {
+fn ids_that_differ_only_in_space_are_not_unique() {
     let question = |id: &str, red| {
         row(
             json!({"index": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(red)}),
@@ -98,11 +98,11 @@ fn ids_that_differ_in_space_alone_are_no_ids() {
 }
 
 #[test]
-fn a_well_known_set_of_configurations_may_be_one_file() {
+fn preset_config_is_ignored_for_a_single_file() {
     let (_folder, path) = with(vec![
         json!({"question": "?", "options": "['x', 'y']", "answer": "A", "image_1": base64(1), "image_2": null}),
     ]);
-    let place = crate::dataset::place(&format!("mmmu:{}", path.display())).unwrap();
+    let place = crate::dataset::parse_data_place(&format!("mmmu:{}", path.display())).unwrap();
     let dataset = crate::dataset::Dataset::open(&place, None, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 1);
 }

@@ -1,4 +1,4 @@
-//! The groups in which questions of a set are scored together.
+//! Groups of questions that are scored together.
 
 use std::fs;
 
@@ -9,7 +9,7 @@ use super::fixture::{png, row, set};
 use super::{map, open, refusal};
 use crate::dataset::{Dataset, SetArgs};
 
-/// Six rows about three images: numbers from 1, and two columns that make a group together. The last row is an open question.
+/// Six rows about three images, with numbers from 1 and two columns that form a group together. The last row is an open question.
 fn rows() -> Vec<Map<String, Value>> {
     (1..=6).map(|number| {
         let answer = if number == 6 { "seven" } else { "yes" };
@@ -48,19 +48,19 @@ fn with(text: &str) -> SetArgs {
 }
 
 #[test]
-fn a_group_is_a_column_a_template_or_a_run_of_numbers() {
+fn groups_follow_column_template_or_run_of_numbers() {
     let (_folder, path) = made(&rows());
     let read = |text: &str| open(&path, &with(text)).unwrap();
-    // By rule nothing is a group.
+    // There are no groups by default.
     assert_eq!(groups(&read("id=nr")), [None; 5]);
     let by_image = read("id=nr,group=image");
     assert_eq!(
         groups(&by_image)[..3],
         [Some(("0.png", 2)), Some(("0.png", 2)), Some(("1.png", 2))]
     );
-    // The open question is left out, and its group knows that it lacks one.
+    // The open question is left out, and its group is incomplete.
     assert_eq!(groups(&by_image)[4], Some(("2.png", 2)));
-    let said = by_image.reading().join("\n");
+    let said = by_image.summary().join("\n");
     assert!(
         said.contains("group = image: 3 groups of 2 questions, 1 with questions that are left out, never complete"),
         "{said}"
@@ -76,13 +76,13 @@ fn a_group_is_a_column_a_template_or_a_run_of_numbers() {
             Some(("s1_1", 1))
         ]
     );
-    let said = template.reading().join("\n");
+    let said = template.summary().join("\n");
     assert!(
         said.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete; 1 question without a group"),
         "{said}"
     );
     let alone = read("id=nr,group={nr:1}");
-    let said = alone.reading().join("\n");
+    let said = alone.summary().join("\n");
     assert!(
         said.contains("5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"),
         "{said}"
@@ -99,14 +99,14 @@ fn a_group_is_a_column_a_template_or_a_run_of_numbers() {
     assert_ne!(groups(&from_nought), groups(&runs));
     assert!(
         from_nought
-            .reading()
+            .summary()
             .join("\n")
             .contains("about several images")
     );
 }
 
 #[test]
-fn a_wrong_group_is_refused_with_what_was_expected() {
+fn invalid_group_error_names_expected() {
     let (_folder, path) = made(&rows());
     for (text, says) in [
         (
@@ -124,8 +124,8 @@ fn a_wrong_group_is_refused_with_what_was_expected() {
 }
 
 #[test]
-fn what_a_run_stores_keeps_its_groups() {
-    // A part of the questions of a run, whose group had three.
+fn stored_questions_keep_their_groups() {
+    // Some questions of a run, from a group of three.
     let own = |id: &str| {
         row(json!({
             "id": id, "image": "0.png", "family": "f", "question": "?", "choices": ["x", "y"], "answer": "x", "group": "g", "group_size": 3,
@@ -136,7 +136,7 @@ fn what_a_run_stores_keeps_its_groups() {
     assert_eq!(groups(&dataset), [Some(("g", 3)); 2]);
     let off = open(&path, &map("group=")).unwrap();
     assert_eq!(groups(&off), [None; 2]);
-    // A stranger's column of this name is nothing by itself.
+    // A column with this name in a foreign set does not make groups.
     let strange = |id: &str| {
         let mut row = own(id);
         row.remove("group_size");
@@ -151,9 +151,10 @@ fn what_a_run_stores_keeps_its_groups() {
 }
 
 #[test]
-fn known_sets_bring_their_groups() {
+fn presets_have_groups() {
     let known = |name: &str, path: &std::path::Path, args: &SetArgs| {
-        let place = crate::dataset::place(&format!("{name}:{}", path.display())).unwrap();
+        let place =
+            crate::dataset::parse_data_place(&format!("{name}:{}", path.display())).unwrap();
         Dataset::open(&place, None, args).unwrap()
     };
     let mme = |number: usize| {
@@ -168,7 +169,7 @@ fn known_sets_bring_their_groups() {
     assert_eq!(groups(&dataset)[0], Some(("colour_0.png", 2)));
     let own = known("mme", &path, &map("group=question"));
     assert_eq!(groups(&own)[0], Some(("Is it 0?", 1)));
-    // Of a copy without the column it is said that there are no groups.
+    // Without the column, a note says that there are no groups.
     let without = rows.into_iter().map(|mut row| {
         row.remove("question_id");
         row
@@ -176,7 +177,7 @@ fn known_sets_bring_their_groups() {
     let (_folder, path) = made(&without.collect::<Vec<_>>());
     let dataset = known("mme", &path, &SetArgs::default());
     assert_eq!(groups(&dataset), [None; 4]);
-    let said = dataset.reading().join("\n");
+    let said = dataset.summary().join("\n");
     assert!(
         said.contains("no groups: MME scores questions together by {category}_{question_id} or"),
         "{said}"

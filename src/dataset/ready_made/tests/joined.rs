@@ -1,4 +1,4 @@
-//! Rows by their names, families of joined configurations, sets in ZIP files, and rows that contradict each other.
+//! Rows by name, families of several configurations, sets in ZIP files, and contradictory rows.
 
 use std::fs;
 use std::io::Write as _;
@@ -28,7 +28,7 @@ fn written(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 #[test]
-fn the_names_of_rows_are_their_ids() {
+fn names_of_rows_become_ids() {
     let text = json!({"q7": question(json!({})), "q2": question(json!({"question": "Which?"}))})
         .to_string();
     let (_folder, path) = written(&text);
@@ -36,12 +36,12 @@ fn the_names_of_rows_are_their_ids() {
     let mut ids: Vec<String> = read(&dataset).into_iter().map(|read| read.0).collect();
     ids.sort();
     assert_eq!(ids, ["q2", "q7"]);
-    let said = dataset.reading().join("\n");
+    let said = dataset.summary().join("\n");
     assert!(
         said.contains("id = id") && said.contains("the names of the rows"),
         "{said}"
     );
-    // Their own ids go first.
+    // A column of ids takes precedence.
     let text = json!({"q7": question(json!({"question_id": 1})), "q2": question(json!({"question_id": 2}))}).to_string();
     let (_folder, path) = written(&text);
     let dataset = open(&path, &SetArgs::default()).unwrap();
@@ -50,15 +50,15 @@ fn the_names_of_rows_are_their_ids() {
     assert_eq!(ids, ["1", "2"]);
     assert!(
         !dataset
-            .reading()
+            .summary()
             .join("\n")
             .contains("the names of the rows")
     );
 }
 
 #[test]
-fn a_family_varies_among_the_questions_that_are_asked() {
-    // The types differ only in rows that are left out.
+fn family_column_varies_among_asked_questions() {
+    // The types differ only in omitted rows.
     let rows = [
         json!({"id": 1, "category": "choice", "topic": "cups"}),
         json!({"id": 2, "category": "choice", "topic": "balls"}),
@@ -81,7 +81,7 @@ fn a_family_varies_among_the_questions_that_are_asked() {
 }
 
 #[test]
-fn a_configuration_is_a_family_where_no_column_varies() {
+fn configuration_is_the_family_if_no_column_varies() {
     let rows = |id: i64| [row(question(json!({"id": id, "category": "choice"})))];
     let (folder, path) = set("art/test.jsonl", &rows(1));
     super::fixture::write(&folder.path().join("music.jsonl"), &rows(2));
@@ -96,11 +96,11 @@ fn a_configuration_is_a_family_where_no_column_varies() {
     let families: Vec<String> = read(&dataset).into_iter().map(|read| read.1).collect();
     assert_eq!(families, ["Art", "Music"]);
     assert!(
-        dataset.reading()[0].contains("in 2 families (by configuration)"),
+        dataset.summary()[0].contains("in 2 families (by configuration)"),
         "{:?}",
-        dataset.reading()
+        dataset.summary()
     );
-    // A column that the user names goes first, and so does one of a single configuration.
+    // A column given by the user takes precedence, and so does any column if there is only one configuration.
     let mapped = SetArgs {
         map: vec!["family=category".parse().unwrap()],
         ..args
@@ -112,7 +112,7 @@ fn a_configuration_is_a_family_where_no_column_varies() {
     );
 }
 
-/// A ZIP file of these files.
+/// A ZIP file with these files.
 fn zip(files: &[(&str, &[u8])]) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("set.zip");
@@ -127,7 +127,7 @@ fn zip(files: &[(&str, &[u8])]) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 #[test]
-fn a_zip_file_carries_its_name_and_its_map() {
+fn zip_file_has_its_own_name_and_map() {
     let table = b"nr,frage,bild,A,B,richtig\n1,Which?,0,x,y,B\n";
     let info = br#"{"name": "Probe", "map": "id=nr,question=frage,image=images/{bild}.png,answer=richtig"}"#;
     let image = png(3);
@@ -159,7 +159,7 @@ fn a_zip_file_carries_its_name_and_its_map() {
 }
 
 #[test]
-fn an_image_in_a_zip_file_is_the_only_one_of_its_name() {
+fn ambiguous_image_in_zip_is_refused() {
     let table = b"id,question,image,A,B,answer\n1,Which?,images/0.png,x,y,B\n";
     let (near, top) = (png(3), png(5));
     let of = |files: &[(&str, &[u8])]| zip(&[files, &[("data/metadata.csv", table)]].concat());
@@ -177,7 +177,7 @@ fn an_image_in_a_zip_file_is_the_only_one_of_its_name() {
 }
 
 #[test]
-fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
+fn equal_rows_with_different_answers_are_refused() {
     let rows = |answers: [&str; 2]| -> Vec<_> {
         (0..40)
             .map(|at| {
@@ -207,30 +207,30 @@ fn two_rows_that_differ_in_their_answers_alone_contradict_each_other() {
     assert_eq!(dataset.questions().len(), 38);
     assert!(
         dataset
-            .reading()
+            .summary()
             .join("\n")
             .contains("left out: 2 of 40 rows")
     );
-    // An exact repeat is asked again, and said.
+    // An exact repeat is asked again, with a note.
     let (_folder, path) = set("set.jsonl", &rows(["x", "x"]));
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 40);
     assert!(
         dataset
-            .reading()
+            .summary()
             .join("\n")
             .contains("that repeat an earlier one, with its image and options: 1;")
     );
 }
 
 #[test]
-fn rows_with_ids_contradict_each_other_too() {
+fn contradictions_are_found_with_ids_too() {
     let skip = SetArgs {
         bad: Some(crate::dataset::SkipBad::default()),
         ..SetArgs::default()
     };
     let strict = SetArgs::default();
-    // The images of the rows 39 to 41, in cells and in files.
+    // Images of the rows 39 to 41, in cells and in files.
     for [same, other] in [
         [json!(base64(1)), json!(base64(2))],
         [json!("a.png"), json!("b.png")],
@@ -266,7 +266,7 @@ fn rows_with_ids_contradict_each_other_too() {
         let ids: Vec<&str> = kept.questions().iter().map(|kept| &*kept.id.0).collect();
         assert_eq!(ids.len(), 57);
         assert!(!ids.iter().any(|id| ["38", "39", "40"].contains(id)));
-        // Another image, or the same answer.
+        // With another image or the same answer there is no contradiction.
         for fine in [
             [(&same, "x"), (&same, "x"), (&other, "y")],
             [(&same, "y"), (&same, "y"), (&same, "y")],
@@ -277,7 +277,7 @@ fn rows_with_ids_contradict_each_other_too() {
 }
 
 #[test]
-fn a_folder_says_which_column_is_which_of_its_questions() {
+fn dataset_json_maps_columns_of_questions() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     fs::write(at("0.png"), png(9)).unwrap();
@@ -297,7 +297,7 @@ fn a_folder_says_which_column_is_which_of_its_questions() {
 }
 
 #[test]
-fn a_bmp_image_is_read() {
+fn bmp_image_is_read() {
     let mut file = std::io::Cursor::new(Vec::new());
     let image = image::RgbImage::from_fn(8, 8, |x, _| image::Rgb([7, x as u8, 0]));
     image.write_to(&mut file, image::ImageFormat::Bmp).unwrap();
@@ -305,7 +305,7 @@ fn a_bmp_image_is_read() {
     let (_folder, path) = set("set.jsonl", &[row(question(json!({"image": text})))]);
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(read(&dataset)[0].5, 7);
-    assert!(dataset.reading().join("\n").contains("BMP 1"));
+    assert!(dataset.summary().join("\n").contains("BMP 1"));
     let (_folder, path) = set(
         "set.jsonl",
         &[row(question(
@@ -326,7 +326,7 @@ fn a_bmp_image_is_read() {
 }
 
 #[test]
-fn several_files_of_one_set_are_joined_in_their_order() {
+fn several_files_are_joined_in_order() {
     let rows = |id: i64| {
         [row(question(
             json!({"id": id, "image": format!("{id}.png")}),

@@ -1,4 +1,4 @@
-//! Files that would fill the memory or the disk, and what is said of flags and cards that cannot be followed.
+//! Files that would fill the memory or the disk, and invalid flags and cards.
 
 use std::fs;
 use std::io::Write as _;
@@ -21,7 +21,7 @@ fn question() -> serde_json::Map<String, serde_json::Value> {
 }
 
 #[test]
-fn a_table_of_too_many_columns_is_named() {
+fn too_many_columns_are_an_error() {
     let header: Vec<String> = (0..5000).map(|at| format!("c{at}")).collect();
     for (name, text) in [
         ("set.csv", header.join(",") + "\n1\n"),
@@ -53,7 +53,7 @@ fn a_table_of_too_many_columns_is_named() {
 }
 
 #[test]
-fn a_record_without_an_end_is_named() {
+fn unterminated_record_is_an_error() {
     let mut text = b"question,answer\nWhich?,x\n\"What".to_vec();
     text.resize(70 << 20, b'x');
     let (_folder, path) = file("set.csv", &text);
@@ -66,7 +66,7 @@ fn a_record_without_an_end_is_named() {
 }
 
 #[test]
-fn a_row_of_parquet_that_would_fill_the_memory_is_named() {
+fn huge_parquet_row_is_an_error() {
     let with = |length: usize| {
         let mut long = question();
         long.insert("evidence".to_owned(), json!("x".repeat(length)));
@@ -87,7 +87,7 @@ fn a_row_of_parquet_that_would_fill_the_memory_is_named() {
 }
 
 #[test]
-fn a_row_of_a_million_values_is_refused() {
+fn row_with_a_million_values_is_refused() {
     let values = "0,".repeat(1_100_000);
     for (name, text) in [
         ("set.jsonl", format!("{{\"question\": [{values}0]}}\n")),
@@ -100,7 +100,7 @@ fn a_row_of_a_million_values_is_refused() {
             "{problem}"
         );
     }
-    // Commas in a text are no values.
+    // Commas in a string do not count.
     let mut rows = question();
     rows.insert("evidence".to_owned(), json!(values));
     let (_folder, path) = set("set.jsonl", &[rows]);
@@ -118,7 +118,7 @@ fn a_row_of_a_million_values_is_refused() {
 }
 
 #[test]
-fn a_packed_file_that_grows_without_end_is_refused() {
+fn decompression_bomb_is_refused() {
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     let zeros = vec![b' '; 1 << 24];
     for _ in 0..65 {
@@ -133,7 +133,7 @@ fn a_packed_file_that_grows_without_end_is_refused() {
 }
 
 #[test]
-fn a_flag_for_json_is_refused_for_other_files() {
+fn rows_flag_is_refused_for_other_files() {
     let args = SetArgs {
         rows: Some("items".to_owned()),
         ..SetArgs::default()
@@ -149,7 +149,7 @@ fn a_flag_for_json_is_refused_for_other_files() {
 }
 
 #[test]
-fn a_card_names_splits_as_fields_and_a_folder() {
+fn card_with_split_fields_and_folder_is_read() {
     let (folder, path) = set("data/inner/test-a.csv", &[question()]);
     super::fixture::write(
         &path.with_file_name("train-a.csv"),
@@ -175,7 +175,7 @@ fn a_card_names_splits_as_fields_and_a_folder() {
     };
     card(mapping).unwrap();
     assert_eq!(open(folder.path(), &train).unwrap().questions().len(), 2);
-    // Of a card that cannot be read it is said that names decide.
+    // If the card cannot be parsed, a note says that file names decide.
     fs::rename(
         folder.path().join("data/inner/test-a.csv"),
         folder.path().join("test.csv"),
@@ -183,7 +183,7 @@ fn a_card_names_splits_as_fields_and_a_folder() {
     .unwrap();
     let dataset = card("- config_name: default\n  data_files: &x y\n").unwrap();
     assert_eq!(read(&dataset).len(), 1);
-    let said = dataset.reading().join("\n");
+    let said = dataset.summary().join("\n");
     assert!(
         said.contains("README.md cannot be read") && said.contains("names of files decide"),
         "{said}"

@@ -1,4 +1,4 @@
-//! Letters in the text of a question: options, or names of things in the image; and options by their letters in an object.
+//! Letters in the text of a question (options, or labels of things in the image), and objects with options by letter.
 
 use serde_json::{Value, json};
 
@@ -17,7 +17,7 @@ fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 #[test]
-fn a_line_behind_the_last_option_is_no_part_of_it() {
+fn line_after_last_option_belongs_to_question() {
     let text = "Which colour?\n(A) red\n(B) green\n(C) pink\n(D) blue\n";
     for (ending, question) in [
         ("Answer with the letter.", "Which colour?"),
@@ -56,7 +56,7 @@ fn a_line_behind_the_last_option_is_no_part_of_it() {
 }
 
 #[test]
-fn letters_that_name_things_are_no_options() {
+fn letters_of_things_in_the_image_are_not_options() {
     let rows = vec![
         asked("Is person (A) left of person (B)?", json!("yes")),
         asked("Is person (A) left of person (B) or near?", json!("no")),
@@ -76,7 +76,7 @@ fn letters_that_name_things_are_no_options() {
             ("Is it a cup?", "no"),
         ]
     );
-    // Options of yes and no are options.
+    // “Yes” and “no” with letters are options.
     let (_folder, path) = with(vec![asked("Is it? (A) no (B) yes", json!("yes"))]);
     assert_eq!(
         read(&open(&path, &SetArgs::default()).unwrap())[0].3,
@@ -85,7 +85,7 @@ fn letters_that_name_things_are_no_options() {
 }
 
 #[test]
-fn numbers_say_nothing_of_lettered_options() {
+fn numbers_do_not_identify_lettered_options() {
     let (_folder, path) = with(vec![asked("Which? (A) red (B) blue (C) pink", json!(0))]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(problem.contains("not one of the options"), "{problem}");
@@ -96,7 +96,7 @@ fn numbers_say_nothing_of_lettered_options() {
 }
 
 #[test]
-fn a_map_without_options_leaves_the_question_whole() {
+fn empty_options_map_keeps_the_whole_question() {
     let text = "Which is redder? (A) the cup (B) the ball";
     let (_folder, path) = with(vec![asked(text, json!("yes"))]);
     let found = read(&open(&path, &map("options=")).unwrap());
@@ -113,7 +113,7 @@ fn a_map_without_options_leaves_the_question_whole() {
 }
 
 #[test]
-fn options_by_letter_in_an_object_are_a_list() {
+fn object_with_letter_keys_has_options() {
     let open_as = |options: Value| {
         let (_folder, path) = with(vec![
             json!({"question": "?", "options": options, "answer": "B", "image": base64(1)}),
@@ -164,7 +164,7 @@ fn options_by_letter_in_an_object_are_a_list() {
 }
 
 #[test]
-fn a_list_of_one_image_in_a_text_is_one_image() {
+fn text_list_with_one_image_is_one_image() {
     for form in ["tsv", "csv", "json", "parquet"] {
         let embedded = [format!("[\"{}\"]", base64(4)), format!("['{}']", base64(4))];
         let paths = [

@@ -1,4 +1,4 @@
-//! Sets in the shapes in which benchmarks ship, read and refused.
+//! Tests of the reader with the layouts of published benchmarks.
 
 mod broken;
 mod columns;
@@ -20,12 +20,12 @@ use super::SetArgs;
 use crate::dataset::{DataPlace, Dataset, Picture};
 use crate::error::Result;
 
-/// The set at a path, read with these flags.
+/// Opens the set at a path with these flags.
 fn open(path: &Path, args: &SetArgs) -> Result<Dataset> {
     Dataset::open(&DataPlace::Path(path.to_owned()), None, args)
 }
 
-/// The flags with a map.
+/// Flags with this map.
 fn map(text: &str) -> SetArgs {
     SetArgs {
         map: vec![text.parse().unwrap()],
@@ -33,17 +33,17 @@ fn map(text: &str) -> SetArgs {
     }
 }
 
-/// The message with which a set is refused.
+/// Error message for a set that is refused.
 fn refusal(path: &Path, args: &SetArgs) -> String {
     open(path, args)
         .err()
         .map_or_else(|| "it was read".to_owned(), |e| e.to_string())
 }
 
-/// A question as the tests compare it: id, family, text, choices, true choice, and the first sample of its image.
+/// Compared parts of a question: id, family, text, choices, true choice, and the first sample of its image.
 type Read = (String, String, String, Vec<String>, String, u8);
 
-/// All questions of a set, with the red of their images.
+/// All questions of a set, with the red values of their images.
 fn read(dataset: &Dataset) -> Vec<Read> {
     dataset
         .questions()
@@ -63,7 +63,7 @@ fn read(dataset: &Dataset) -> Vec<Read> {
         .collect()
 }
 
-/// The digests of the images, by frame.
+/// Digests of the images by frame.
 fn digests(dataset: &Dataset) -> Vec<(String, String)> {
     let frames = dataset.frames();
     frames

@@ -1,4 +1,4 @@
-//! Ambiguous data are refused, with a command that resolves them; the command works as it is printed.
+//! Ambiguous data are refused, with a flag that resolves the ambiguity.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use super::fixture::{base64, row, set};
 use super::{map, open, read, refusal};
 use crate::dataset::ready_made::SetArgs;
 
-/// A set of rows with these fields beside a question and an image.
+/// A set with these fields in each row, and a question and an image.
 fn with(fields: &[Value]) -> (tempfile::TempDir, std::path::PathBuf) {
     let rows: Vec<_> = fields
         .iter()
@@ -21,7 +21,7 @@ fn with(fields: &[Value]) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 #[test]
-fn two_readings_of_an_answer_are_refused() {
+fn ambiguous_answer_format_is_refused() {
     let numbers = json!({"options": ["red", "green", "blue"], "answer": 1});
     let (_folder, path) = with(&[numbers.clone(), numbers.clone()]);
     let problem = refusal(&path, &SetArgs::default());
@@ -41,7 +41,7 @@ fn two_readings_of_an_answer_are_refused() {
         ),
         ("green".into(), "red".into())
     );
-    // One row that only one reading fits decides for all.
+    // A row that fits only one format decides for all rows.
     let (_folder, path) = with(&[numbers, json!({"options": ["red", "green"], "answer": 0})]);
     assert_eq!(
         read(&open(&path, &SetArgs::default()).unwrap())[0].4,
@@ -50,7 +50,7 @@ fn two_readings_of_an_answer_are_refused() {
 }
 
 #[test]
-fn two_columns_that_differ_are_refused_and_two_that_agree_are_one() {
+fn differing_columns_of_a_role_are_refused() {
     let (_folder, path) =
         with(&[json!({"options": ["B", "A"], "choices": ["x", "y"], "answer": "A"})]);
     let problem = refusal(&path, &SetArgs::default());
@@ -74,14 +74,14 @@ fn two_columns_that_differ_are_refused_and_two_that_agree_are_one() {
         json!({"options": ["A. x", "B. y"], "choices": ["x", "y"], "answer": "x", "label": "A"}),
     ]);
     assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].4, "x");
-    // A column that no reading fits is no column of answers.
+    // A column that fits no format is not an answer column.
     let (_folder, path) =
         with(&[json!({"options": ["x", "y"], "answer": "x", "target": "the chair"})]);
     assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].4, "x");
 }
 
 #[test]
-fn what_cannot_be_found_is_said_with_the_columns() {
+fn error_for_missing_role_lists_columns() {
     let (folder, path) = set(
         "set.json",
         &[row(json!({"nr": 0, "frage": "?", "bild": "0"}))],
@@ -129,7 +129,7 @@ fn what_cannot_be_found_is_said_with_the_columns() {
 }
 
 #[test]
-fn a_test_split_without_answers_is_named_so() {
+fn split_without_answers_is_an_error() {
     let (_folder, path) = with(&[
         json!({"options": ["x", "y"], "answer": null}),
         json!({"options": ["x", "y"], "answer": ""}),

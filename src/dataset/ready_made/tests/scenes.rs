@@ -1,4 +1,4 @@
-//! The scenes of the frames of a set.
+//! Scenes of the frames of a set.
 
 use std::fs;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use super::fixture::{png, row, set};
 use super::{map, open, refusal};
 use crate::dataset::{DataPlace, Dataset, SetArgs};
 
-/// Six rows about three images, whose scenes are in a column.
+/// Six rows about three images, with a column of scenes.
 fn rows(column: &str, scenes: [Value; 6]) -> Vec<Map<String, Value>> {
     scenes.into_iter().enumerate().map(|(number, scene)| {
         row(json!({
@@ -27,7 +27,7 @@ fn made(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir, PathBuf)
     (folder, path)
 }
 
-/// The scene of each frame that is asked about.
+/// Scene of each frame with a question.
 fn scenes(dataset: &Dataset) -> Vec<String> {
     dataset
         .questions()
@@ -40,12 +40,12 @@ fn scenes(dataset: &Dataset) -> Vec<String> {
 const TWO: [&str; 6] = ["a", "a", "a", "a", "b", "b"];
 
 #[test]
-fn a_column_names_the_scene_in_every_form() {
+fn scene_column_is_read_in_every_format() {
     for name in ["set.jsonl", "set.json", "set.tsv", "set.csv", "set.parquet"] {
         let (_folder, path) = made(name, &rows("Scene", TWO.map(|scene| json!(scene))));
         let read = open(&path, &SetArgs::default()).unwrap();
         assert_eq!(scenes(&read), ["a", "a", "b"], "{name}");
-        let said = read.reading().join("\n");
+        let said = read.summary().join("\n");
         assert!(
             said.contains("scene = Scene: 2 scenes of 3 images"),
             "{said}"
@@ -61,7 +61,7 @@ fn a_column_names_the_scene_in_every_form() {
 }
 
 #[test]
-fn the_questions_of_a_folder_name_the_scenes_of_its_frames() {
+fn questions_assign_scenes_to_frames() {
     let rows = rows("scene", TWO.map(|scene| json!(scene)));
     let rows: Vec<Map<String, Value>> = rows
         .into_iter()
@@ -75,8 +75,8 @@ fn the_questions_of_a_folder_name_the_scenes_of_its_frames() {
     let place = DataPlace::Path(folder.path().to_owned());
     let read = Dataset::open(&place, None, &SetArgs::default()).unwrap();
     assert_eq!(scenes(&read), ["a", "a", "b"]);
-    // It is this program's own form still.
-    assert_eq!(read.reading_to_say().count(), 0);
+    // The set is still in this program's own format.
+    assert_eq!(read.printed_summary().count(), 0);
 }
 
 #[test]
@@ -92,7 +92,7 @@ fn some_frames_may_have_no_scene() {
     let (_folder, path) = made("set.jsonl", &rows("scene", some));
     let read = open(&path, &map("id=id")).unwrap();
     assert_eq!(scenes(&read), ["a", "", "b"]);
-    let said = read.reading().join("\n");
+    let said = read.summary().join("\n");
     assert!(
         said.contains("2 scenes of 3 images, 1 image without a scene"),
         "{said}"
@@ -100,7 +100,7 @@ fn some_frames_may_have_no_scene() {
 }
 
 #[test]
-fn an_image_of_two_scenes_is_refused_or_no_scene_is_used() {
+fn contradictory_scenes_are_refused_or_ignored() {
     let two = ["a", "b", "a", "a", "b", "b"].map(|scene| json!(scene));
     let (_folder, path) = made("set.jsonl", &rows("scene", two));
     let problem = refusal(&path, &SetArgs::default());
@@ -110,7 +110,7 @@ fn an_image_of_two_scenes_is_refused_or_no_scene_is_used() {
         "{problem}"
     );
     assert_eq!(scenes(&open(&path, &map("scene=")).unwrap()), ["", "", ""]);
-    // A column of other sets that happens to have the name.
+    // A column of a foreign set that has this name by coincidence.
     let mut foreign = rows(
         "scene",
         ["a", "b", "a", "a", "b", "b"].map(|scene| json!(scene)),
@@ -121,7 +121,7 @@ fn an_image_of_two_scenes_is_refused_or_no_scene_is_used() {
     let (_folder, path) = made("set.jsonl", &foreign);
     let read = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(scenes(&read), ["", "", ""]);
-    let said = read.reading().join("\n");
+    let said = read.summary().join("\n");
     assert!(
         said.contains("scene is not used as the scene: the image \"0.png\" is of"),
         "{said}"

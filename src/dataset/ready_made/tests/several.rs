@@ -1,4 +1,4 @@
-//! Rows that show several images.
+//! Rows with several images.
 
 use serde_json::{Map, Value, json};
 
@@ -13,10 +13,10 @@ fn send() -> SetArgs {
     }
 }
 
-/// The id and the text of a question, and the name and the red of each of its images.
+/// Id and text of a question, and the name and the red value of each of its images.
 type Shown = (String, String, Vec<(String, u8)>);
 
-/// Each question with the red of its images, in every form that holds images.
+/// Each question with the red values of its images, from every format with embedded images.
 fn shown(rows: &[Map<String, Value>]) -> Vec<Shown> {
     let mut all = ["set.parquet", "set.json", "set.jsonl"].map(|name| {
         let (_folder, path) = set(name, rows);
@@ -25,7 +25,7 @@ fn shown(rows: &[Map<String, Value>]) -> Vec<Shown> {
             .questions()
             .iter()
             .map(|question| {
-                let frames = dataset.shown(&question.frame).iter().map(|frame| {
+                let frames = dataset.shown_frames(&question.frame).iter().map(|frame| {
                     let picture = dataset.picture(frame).unwrap().decode().unwrap();
                     (frame.0.clone(), picture.samples()[0])
                 });
@@ -59,7 +59,7 @@ fn rows() -> Vec<Map<String, Value>> {
 }
 
 #[test]
-fn images_are_named_by_the_least_row_that_shows_them() {
+fn images_are_named_by_the_lowest_row_id() {
     let image = |name: &str, red: u8| (name.to_owned(), red);
     let expected = [
         ("3".to_owned(), "?".to_owned(), vec![image("3", 2)]),
@@ -80,7 +80,7 @@ fn images_are_named_by_the_least_row_that_shows_them() {
 }
 
 #[test]
-fn an_id_that_ends_as_a_number_of_an_image_takes_no_image() {
+fn id_that_looks_like_an_image_number_does_not_clash() {
     let mut rows = rows();
     rows.push(row(
         json!({"id": "7#1", "question": "Red?", "choices": ["x", "y"], "answer": "x", "image_1": bytes(9), "image_2": null}),
@@ -92,7 +92,7 @@ fn an_id_that_ends_as_a_number_of_an_image_takes_no_image() {
 }
 
 #[test]
-fn ids_by_content_are_of_all_images() {
+fn content_ids_depend_on_all_images() {
     let fields = json!([
         {"question": "?", "choices": ["x", "y"], "answer": "x", "image": [bytes(1), bytes(2)]},
         {"question": "?", "choices": ["x", "y"], "answer": "x", "image": [bytes(1), bytes(3)]},
@@ -112,7 +112,7 @@ fn ids_by_content_are_of_all_images() {
 }
 
 #[test]
-fn a_mark_without_an_image_makes_a_bad_row() {
+fn mark_without_image_makes_a_bad_row() {
     let mut rows = rows();
     let more = (0..60).map(|id| {
         json!({"id": format!("m{id}"), "question": "?", "choices": ["x", "y"], "answer": "x", "image_1": bytes(id), "image_2": null})
@@ -132,9 +132,9 @@ fn a_mark_without_an_image_makes_a_bad_row() {
         bad: Some(crate::dataset::SkipBad::default()),
         ..send()
     };
-    let reading = open(&path, &args).unwrap().reading().join("\n");
+    let summary = open(&path, &args).unwrap().summary().join("\n");
     assert!(
-        reading.contains("2 questions show 2 images, all in one request"),
-        "{reading}"
+        summary.contains("2 questions show 2 images, all in one request"),
+        "{summary}"
     );
 }

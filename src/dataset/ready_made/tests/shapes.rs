@@ -1,4 +1,4 @@
-//! Each shape is read as its publishers mean it.
+//! Layouts of published sets.
 
 use std::fs;
 
@@ -11,7 +11,7 @@ use crate::dataset::ready_made::SetArgs;
 
 const FORMS: [&str; 5] = ["tsv", "csv", "json", "jsonl", "parquet"];
 
-/// The questions of rows in every form, which must be the same; with digests.
+/// Questions of these rows, which must be the same in every format, and digests of their images.
 fn in_every_form(rows: &[Map<String, Value>], args: &SetArgs) -> Vec<Read> {
     let mut first = None;
     for form in FORMS {
@@ -25,8 +25,8 @@ fn in_every_form(rows: &[Map<String, Value>], args: &SetArgs) -> Vec<Read> {
 }
 
 #[test]
-fn cells_of_options_and_letters() {
-    // MMBench: an absent cell is no option, a short image is the id of another row, a hint comes first.
+fn option_cells_and_letter_answers_are_read() {
+    // MMBench: an absent cell is not an option, a short image is the id of another row, a hint comes first.
     let rows = [
         row(
             json!({"index": 241, "question": "What colour?", "A": "red", "B": "green", "C": "blue", "answer": "B", "category": "colour", "l2-category": "x", "image": base64(1)}),
@@ -81,7 +81,7 @@ fn lists_of_options_and_numbers() {
     );
     assert_eq!(questions[1].2, "What colour?");
     assert_eq!(questions[0].1, "other");
-    // Without a column of ids an id follows from the content.
+    // Without a column of ids, ids depend on the content.
     let mut turned = rows.to_vec();
     turned.reverse();
     let again = in_every_form(&turned, &SetArgs::default());
@@ -93,7 +93,7 @@ fn lists_of_options_and_numbers() {
 }
 
 #[test]
-fn options_in_the_text_of_a_list_or_in_a_cell() {
+fn options_in_a_list_text_or_a_cell_are_read() {
     for options in [
         json!("['it\\'s red', \"it's green\"]"),
         json!("[\"it's red\", \"it's green\"]"),
@@ -151,7 +151,7 @@ fn options_in_the_question_and_yes_or_no() {
 }
 
 #[test]
-fn digits_are_yes_and_no_only_if_all_rows_ask_so() {
+fn digits_mean_yes_or_no_only_in_yes_no_sets() {
     let question = |text: &str, answer: &str, red| {
         row(json!({"question": text, "gt_answer": answer, "image": bytes(red)}))
     };
@@ -164,7 +164,7 @@ fn digits_are_yes_and_no_only_if_all_rows_ask_so() {
         .map(|read| read.4)
         .collect();
     assert_eq!(truths, ["yes", "no"]);
-    // "How many" has a number for an answer: it is open, and no question of yes and no.
+    // The answer to "how many" is a number: the question is open, not a yes/no question.
     let rows = [
         question("How many cups?", "1", 1),
         question("How many cats?", "0", 2),
@@ -174,8 +174,8 @@ fn digits_are_yes_and_no_only_if_all_rows_ask_so() {
 }
 
 #[test]
-fn equal_images_are_one_frame_and_get_their_name_from_the_least_id() {
-    // POPE: many questions an image.
+fn equal_images_share_the_lowest_id() {
+    // POPE: many questions per image.
     let question = |id: i64, colour| {
         row(json!({"id": id, "question": "Is it there?", "answer": "yes", "image": bytes(colour)}))
     };
@@ -192,7 +192,7 @@ fn equal_images_are_one_frame_and_get_their_name_from_the_least_id() {
 }
 
 #[test]
-fn ids_that_are_not_unique_are_passed_over() {
+fn id_columns_with_duplicates_are_skipped() {
     let question = |text: &str| {
         row(json!({"question_id": "one.png", "question": text, "answer": "yes", "image": bytes(1)}))
     };
@@ -205,22 +205,22 @@ fn ids_that_are_not_unique_are_passed_over() {
     assert_ne!(questions[0].0, questions[1].0);
     assert_eq!(questions[2].0, format!("{}-1", questions[0].0));
     let (_folder, path) = set("set.json", &rows);
-    let reading = open(&path, &SetArgs::default())
+    let summary = open(&path, &SetArgs::default())
         .unwrap()
-        .reading()
+        .summary()
         .join("\n");
     assert!(
-        reading.contains("id = content (question_id does not tell all rows apart)"),
-        "{reading}"
+        summary.contains("id = content (question_id does not tell all rows apart)"),
+        "{summary}"
     );
     assert!(
-        reading.contains("questions that repeat an earlier one, with its image and options: 1;"),
-        "{reading}"
+        summary.contains("questions that repeat an earlier one, with its image and options: 1;"),
+        "{summary}"
     );
 }
 
 #[test]
-fn several_images_none_and_open_questions_are_left_out_only_by_a_flag() {
+fn rows_that_cannot_be_asked_need_a_flag() {
     let rows = [
         row(
             json!({"id": 1, "question": "?", "choices": ["x", "y"], "answer": "x", "image_1": bytes(1), "image_2": null}),
@@ -254,15 +254,15 @@ fn several_images_none_and_open_questions_are_left_out_only_by_a_flag() {
     ] {
         assert!(problem.contains(says), "{problem}");
     }
-    let reading = open(&path, &args).unwrap().reading().join("\n");
+    let summary = open(&path, &args).unwrap().summary().join("\n");
     assert!(
-        reading.contains("left out: 1 of 3 rows (several images)"),
-        "{reading}"
+        summary.contains("left out: 1 of 3 rows (several images)"),
+        "{summary}"
     );
 }
 
 #[test]
-fn a_list_of_one_image_is_one_image() {
+fn list_with_one_image_is_one_image() {
     // SEED-Bench.
     let rows = [
         row(
@@ -285,7 +285,7 @@ fn a_list_of_one_image_is_one_image() {
 }
 
 #[test]
-fn an_image_folder_and_files_beside_a_table() {
+fn image_folder_and_image_files_are_read() {
     let rows = [row(
         json!({"file_name": "0.png", "question": "?", "options": ["x", "y"], "answer": "y"}),
     )];
@@ -309,11 +309,11 @@ fn an_image_folder_and_files_beside_a_table() {
         read(&open(&path, &map("image=MMVP Images/{Index}.jpg")).unwrap())[0].5,
         6
     );
-    let known = crate::dataset::place(&format!("mmvp:{}", path.display())).unwrap();
+    let known = crate::dataset::parse_data_place(&format!("mmvp:{}", path.display())).unwrap();
     let dataset = crate::dataset::Dataset::open(&known, None, &SetArgs::default()).unwrap();
     assert!(
         dataset
-            .reading()
+            .summary()
             .join("\n")
             .contains("read by the rules of MMVP: Tong et al.")
     );
@@ -321,7 +321,7 @@ fn an_image_folder_and_files_beside_a_table() {
 }
 
 #[test]
-fn rows_inside_a_json_file_are_found_by_their_way() {
+fn rows_in_json_are_found_by_path() {
     let one = json!({"q": "?", "opts": ["x", "y"], "a": "x", "id": 1});
     let nested = json!({"info": 1, "images": [{"file_name": "0.png", "id": 9, "qa": [one]}]});
     let (folder, path) = set("set.json", &[]);
@@ -342,7 +342,7 @@ fn rows_inside_a_json_file_are_found_by_their_way() {
 }
 
 #[test]
-fn a_repository_has_configurations_splits_and_shards() {
+fn repository_has_configurations_splits_and_shards() {
     let question = |text: &str, red| {
         row(json!({"question": text, "options": ["x", "y"], "answer": "x", "image": bytes(red)}))
     };
@@ -418,7 +418,7 @@ fn a_repository_has_configurations_splits_and_shards() {
 
 #[cfg(unix)]
 #[test]
-fn a_hub_s_cache_is_read_through_its_links() {
+fn hub_cache_is_read_through_links() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("datasets--org--name");
     let snapshot = cache.join("snapshots/abc");
@@ -482,7 +482,7 @@ fn compressed_files_are_read() {
     let dataset = open(&zip, &SetArgs::default()).unwrap();
     let frames: Vec<&str> = dataset.frames().map(|frame| frame.0.as_str()).collect();
     assert_eq!((frames, read(&dataset)[1].5), (vec!["test/pics/0.png"], 6));
-    // Embedded images are read from the unpacked copy.
+    // Embedded images are read from the decompressed copy.
     let rows = [row(
         json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "y", "image": bytes(7)}),
     )];
@@ -492,7 +492,7 @@ fn compressed_files_are_read() {
     assert_eq!(read(&open(&zip, &SetArgs::default()).unwrap())[0].5, 7);
 }
 
-/// Writes a ZIP file of these entries.
+/// Writes a ZIP file with these entries.
 pub(super) fn pack(path: &std::path::Path, entries: &[(&str, &[u8])]) {
     let mut zip = zip::ZipWriter::new(fs::File::create(path).unwrap());
     for (name, bytes) in entries {

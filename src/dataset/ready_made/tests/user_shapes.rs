@@ -1,4 +1,4 @@
-//! Shapes of users' own sets and of late benchmarks: read, or refused with the map that reads them.
+//! Sets of users and recent benchmarks: read, or refused with a map that reads them.
 
 use serde_json::{Value, json};
 
@@ -6,14 +6,14 @@ use super::fixture::{base64, bytes, png, row, set};
 use super::{map, open, read, refusal};
 use crate::dataset::ready_made::SetArgs;
 
-/// The map in a refusal, as a user pastes it.
+/// The `--map` flag in an error message, as a user pastes it.
 fn map_in(problem: &str) -> SetArgs {
     let (_, flag) = problem.split_once("--map ").unwrap();
     let value = flag.split([' ', '\n']).next().unwrap();
     map(value.trim_matches(['\'', ',', ';', '.']))
 }
 
-/// The choices and the truth of the first question.
+/// Choices and true choice of the first question.
 fn first(path: &std::path::Path, args: &SetArgs) -> (String, Vec<String>, String) {
     let (_, _, text, choices, truth, _) = read(&open(path, args).unwrap()).swap_remove(0);
     (text, choices, truth)
@@ -24,7 +24,7 @@ fn words(words: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn conversations_are_refused_with_the_map_that_reads_them() {
+fn error_for_conversations_suggests_a_map() {
     let question = "<image>\nWhich room?\nA. hall\nB. attic";
     for turns in [
         json!([{"from": "human", "value": question}, {"from": "gpt", "value": "B"}]),
@@ -49,7 +49,7 @@ fn conversations_are_refused_with_the_map_that_reads_them() {
                 expected,
                 "{form}: {problem}"
             );
-            // A list is no empty question, and its JSON no question.
+            // A list is neither an empty question nor a question as JSON text.
             let problem = refusal(&path, &map("question=turns,answer=id"));
             assert!(
                 !problem.contains("is empty") && problem.contains("--map question=turns."),
@@ -60,7 +60,7 @@ fn conversations_are_refused_with_the_map_that_reads_them() {
 }
 
 #[test]
-fn a_question_in_the_image_is_asked_by_an_empty_map() {
+fn empty_question_map_asks_the_question_in_the_image() {
     let rows = [row(
         json!({"id": "1", "image": base64(9), "options": "['x', 'y']", "answer": "B", "subject": "Art"}),
     )];
@@ -73,7 +73,7 @@ fn a_question_in_the_image_is_asked_by_an_empty_map() {
 }
 
 #[test]
-fn a_column_of_questions_of_another_name_is_proposed() {
+fn question_column_with_unknown_name_is_suggested() {
     let rows = [row(
         json!({"bild": "a text", "frage": "What is it?", "image": base64(9), "options": ["x", "y"], "answer": "x"}),
     )];
@@ -87,7 +87,7 @@ fn a_column_of_questions_of_another_name_is_proposed() {
 }
 
 #[test]
-fn bytes_in_another_column_than_the_path_are_the_image() {
+fn image_data_is_preferred_to_a_path() {
     let fields = |column: &str| {
         let mut fields = row(
             json!({"pid": "1", "question": "?", "image": "images/1.jpg", "choices": ["x", "y"], "answer": "y"}),
@@ -97,7 +97,7 @@ fn bytes_in_another_column_than_the_path_are_the_image() {
     };
     let (_folder, path) = set("set.parquet", &[fields("decoded_image")]);
     assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].5, 77);
-    // A column of no known name is proposed.
+    // A column without a known name is suggested.
     let (_folder, path) = set("set.parquet", &[fields("pixels")]);
     let problem = refusal(&path, &SetArgs::default());
     assert_eq!(
@@ -108,7 +108,7 @@ fn bytes_in_another_column_than_the_path_are_the_image() {
 }
 
 #[test]
-fn answers_by_index_beside_an_empty_column_are_read_or_proposed() {
+fn index_answers_are_read_or_suggested() {
     let fields = |column: &str, at: usize| {
         let mut fields = row(
             json!({"question_id": at.to_string(), "question": "?", "image": base64(at as u8), "choices": ["x", "y", "z"], "answer": ""}),
@@ -140,7 +140,7 @@ fn answers_by_index_beside_an_empty_column_are_read_or_proposed() {
 }
 
 #[test]
-fn a_template_takes_a_width() {
+fn template_has_a_number_width() {
     let fields =
         row(json!({"image_id": 42, "question": "?", "options": ["x", "y"], "answer": "x"}));
     let (folder, path) = set("set.json", &[fields]);
@@ -161,7 +161,7 @@ fn a_template_takes_a_width() {
 }
 
 #[test]
-fn blanks_and_line_ends_of_options_do_not_reach_the_choices() {
+fn options_are_trimmed_and_on_one_line() {
     let clean = words(&["red", "dark blue"]);
     for fields in [
         json!({"options": ["red \n", "dark\r\nblue\t"], "answer": "red"}),
@@ -178,9 +178,9 @@ fn blanks_and_line_ends_of_options_do_not_reach_the_choices() {
     }
 }
 
-/// Values so long that a message may not repeat them.
+/// Values that are too long for a message.
 #[test]
-fn no_message_repeats_long_values() {
+fn messages_excerpt_long_values() {
     let long = "lorem ipsum ".repeat(500);
     let unbroken = "x".repeat(5000);
     let good = json!({"id": "1", "question": "?", "image": base64(9), "options": ["x", "y"], "answer": "x"});

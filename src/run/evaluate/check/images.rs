@@ -93,7 +93,7 @@ pub(super) fn images(
     if unusable > 0 {
         findings.warn(format!(
             "{} leaves out the questions about {} that cannot be used",
-            SkipBad::enough(unusable, shown.len()).flag(),
+            SkipBad::allowing(unusable, shown.len()).flag(),
             counted(unusable, "image")
         ));
     }
@@ -114,7 +114,7 @@ fn first_shown<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a F
     let mut seen = HashSet::new();
     first_asked(questions)
         .into_iter()
-        .flat_map(|question| dataset.shown(&question.frame))
+        .flat_map(|question| dataset.shown_frames(&question.frame))
         .filter(|frame| seen.insert(*frame))
         .collect()
 }

@@ -38,7 +38,7 @@ use images::Depth;
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CheckArgs {
     /// The data, in place of --data; default: --data
-    #[arg(value_name = "DATA", value_parser = crate::dataset::place, add = Decides::Nothing)]
+    #[arg(value_name = "DATA", value_parser = crate::dataset::parse_data_place, add = Decides::Nothing)]
     pub place: Option<DataPlace>,
     /// Decode every image, so that damage inside a file is found; one that ends early is found without
     #[arg(long, help_heading = "Check", add = Decides::Nothing)]
@@ -133,7 +133,7 @@ fn data(
             return Ok(0);
         }
     };
-    for line in dataset.reading() {
+    for line in dataset.summary() {
         findings.ok(line);
     }
     let asked = match select(dataset.take_questions(), selection) {
@@ -206,8 +206,11 @@ fn save(path: &Path, dataset: &Dataset, questions: &[Question]) -> Result<()> {
             Ok(Picture::Encoded(file)) => Some(hex(&Sha256::digest(file.bytes()))),
             _ => None,
         };
-        let digests: Vec<Option<String>> =
-            dataset.shown(&question.frame).iter().map(digest).collect();
+        let digests: Vec<Option<String>> = dataset
+            .shown_frames(&question.frame)
+            .iter()
+            .map(digest)
+            .collect();
         let digest = match &*digests {
             [only] => json!(only),
             several => json!(several),

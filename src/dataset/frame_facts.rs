@@ -1,4 +1,4 @@
-//! The facts about a frame that are not in its images: [`FrameFacts`]; and the bytes of its files: [`FrameFiles`].
+//! Metadata of a frame ([`FrameFacts`]), and its files before decoding ([`FrameFiles`]).
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,37 +12,37 @@ use crate::types::{
     DepthKind, Digest, Frame, FrameId, InputNote, Intrinsics, SegmentName, Segmentation,
 };
 
-/// The facts about a frame that are not in its images: scene, camera, names of segments, room.
+/// Metadata of a frame: scene, camera, names of segments, room.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(crate) struct FrameFacts {
     pub(crate) scene: String,
     pub(crate) depth_kind: DepthKind,
     pub(crate) intrinsics: Option<Intrinsics>,
     pub(crate) segmentation: Segmentation,
-    #[serde(serialize_with = "pairs")]
+    #[serde(serialize_with = "serialize_as_pairs")]
     pub(crate) names: Arc<BTreeMap<u32, SegmentName>>,
     pub(crate) room: Option<String>,
 }
 
-/// Writes a map as a list of pairs, because the keys of a JSON object can only be texts.
-fn pairs<S: Serializer>(
+/// Serializes a map as a list of pairs, because keys of a JSON object must be strings.
+fn serialize_as_pairs<S: Serializer>(
     names: &BTreeMap<u32, SegmentName>,
     serializer: S,
 ) -> std::result::Result<S::Ok, S::Error> {
     serializer.collect_seq(names)
 }
 
-/// The files of a frame as they are stored, not decoded.
+/// Files of a frame, not decoded.
 #[derive(Debug)]
 pub struct FrameFiles<'a> {
     pub(crate) id: &'a FrameId,
     pub(crate) picture: Picture,
     pub(crate) maps: MapFiles<'a>,
-    pub(crate) view: &'a FrameFacts,
+    pub(crate) facts: &'a FrameFacts,
 }
 
 impl FrameFiles<'_> {
-    /// The digest of all files and facts, without the name of the frame.
+    /// Digest of all files and metadata, without the name of the frame.
     ///
     /// # Errors
     /// If a number of the camera intrinsics is not finite.
@@ -50,20 +50,20 @@ impl FrameFiles<'_> {
         let parts = [
             self.picture.digest(),
             self.maps.digest(),
-            Digest::canonical("darkqa.view/1", self.view)?,
+            Digest::canonical("darkqa.view/1", self.facts)?,
         ];
         Ok(Digest::from_parts(
             parts.iter().map(|part| &part.as_bytes()[..]),
         ))
     }
 
-    /// Changes that reading the image makes besides decoding its codes.
+    /// Changes made to the samples while decoding, such as color conversion.
     #[must_use]
     pub fn note(&self) -> InputNote {
         self.picture.note()
     }
 
-    /// The frame with its image and maps decoded.
+    /// Decodes the image and the maps.
     ///
     /// # Errors
     /// If an image or a map is broken, or a map has another size than the image; the error names the file.
@@ -75,15 +75,15 @@ impl FrameFiles<'_> {
         let size = (rgb.height(), rgb.width());
         Ok(Frame {
             id: self.id.clone(),
-            scene: self.view.scene.clone(),
+            scene: self.facts.scene.clone(),
             depth: self.maps.depth(size)?,
-            depth_kind: self.view.depth_kind,
-            intrinsics: self.view.intrinsics,
+            depth_kind: self.facts.depth_kind,
+            intrinsics: self.facts.intrinsics,
             semantic: self.maps.semantic(size)?,
             segments: self.maps.segments(size)?,
-            segmentation: self.view.segmentation,
-            names: Arc::clone(&self.view.names),
-            room: self.view.room.clone(),
+            segmentation: self.facts.segmentation,
+            names: Arc::clone(&self.facts.names),
+            room: self.facts.room.clone(),
             rgb,
         })
     }

@@ -1,43 +1,46 @@
-//! The names of image files in a folder: [`ImageNames`].
+//! Image files among the paths of a folder: [`ImagePaths`].
 
 use std::path::{Path, PathBuf};
 
 use crate::picture::image_file::format::READ;
 use crate::types::images::is_image_ending;
 
-/// Endings of the names of images in formats that are not read.
-const UNREAD: [&str; 28] = [
+/// Extensions of image formats that are not supported.
+const UNSUPPORTED: [&str; 28] = [
     "heic", "heif", "hif", "avif", "gif", "jxl", "jp2", "j2k", "jpf", "psd", "tga", "ico", "ppm",
     "pgm", "pnm", "pfm", "hdr", "dng", "cr2", "cr3", "nef", "arw", "orf", "raf", "rw2", "pef",
     "srw", "svg",
 ];
 
-/// The image files among some paths, and those that look like images in formats that are not read.
-pub(crate) struct ImageNames {
+/// Image files in supported and in unsupported formats.
+pub(crate) struct ImagePaths {
     pub(super) images: Vec<PathBuf>,
-    unread: Vec<PathBuf>,
+    unsupported: Vec<PathBuf>,
 }
 
-impl ImageNames {
-    /// Sorts paths by the endings of their names. Folders and other files are left out.
+impl ImagePaths {
+    /// Sorts paths by their extensions. Folders and other files are left out.
     pub(crate) fn from_paths(paths: impl IntoIterator<Item = PathBuf>) -> Self {
-        let (mut images, mut unread) = (Vec::new(), Vec::new());
+        let (mut images, mut unsupported) = (Vec::new(), Vec::new());
         for path in paths {
             if is_image(&path) {
                 images.push(path);
-            } else if has(&path, |ending| {
-                UNREAD.contains(&&*ending.to_ascii_lowercase())
+            } else if is_file_with_extension(&path, |extension| {
+                UNSUPPORTED.contains(&&*extension.to_ascii_lowercase())
             }) {
-                unread.push(path);
+                unsupported.push(path);
             }
         }
-        Self { images, unread }
+        Self {
+            images,
+            unsupported,
+        }
     }
 
-    /// How many files look like images and are not read, with the name of the first; `None` if there are none.
-    pub(super) fn unread(&self) -> Option<String> {
-        let first = self.unread.first()?;
-        let count = match self.unread.len() {
+    /// Message with the number of unsupported images and the name of the first; `None` if all are supported.
+    pub(super) fn unsupported_note(&self) -> Option<String> {
+        let first = self.unsupported.first()?;
+        let count = match self.unsupported.len() {
             1 => "1 file looks like an image and is not read".to_owned(),
             n => format!("{n} files look like images and are not read"),
         };
@@ -47,22 +50,24 @@ impl ImageNames {
         ))
     }
 
-    /// Prints how many files of a folder look like images and are not read.
-    pub(crate) fn warn_of_unread(&self, folder: &Path) {
-        if let Some(unread) = self.unread() {
-            tracing::warn!("{}: {unread}", folder.display());
+    /// Warns if the folder has images in unsupported formats.
+    pub(crate) fn warn_of_unsupported(&self, folder: &Path) {
+        if let Some(note) = self.unsupported_note() {
+            tracing::warn!("{}: {note}", folder.display());
         }
     }
 }
 
-/// Whether a path is a file with the ending of an image that is read.
+/// True if the path is a file with the extension of a supported image format.
 pub(crate) fn is_image(path: &Path) -> bool {
-    has(path, is_image_ending)
+    is_file_with_extension(path, is_image_ending)
 }
 
-fn has(path: &Path, is_one: impl Fn(&str) -> bool) -> bool {
-    let ending = path.extension().and_then(|ending| ending.to_str());
-    ending.is_some_and(is_one) && path.is_file()
+fn is_file_with_extension(path: &Path, is_wanted: impl Fn(&str) -> bool) -> bool {
+    path.extension()
+        .and_then(|extension| extension.to_str())
+        .is_some_and(is_wanted)
+        && path.is_file()
 }
 
 #[cfg(test)]
@@ -72,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_are_sorted_by_their_endings() {
+    fn files_are_sorted_by_extension() {
         let folder = tempfile::tempdir().unwrap();
         let names = [
             "a.PNG", "b.webp", "c.tiff", "d.HEIC", "e.avif", "f.txt", "g",
@@ -83,19 +88,19 @@ mod tests {
         }
         let inner = folder.path().join("inner.png");
         fs::create_dir(&inner).unwrap();
-        let names = ImageNames::from_paths(paths.into_iter().chain([inner]));
-        let images: Vec<_> = names
+        let found = ImagePaths::from_paths(paths.into_iter().chain([inner]));
+        let images: Vec<_> = found
             .images
             .iter()
             .map(|path| path.file_name().unwrap())
             .collect();
         assert_eq!(images, ["a.PNG", "b.webp", "c.tiff"]);
         assert_eq!(
-            names.unread().unwrap(),
+            found.unsupported_note().unwrap(),
             "2 files look like images and are not read, as d.HEIC; PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected, so convert them first"
         );
         assert_eq!(
-            ImageNames::from_paths([folder.path().join("f.txt")]).unread(),
+            ImagePaths::from_paths([folder.path().join("f.txt")]).unsupported_note(),
             None
         );
     }

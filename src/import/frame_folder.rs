@@ -1,4 +1,4 @@
-//! A folder of the common interface, imported unchanged, so that key frames can be chosen from it.
+//! A folder of frames in the format of this program, imported to choose key frames: [`FrameFolder`].
 
 use std::path::{Path, PathBuf};
 
@@ -10,17 +10,17 @@ use crate::error::{Error, Result};
 use crate::files::reading::json_lines;
 use crate::types::{DepthKind, Frame, FrameId, Rgb, Segmentation};
 
-/// An open folder of the common interface.
+/// Folder of frames in the format of this program.
 #[derive(Debug)]
-pub(super) struct Interface {
+pub(super) struct FrameFolder {
     folder: PathBuf,
     dataset: Dataset,
     listing: Listing,
 }
 
-/// The keys of a line of `frames.jsonl` that are read here in addition to [`Dataset`].
+/// Fields of a line of `frames.jsonl` that [`Dataset`] does not read.
 #[derive(Deserialize)]
-struct InterfaceLine {
+struct FrameLine {
     scene: String,
     frame: String,
     t: Option<f64>,
@@ -28,7 +28,7 @@ struct InterfaceLine {
     depth_kind: Option<DepthKind>,
 }
 
-impl Interface {
+impl FrameFolder {
     pub(super) fn open(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         let dataset = Dataset::from_frames(folder, further)?;
         let Some(labels) = dataset.labels().cloned() else {
@@ -37,7 +37,7 @@ impl Interface {
                 "no classes.json in this folder",
             ));
         };
-        let lines = json_lines::<InterfaceLine>(&folder.join("frames.jsonl"))?;
+        let lines = json_lines::<FrameLine>(&folder.join("frames.jsonl"))?;
         let depth_kind = lines.iter().find_map(|(_, line)| line.depth_kind);
         let mut listing = Listing {
             labels,
@@ -49,22 +49,22 @@ impl Interface {
             let Some(ImageSource::File(file)) = dataset.sources.get(&id) else {
                 continue;
             };
-            let view = &file.view;
-            if view.segmentation == Segmentation::Parts {
+            let facts = &file.facts;
+            if facts.segmentation == Segmentation::Parts {
                 listing.segmentation = Segmentation::Parts;
             }
             listing
                 .names
                 .entry(line.scene.clone())
-                .or_insert_with(|| view.names.as_ref().clone());
+                .or_insert_with(|| facts.names.as_ref().clone());
             listing.frames.push(ListedFrame {
                 rgb: file.rgb.clone(),
                 scene: line.scene,
                 frame: line.frame,
                 time: line.t,
                 pose: line.pose,
-                intrinsics: view.intrinsics,
-                room: view.room.clone(),
+                intrinsics: facts.intrinsics,
+                room: facts.room.clone(),
                 index,
             });
         }
@@ -79,17 +79,19 @@ impl Interface {
     }
 }
 
-impl Adapter for Interface {
+impl Adapter for FrameFolder {
     fn listing(&self) -> &Listing {
         &self.listing
     }
 
-    fn further_files(&self) -> Vec<PathBuf> {
-        let about =
+    fn other_files(&self) -> Vec<PathBuf> {
+        let folder_files =
             ["frames.jsonl", "classes.json", "dataset.json"].map(|name| self.folder.join(name));
-        let scenes = self.listing.names.keys();
-        let names =
-            scenes.map(|scene| self.folder.join("scenes").join(scene).join("segments.json"));
+        let segment_names = self
+            .listing
+            .names
+            .keys()
+            .map(|scene| self.folder.join("scenes").join(scene).join("segments.json"));
         let maps = self
             .dataset
             .sources
@@ -97,15 +99,16 @@ impl Adapter for Interface {
             .filter_map(|source| match source {
                 ImageSource::File(file) => Some(file.maps.paths()),
                 _ => None,
-            });
-        about
+            })
+            .flatten();
+        folder_files
             .into_iter()
-            .chain(names)
-            .chain(maps.flatten())
+            .chain(segment_names)
+            .chain(maps)
             .collect()
     }
 
-    fn read(&self, frame: &ListedFrame, _rgb: &Rgb) -> Result<FrameMaps> {
+    fn read_maps(&self, frame: &ListedFrame, _rgb: &Rgb) -> Result<FrameMaps> {
         let Frame {
             depth,
             semantic,

@@ -1,12 +1,12 @@
-//! Interpretation of the answers in a ready-made set: [`Reading`], and [`one_reading`] to find the one that fits all rows.
+//! Format of the answers in a ready-made set: [`AnswerFormat`], and [`find_format`] to find the one that fits all rows.
 
-use super::offered::{Offered, Origin, one_line};
+use super::option_list::{OptionList, OptionOrigin, one_line};
 use crate::types::Choices;
 use crate::types::questions::letter;
 
 /// How an answer identifies a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::dataset::ready_made) enum Reading {
+pub(in crate::dataset::ready_made) enum AnswerFormat {
     /// Letter of the choice: `A`, `(a)` or `A.`. A lower-case letter needs a bracket, full stop or colon.
     Letter,
     /// Text of the choice, ignoring letter case, surrounding space and a final full stop.
@@ -17,7 +17,7 @@ pub(in crate::dataset::ready_made) enum Reading {
     Index1,
 }
 
-impl Reading {
+impl AnswerFormat {
     pub(in crate::dataset::ready_made) const ALL: [Self; 4] =
         [Self::Letter, Self::Text, Self::Index0, Self::Index1];
 
@@ -32,16 +32,21 @@ impl Reading {
     }
 
     pub(in crate::dataset::ready_made) fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|reading| reading.name() == name)
+        Self::ALL.into_iter().find(|format| format.name() == name)
     }
 
     /// Index of the choice that the answer identifies; `None` if it identifies none.
-    pub(in crate::dataset::ready_made) fn truth(
+    pub(in crate::dataset::ready_made) fn choice_index(
         self,
         answer: &str,
-        options: &Offered,
+        options: &OptionList,
     ) -> Option<usize> {
-        let option_at = |wanted: usize| options.places.iter().position(|place| *place == wanted);
+        let option_at = |wanted: usize| {
+            options
+                .positions
+                .iter()
+                .position(|position| *position == wanted)
+        };
         let answer = answer.trim();
         match self {
             Self::Letter => {
@@ -58,98 +63,117 @@ impl Reading {
                 option_at((0..Choices::MOST).find(|&index| letter(index) == upper)?)
             }
             Self::Text => {
-                let answer = folded(answer);
+                let answer = normalize_text(answer);
                 options
                     .texts
                     .iter()
-                    .position(|option| folded(option) == answer)
+                    .position(|option| normalize_text(option) == answer)
             }
-            Self::Index0 => option_at(number(answer)?),
-            Self::Index1 => option_at(number(answer)?.checked_sub(1)?),
+            Self::Index0 => option_at(parse_index(answer)?),
+            Self::Index1 => option_at(parse_index(answer)?.checked_sub(1)?),
         }
     }
 
-    /// Like [`Self::truth`], for a reading that the user did not choose: numbers identify none of the options that a question's text
-    /// lists by letter.
-    pub(in crate::dataset::ready_made) fn by_rule(
+    /// Like [`Self::choice_index`], for a format that the user did not choose: numbers do not identify options that the text of the
+    /// question lists by letter.
+    pub(in crate::dataset::ready_made) fn inferred_choice_index(
         self,
         answer: &str,
-        options: &Offered,
+        options: &OptionList,
     ) -> Option<usize> {
         let is_number = matches!(self, Self::Index0 | Self::Index1);
-        if is_number && options.origin == Origin::Question {
+        if is_number && options.origin == OptionOrigin::Question {
             return None;
         }
-        self.truth(answer, options)
+        self.choice_index(answer, options)
     }
 }
 
 /// Normalizes a text for comparison: one line in lower case, without surrounding space and full stops at its end.
-pub(super) fn folded(text: &str) -> String {
+fn normalize_text(text: &str) -> String {
     let text = one_line(text);
     text.trim_end_matches('.').trim_end().to_lowercase()
 }
 
 /// Parses a whole number, written as `3` or `3.0`.
-fn number(text: &str) -> Option<usize> {
+fn parse_index(text: &str) -> Option<usize> {
     let digits = text.strip_suffix(".0").unwrap_or(text);
     let is_number = !digits.is_empty() && digits.bytes().all(|byte| byte.is_ascii_digit());
     is_number.then(|| digits.parse().ok()).flatten()
 }
 
-/// An answer, with the options of its row.
-pub(super) type AnswerOf<'a> = (&'a str, &'a Offered);
-
-/// Result of the search for one reading of all answers.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum OneReading {
-    /// This reading fits all rows.
-    Fits(Reading),
-    /// No reading fits all rows: the one that fits most, and the indices of the rows that it does not fit.
-    None { best: Reading, unfit: Vec<usize> },
-    /// Two readings fit all rows, but identify different choices in this row.
-    Ambiguous { readings: [Reading; 2], row: usize },
+/// Answer of a row, with the options of the row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RowAnswer<'a> {
+    pub(super) answer: &'a str,
+    pub(super) options: &'a OptionList,
 }
 
-/// Finds the reading that fits the answers of all rows; the first of several that agree in every row.
-pub(super) fn one_reading(rows: &[AnswerOf<'_>]) -> OneReading {
-    let unfit_rows = Reading::ALL.map(|reading| {
+impl RowAnswer<'_> {
+    /// Index of the choice that the answer identifies in an inferred format.
+    fn choice_index(self, format: AnswerFormat) -> Option<usize> {
+        format.inferred_choice_index(self.answer, self.options)
+    }
+}
+
+/// Result of the search for one format of all answers.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum FormatSearch {
+    /// This format fits all rows.
+    Fits(AnswerFormat),
+    /// No format fits all rows: the one that fits most, and the indices of the rows that it does not fit.
+    None {
+        best: AnswerFormat,
+        unfit: Vec<usize>,
+    },
+    /// Two formats fit all rows, but identify different choices in this row.
+    Ambiguous {
+        formats: [AnswerFormat; 2],
+        row: usize,
+    },
+}
+
+/// Finds the format that fits the answers of all rows; the first of several that agree in every row.
+pub(super) fn find_format(rows: &[RowAnswer<'_>]) -> FormatSearch {
+    let unfit_rows = AnswerFormat::ALL.map(|format| {
         let unfit: Vec<usize> = rows
             .iter()
             .enumerate()
-            .filter(|(_, (answer, options))| reading.by_rule(answer, options).is_none())
-            .map(|(row, _)| row)
+            .filter(|(_, row)| row.choice_index(format).is_none())
+            .map(|(index, _)| index)
             .collect();
-        (reading, unfit)
+        (format, unfit)
     });
-    let fitting: Vec<Reading> = unfit_rows
+    let fitting: Vec<AnswerFormat> = unfit_rows
         .iter()
         .filter(|(_, unfit)| unfit.is_empty())
-        .map(|(reading, _)| *reading)
+        .map(|(format, _)| *format)
         .collect();
     let Some((&first, others)) = fitting.split_first() else {
         let (best, unfit) = unfit_rows
             .into_iter()
-            .min_by_key(|(reading, unfit)| (unfit.len(), *reading))
-            .unwrap_or((Reading::Text, Vec::new()));
-        return OneReading::None { best, unfit };
+            .min_by_key(|(format, unfit)| (unfit.len(), *format))
+            .unwrap_or((AnswerFormat::Text, Vec::new()));
+        return FormatSearch::None { best, unfit };
     };
-    for (row, (answer, options)) in rows.iter().enumerate() {
-        let choice = first.by_rule(answer, options);
+    for (index, row) in rows.iter().enumerate() {
+        let choice = row.choice_index(first);
         let differing = others
             .iter()
-            .find(|other| other.by_rule(answer, options) != choice);
+            .find(|other| row.choice_index(**other) != choice);
         if let Some(&other) = differing {
-            let readings = [first, other];
-            return OneReading::Ambiguous { readings, row };
+            return FormatSearch::Ambiguous {
+                formats: [first, other],
+                row: index,
+            };
         }
     }
-    OneReading::Fits(first)
+    FormatSearch::Fits(first)
 }
 
 /// Index of the choice of a yes/no question that the answer identifies: 0 for yes, 1 for no.
-pub(in crate::dataset::ready_made) fn yes_or_no(answer: &str) -> Option<usize> {
-    match &*folded(answer) {
+pub(in crate::dataset::ready_made) fn yes_no_index(answer: &str) -> Option<usize> {
+    match &*normalize_text(answer) {
         "yes" | "true" => Some(0),
         "no" | "false" => Some(1),
         _ => None,
@@ -157,8 +181,8 @@ pub(in crate::dataset::ready_made) fn yes_or_no(answer: &str) -> Option<usize> {
 }
 
 /// Index of the choice of a yes/no question that a digit identifies: 0 (yes) for the digit 1, 1 (no) for the digit 0.
-pub(in crate::dataset::ready_made) fn digit(answer: &str) -> Option<usize> {
-    match number(answer.trim()) {
+pub(in crate::dataset::ready_made) fn digit_index(answer: &str) -> Option<usize> {
+    match parse_index(answer.trim()) {
         Some(1) => Some(0),
         Some(0) => Some(1),
         _ => None,
@@ -183,18 +207,19 @@ pub(super) fn asks_yes_or_no(question: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn options(texts: &[&str]) -> Offered {
-        Offered::listed(&texts.iter().map(ToString::to_string).collect::<Vec<_>>())
+    fn options(texts: &[&str]) -> OptionList {
+        OptionList::from_list(&texts.iter().map(ToString::to_string).collect::<Vec<_>>())
     }
 
     #[test]
     fn letters_and_numbers_count_empty_columns() {
-        let offered = Offered {
+        let options = OptionList {
             texts: ["red", "blue"].map(str::to_owned).into(),
-            places: vec![0, 2],
-            origin: Origin::Columns,
+            positions: vec![0, 2],
+            origin: OptionOrigin::Columns,
         };
-        let read = |answer: &str| Reading::ALL.map(|reading| reading.truth(answer, &offered));
+        let read =
+            |answer: &str| AnswerFormat::ALL.map(|format| format.choice_index(answer, &options));
         assert_eq!(read("C"), [Some(1), None, None, None]);
         assert_eq!(read("B"), [None; 4]);
         assert_eq!(read("2"), [None, None, Some(1), None]);
@@ -202,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn each_reading_accepts_its_own_forms() {
+    fn each_format_accepts_its_own_answers() {
         let texts = options(&["Red", "2", "blue."]);
         for (answer, letter, text, index0, index1) in [
             ("A", Some(0), None, None, None),
@@ -218,42 +243,50 @@ mod tests {
             ("1.5", None, None, None, None),
             ("-1", None, None, None, None),
         ] {
-            let read = Reading::ALL.map(|reading| reading.truth(answer, &texts));
+            let read = AnswerFormat::ALL.map(|format| format.choice_index(answer, &texts));
             assert_eq!(read, [letter, text, index0, index1], "{answer}");
         }
     }
 
     #[test]
-    fn one_reading_must_fit_all_rows() {
-        let (two, letters) = (options(&["x", "y", "z"]), options(&["B", "A"]));
-        let rows: [AnswerOf<'_>; 2] = [("1", &two), ("0", &two)];
-        assert_eq!(one_reading(&rows), OneReading::Fits(Reading::Index0));
-        let rows: [AnswerOf<'_>; 2] = [("1", &two), ("2", &two)];
-        let readings = [Reading::Index0, Reading::Index1];
+    fn one_format_must_fit_all_rows() {
+        let find = |answers: &[&str], texts: &[&str]| {
+            let options = options(texts);
+            let rows: Vec<RowAnswer<'_>> = answers
+                .iter()
+                .map(|answer| RowAnswer {
+                    answer,
+                    options: &options,
+                })
+                .collect();
+            find_format(&rows)
+        };
+        let texts = ["x", "y", "z"];
         assert_eq!(
-            one_reading(&rows),
-            OneReading::Ambiguous { readings, row: 0 }
+            find(&["1", "0"], &texts),
+            FormatSearch::Fits(AnswerFormat::Index0)
         );
-        let rows: [AnswerOf<'_>; 1] = [("A", &letters)];
-        let readings = [Reading::Letter, Reading::Text];
+        let formats = [AnswerFormat::Index0, AnswerFormat::Index1];
         assert_eq!(
-            one_reading(&rows),
-            OneReading::Ambiguous { readings, row: 0 }
+            find(&["1", "2"], &texts),
+            FormatSearch::Ambiguous { formats, row: 0 }
         );
-        let rows: [AnswerOf<'_>; 3] = [("x", &two), ("A", &two), ("y", &two)];
-        let unfit = vec![1];
+        let formats = [AnswerFormat::Letter, AnswerFormat::Text];
         assert_eq!(
-            one_reading(&rows),
-            OneReading::None {
-                best: Reading::Text,
-                unfit
+            find(&["A"], &["B", "A"]),
+            FormatSearch::Ambiguous { formats, row: 0 }
+        );
+        assert_eq!(
+            find(&["x", "A", "y"], &texts),
+            FormatSearch::None {
+                best: AnswerFormat::Text,
+                unfit: vec![1]
             }
         );
-        // Readings that agree in every row are not ambiguous.
-        let same = options(&["A", "B"]);
+        // Formats that agree in every row are not ambiguous.
         assert_eq!(
-            one_reading(&[("B", &same)]),
-            OneReading::Fits(Reading::Letter)
+            find(&["B"], &["A", "B"]),
+            FormatSearch::Fits(AnswerFormat::Letter)
         );
     }
 
@@ -262,11 +295,15 @@ mod tests {
         assert!(asks_yes_or_no("Is it red?") && asks_yes_or_no(" are they?"));
         assert!(!asks_yes_or_no("How many?") && !asks_yes_or_no("Issue?"));
         assert_eq!(
-            (yes_or_no("Yes."), yes_or_no("false"), yes_or_no("1")),
+            (
+                yes_no_index("Yes."),
+                yes_no_index("false"),
+                yes_no_index("1")
+            ),
             (Some(0), Some(1), None)
         );
         assert_eq!(
-            (digit("1"), digit("0"), digit("2")),
+            (digit_index("1"), digit_index("0"), digit_index("2")),
             (Some(0), Some(1), None)
         );
     }

@@ -1,4 +1,4 @@
-//! The files of a folder that an import does not read: [`LeftOver`].
+//! Files of a folder that an import does not read: [`UnreadFiles`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -6,50 +6,49 @@ use std::path::{Path, PathBuf};
 use crate::error::Result;
 use crate::files::reading::entries;
 
-/// The most kinds of files that are named.
-const MOST_NAMED: usize = 8;
+/// Maximum number of kinds of files in the message.
+const MAX_NAMED_KINDS: usize = 8;
 
-/// The files that are not read, by their kind: the name of their folder and the ending of their names. A single file of its kind has
-/// its name.
+/// Unread files by kind: the name of their folder and their extension.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(crate) struct LeftOver(BTreeMap<String, Files>);
+pub(crate) struct UnreadFiles(BTreeMap<String, FilesOfKind>);
 
 #[derive(Debug, PartialEq, Eq)]
-struct Files {
+struct FilesOfKind {
     count: usize,
+    /// Relative path of the first file.
     first: String,
 }
 
-impl LeftOver {
-    /// The files in a folder and below, without those that are read. Links to folders are not followed.
+impl UnreadFiles {
+    /// Finds the files in a folder and its subfolders that are not in `read`. Links to folders are not followed.
     ///
     /// # Errors
     /// If a folder cannot be read.
     pub(super) fn in_folder(folder: &Path, read: &BTreeSet<PathBuf>) -> Result<Self> {
-        let mut left = Self::default();
-        left.add(folder, folder, read)?;
-        Ok(left)
+        let mut unread = Self::default();
+        unread.add_folder(folder, folder, read)?;
+        Ok(unread)
     }
 
-    fn add(&mut self, root: &Path, folder: &Path, read: &BTreeSet<PathBuf>) -> Result<()> {
+    fn add_folder(&mut self, root: &Path, folder: &Path, read: &BTreeSet<PathBuf>) -> Result<()> {
         for path in entries(folder)? {
             if path.is_symlink() && path.is_dir() {
                 continue;
             }
             if path.is_dir() {
-                self.add(root, &path, read)?;
+                self.add_folder(root, &path, read)?;
             } else if !read.contains(&path) {
-                let within = path.strip_prefix(root).unwrap_or(&path);
-                self.count(within);
+                self.count(path.strip_prefix(root).unwrap_or(&path));
             }
         }
         Ok(())
     }
 
+    /// Counts a file, given by its relative path.
     fn count(&mut self, path: &Path) {
         let text = |part: Option<&std::ffi::OsStr>| {
-            part.map(|part| part.to_string_lossy().into_owned())
-                .unwrap_or_default()
+            part.unwrap_or_default().to_string_lossy().into_owned()
         };
         let folder = text(path.parent().and_then(Path::file_name));
         let name = match path.extension() {
@@ -61,7 +60,7 @@ impl LeftOver {
         } else {
             format!("{folder}/{name}")
         };
-        let files = self.0.entry(kind).or_insert_with(|| Files {
+        let files = self.0.entry(kind).or_insert_with(|| FilesOfKind {
             count: 0,
             first: path.display().to_string(),
         });
@@ -69,27 +68,25 @@ impl LeftOver {
     }
 
     /// Adds the files of another folder.
-    pub(super) fn join(&mut self, other: Self) {
+    pub(super) fn merge(&mut self, other: Self) {
         for (kind, files) in other.0 {
-            match self.0.get_mut(&kind) {
-                Some(known) => known.count += files.count,
-                None => {
-                    self.0.insert(kind, files);
-                }
-            }
+            self.0
+                .entry(kind)
+                .and_modify(|known| known.count += files.count)
+                .or_insert(files);
         }
     }
 
-    /// One line that names the files, the most frequent kinds first; empty if there are none.
+    /// Line with the unread files, the most frequent kinds first; empty if there are none.
     pub(crate) fn line(&self) -> String {
         if self.0.is_empty() {
             return String::new();
         }
-        let mut kinds: Vec<(&String, &Files)> = self.0.iter().collect();
+        let mut kinds: Vec<(&String, &FilesOfKind)> = self.0.iter().collect();
         kinds.sort_by_key(|(kind, files)| (std::cmp::Reverse(files.count), *kind));
         let mut named: Vec<String> = kinds
             .iter()
-            .take(MOST_NAMED)
+            .take(MAX_NAMED_KINDS)
             .map(|(kind, files)| match files.count {
                 1 => files.first.clone(),
                 count => format!("{count} {kind}"),
@@ -97,7 +94,7 @@ impl LeftOver {
             .collect();
         let more: usize = kinds
             .iter()
-            .skip(MOST_NAMED)
+            .skip(MAX_NAMED_KINDS)
             .map(|(_, files)| files.count)
             .sum();
         if more > 0 {
@@ -114,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_that_are_not_read_are_named_by_kind() {
+    fn unread_files_are_counted_by_kind() {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str| {
             let path = folder.path().join(name);
@@ -124,18 +121,18 @@ mod tests {
         };
         let read: BTreeSet<PathBuf> = ["s0/rgb/0.png", "s0/rgb/1.png"].map(write).into();
         assert_eq!(
-            LeftOver::in_folder(folder.path(), &read).unwrap().line(),
+            UnreadFiles::in_folder(folder.path(), &read).unwrap().line(),
             ""
         );
         for name in ["s0/sem/0.tif", "s1/sem/1.tif", "s0/note", "README.md"] {
             write(name);
         }
-        let left = LeftOver::in_folder(folder.path(), &read).unwrap();
-        assert_eq!(left.line(), "not read: 2 sem/*.tif, README.md, s0/note\n");
+        let unread = UnreadFiles::in_folder(folder.path(), &read).unwrap();
+        assert_eq!(unread.line(), "not read: 2 sem/*.tif, README.md, s0/note\n");
         for number in 0..9 {
             write(&format!("more/{number}.e{number}"));
         }
-        let line = LeftOver::in_folder(folder.path(), &read).unwrap().line();
+        let line = UnreadFiles::in_folder(folder.path(), &read).unwrap().line();
         assert!(line.ends_with(", 4 more\n"), "{line}");
     }
 }
