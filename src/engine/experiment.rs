@@ -64,6 +64,11 @@ pub(crate) trait Experiment: Sync {
     /// Image sources (frames or walks) of this run or shard.
     fn sources(&self) -> &[Source];
 
+    /// In a shard, the sources of the whole run that enhancers are tried on; empty for those of [`sources`](Self::sources).
+    fn probe_sources(&self) -> &[Source] {
+        &[]
+    }
+
     /// Position of these sources in the whole run, for a shard; `None` if this is the whole run.
     fn part(&self) -> Option<PartPlace>;
 

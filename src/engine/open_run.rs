@@ -483,7 +483,9 @@ pub(crate) fn pipeline<'a, E: Experiment>(
         stored: None,
     };
     let implausible = experiment.settings().loading.probe.implausible();
-    ImagePipeline::new(steps, enhancers, implausible)
+    let mut pipeline = ImagePipeline::new(steps, enhancers, implausible);
+    pipeline.probe_sources = experiment.probe_sources();
+    pipeline
 }
 
 /// Largest image that all endpoints take; `None` if all models are built in. Each image is made once, for all of them.

@@ -44,6 +44,8 @@ pub(crate) struct ImagePipeline<'a> {
     sets: Vec<Vec<Enhancer>>,
     /// The treatment of an enhancer whose output cannot be an enhanced image.
     implausible: Implausible,
+    /// In a shard, the frames of the whole run that enhancers are tried on; empty for those of the plan.
+    pub(crate) probe_sources: &'a [Source],
 }
 
 /// A source in progress.
@@ -69,6 +71,7 @@ impl<'a> ImagePipeline<'a> {
             resting: Vec::new(),
             sets: Vec::new(),
             implausible,
+            probe_sources: &[],
         }
     }
 
@@ -104,6 +107,7 @@ impl<'a> ImagePipeline<'a> {
                     resting: self.resting.clone(),
                     sets: Vec::new(),
                     implausible: self.implausible,
+                    probe_sources: self.probe_sources,
                 };
                 scope.spawn(move || {
                     worker.install(|| {

@@ -1,5 +1,7 @@
 //! The dark frames that an enhancer is tried on before a run: [`dark_frames`], made of [`DarkFrames`].
 
+use std::collections::BTreeSet;
+
 use crate::error::Result;
 use crate::images::frame_work::FrameWork;
 use crate::images::frames::Source;
@@ -16,6 +18,35 @@ const DROPS: [Severity; 3] = [Severity::L3, Severity::L2, Severity::L4];
 pub(crate) struct DarkFrames<'a>(Vec<(&'a Source, Vec<Condition>)>);
 
 impl<'a> DarkFrames<'a> {
+    /// The frames of a whole run for the enhancer of this name, with the conditions that it enhances in a shard's plan, photographs in the
+    /// dark apart. So all shards judge an enhancer alike, and one of them judges it for those that share its store. Without such frames
+    /// or conditions, the frames of the plan.
+    pub(crate) fn of_whole_run<I>(
+        whole: &'a [Source],
+        sources: &'a [Source],
+        plan: &[SourcePlan<I>],
+        name: &EnhancerName,
+    ) -> Self {
+        let conditions: BTreeSet<Condition> = plan
+            .iter()
+            .flat_map(SourcePlan::conditions)
+            .filter(|condition| {
+                condition.enhancer.as_ref() == Some(name) && condition.photograph().is_none()
+            })
+            .cloned()
+            .collect();
+        if whole.is_empty() || conditions.is_empty() {
+            return Self::new(sources, plan, name);
+        }
+        let conditions: Vec<Condition> = conditions.into_iter().collect();
+        Self(
+            whole
+                .iter()
+                .map(|source| (source, conditions.clone()))
+                .collect(),
+        )
+    }
+
     /// Frames for the enhancer of this name, with the conditions of the plan that it enhances.
     pub(crate) fn new<I>(
         sources: &'a [Source],

@@ -115,6 +115,19 @@ impl<'a> ImagePipeline<'a> {
         Ok(())
     }
 
+    /// The frames that an enhancer is tried on.
+    fn dark_frames<'s, I>(
+        &self,
+        sources: &'s [Source],
+        plan: &[SourcePlan<I>],
+        name: &EnhancerName,
+    ) -> DarkFrames<'s>
+    where
+        'a: 's,
+    {
+        DarkFrames::of_whole_run(self.probe_sources, sources, plan, name)
+    }
+
     /// The stored state of a model.
     fn known<I>(
         &self,
@@ -126,7 +139,7 @@ impl<'a> ImagePipeline<'a> {
             return Ok(Known::Nothing(None));
         };
         let recipe = self.steps.recipe;
-        let frames = DarkFrames::new(sources, plan, model.name());
+        let frames = self.dark_frames(sources, plan, model.name());
         if frames.is_empty() {
             // It enhances nothing in this plan, so nothing is tried.
             return Ok(Known::Nothing(None));
@@ -167,7 +180,8 @@ impl<'a> ImagePipeline<'a> {
         sources: &[Source],
         plan: &[SourcePlan<I>],
     ) -> Result<()> {
-        let dark = dark_frames(self.steps, &DarkFrames::new(sources, plan, enhancer.name()))?;
+        let frames = self.dark_frames(sources, plan, enhancer.name());
+        let dark = dark_frames(self.steps, &frames)?;
         if dark.is_empty() {
             return Ok(());
         }

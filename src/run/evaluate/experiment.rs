@@ -51,6 +51,10 @@ impl Experiment for ChoiceSetup<'_> {
         &self.sources
     }
 
+    fn probe_sources(&self) -> &[Source] {
+        &self.probe_sources
+    }
+
     fn part(&self) -> Option<PartPlace> {
         self.part
     }

@@ -16,6 +16,7 @@ use crate::engine::models::{self, ModelName, ModelUnderTest};
 use crate::engine::observer::Observer;
 use crate::engine::room_net::RoomNet;
 use crate::error::Result;
+use crate::images::enhancement::evenly;
 use crate::images::frames::{Source, first_asked, inspect_all, photographs};
 use crate::images::progress::Progress;
 use crate::images::recipes::Recipe;
@@ -24,7 +25,7 @@ use crate::images::trials::{check_enhanced, conditions};
 use crate::runs::part::part;
 use crate::types::manifests::PartPlace;
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
-use darkqa_enhance::ModelFile;
+use darkqa_enhance::{FRAMES, ModelFile};
 use darkqa_questions::observer::is_in_rulebook;
 use darkqa_questions::rules::Rules;
 
@@ -37,6 +38,8 @@ pub(super) struct ChoiceSetup<'a> {
     pub(super) with_other_rooms: Vec<Question>,
     pub(super) other_rooms: OtherRooms,
     pub(super) sources: Vec<Source>,
+    /// In a shard, the sources of the whole run that enhancers are tried on.
+    pub(super) probe_sources: Vec<Source>,
     /// Position of the sources within the whole run; `None` if this is the whole run.
     pub(super) part: Option<PartPlace>,
     /// Index of each frame in `sources`.
@@ -120,8 +123,14 @@ impl<'a> ChoiceSetup<'a> {
         let brightness = (job.set_light == SetLight::Dark)
             .then(|| dark_already::brightness(&*dataset, &sources))
             .flatten();
+        let probe_sources = if part.is_some() && !enhancer_files.is_empty() {
+            probe_sources(&dataset, &selected)
+        } else {
+            Vec::new()
+        };
         let mut setup = Self {
             config,
+            probe_sources,
             places: sources
                 .iter()
                 .map(|source| source.name.clone())
@@ -191,6 +200,15 @@ impl<'a> ChoiceSetup<'a> {
         self.with_other_rooms = questions;
         Ok(())
     }
+}
+
+/// Frames of the whole run, evenly spread, that a shard tries enhancers on. Frames that cannot be read are left out.
+fn probe_sources(dataset: &Dataset, selected: &[Question]) -> Vec<Source> {
+    let first = first_asked(selected);
+    evenly(first.len(), FRAMES)
+        .into_iter()
+        .filter_map(|place| Source::from_questions(dataset, &first[place].frame).ok())
+        .collect()
 }
 
 /// Warns if `room-net` will guess questions, because the rules did not make them.

@@ -81,13 +81,20 @@ fn assert_same(bench: &Bench, [one, other]: [&str; 2]) {
 
 /// The files of the store that hold an image, not measures, small copies or tries.
 fn stored(bench: &Bench) -> Vec<PathBuf> {
+    stored_as(bench, "image")
+}
+
+/// The files of the store with this kind of content.
+fn stored_as(bench: &Bench, content: &str) -> Vec<PathBuf> {
     let mut entries = files(&bench.path("images"));
     entries.retain(|path| path.extension().is_some_and(|extension| extension == "img"));
+    let wanted = format!("\"content\":\"{content}\"");
     entries.retain(|path| {
         let file = fs::read(path).unwrap();
-        let wanted = b"\"content\":\"image\"";
         // The facts stand at the end.
-        file.windows(wanted.len()).rev().any(|part| part == wanted)
+        file.windows(wanted.len())
+            .rev()
+            .any(|part| part == wanted.as_bytes())
     });
     entries.sort_unstable();
     entries
@@ -224,6 +231,29 @@ fn a_dry_run_says_how_many_images_find_room_and_makes_no_store() {
     assert!(narrow.contains("image store: enhanced images"), "{narrow}");
     assert!(!narrow.contains(all), "{narrow}");
     assert!(!bench.path("images").exists());
+}
+
+#[test]
+fn shards_try_an_enhancer_once() {
+    let bench = bench();
+    for shard in ["1/3", "2/3", "3/3"] {
+        evaluate(
+            &bench,
+            "random",
+            &format!("--images-cache images --out run --shard {shard}"),
+        );
+        // The result of the probe, and that the model was opened.
+        assert_eq!(stored_as(&bench, "probe").len(), 2, "{shard}");
+    }
+    let frames = |shard: u8| {
+        let manifest = format!("run/shard-{shard}-of-3/manifest.json");
+        let text = fs::read_to_string(bench.path(&manifest)).unwrap();
+        let manifest: Value = serde_json::from_str(&text).unwrap();
+        manifest["enhancers"]["one"]["probe"].clone()
+    };
+    assert_eq!(frames(1)["frames"], 6);
+    assert_eq!(frames(1), frames(2));
+    assert_eq!(frames(1), frames(3));
 }
 
 #[test]
