@@ -13,7 +13,7 @@ use clap::Args;
 
 use crate::error::{Error, Result};
 use crate::files;
-use crate::run_reports::whole;
+use crate::run_reports::whole_report;
 use crate::runs::Outcome;
 use crate::runs::record_table::RECORDS_PARQUET;
 use crate::runs::stored::name;
@@ -60,7 +60,7 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         thumbnails,
     } = parts;
     let command = command(&manifest, &run);
-    let report = whole(run)?;
+    let report = whole_report(run)?;
     files.extend(report.files);
     let mut changes: Vec<String> = redactor
         .changes
