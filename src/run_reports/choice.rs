@@ -17,7 +17,7 @@ use crate::report::report_length::ReportLength;
 use crate::report::short;
 use crate::runs::outcome::Outcome;
 use crate::runs::outcome::{StdoutFormat, Syntax};
-use crate::runs::stored::{ShownModels, StoredRun, name};
+use crate::runs::stored::{ShownModels, StoredRun, run_name};
 use crate::store::Store;
 use crate::tables::{FLIPS, write_flips};
 use crate::types::manifests::RunManifest;
@@ -116,6 +116,6 @@ pub(super) fn markdown(
     runs: &[(&RunManifest, &Path)],
     length: ReportLength,
 ) -> String {
-    let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+    let names = runs.iter().map(|(_, folder)| run_name(folder)).collect();
     MarkdownReport::for_choices(report, names, length).text()
 }

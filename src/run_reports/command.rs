@@ -23,8 +23,8 @@ use crate::report::products::PAGE;
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::record_table;
-use crate::runs::run_parts::{any_run, choice_run};
-use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, name};
+use crate::runs::sharded_run::{open_any_run, open_choice_run};
+use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
 use crate::runs::{StdoutFormat, Syntax};
 use crate::store::now;
 use crate::store::{AddressChange, Store};
@@ -130,7 +130,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
     let (folders, duplicate_alerts) = distinct(&args.runs);
     let (mut choice, mut open) = (Vec::new(), Vec::new());
     for folder in folders {
-        match any_run(folder)? {
+        match open_any_run(folder)? {
             AnyRun::Choice(run) => choice.push(run),
             AnyRun::Open(run) => open.push(run),
         }
@@ -162,7 +162,7 @@ pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
     let duplicates: Vec<(String, usize)> = counted
         .iter()
         .filter(|(.., count)| *count > 1)
-        .map(|(_, folder, count)| (name(folder), *count))
+        .map(|(_, folder, count)| (run_name(folder), *count))
         .collect();
     let folders = counted.into_iter().map(|(_, folder, _)| folder);
     (folders.collect(), duplicate_folder_alerts(&duplicates))
@@ -190,7 +190,8 @@ fn report_choices(
     }
     let new_and_old = match &args.baseline.baseline {
         Some(folder) => {
-            let mut old = choice_run(folder, "--baseline compares runs of questions with choices")?;
+            let mut old =
+                open_choice_run(folder, "--baseline compares runs of questions with choices")?;
             old.leave_out(args.shown_models());
             Some((runs.clone(), old))
         }
@@ -234,7 +235,7 @@ fn report_choices(
     // Free the trials first, because the record table takes as much memory.
     drop(combined);
     if let Some(folder) = table_folder {
-        record_table::update(&folder, args.show.show.table())?;
+        record_table::update(&folder, args.show.show.record_table())?;
     }
     // `Incomplete` makes the command exit with 1.
     let status = if is_worse {
@@ -356,7 +357,7 @@ fn report_open(
         })?;
         if let Some(text) = text {
             if run.layout == RunLayout::Whole {
-                record_table::update(&run.folder, args.show.show.table())?;
+                record_table::update(&run.folder, args.show.show.record_table())?;
             }
             return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
         }
@@ -374,7 +375,7 @@ fn report_open(
 /// # Errors
 /// If the run is in shards, or one of its files cannot be read or written.
 fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
-    if run.layout == RunLayout::Parts {
+    if run.layout == RunLayout::Shards {
         let problem = format!(
             "{} holds the parts of a run, and their readings are stored in each: name the parts, or merge them with report merge, which reads all replies again",
             run.folder.display()

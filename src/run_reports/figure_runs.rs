@@ -7,7 +7,7 @@ use super::combine::{Combined, combine};
 use super::command::distinct;
 use super::whole_report::without_hidden_models;
 use crate::error::{Error, Result};
-use crate::runs::run_parts::choice_run;
+use crate::runs::sharded_run::open_choice_run;
 use crate::text::alert::Alert;
 use crate::types::{Thumbnail, Truths};
 use darkqa_score::findings::Findings;
@@ -29,7 +29,7 @@ impl FigureRuns {
             .into_iter()
             .map(|folder| {
                 let problem = "figures draws runs of questions with choices; `report` draws the figures of these";
-                without_hidden_models(choice_run(folder, problem)?)
+                without_hidden_models(open_choice_run(folder, problem)?)
             })
             .collect::<Result<_>>()?;
         let combined = combine(runs)?;

@@ -1,4 +1,4 @@
-//! The report on runs of open questions: [`Scores`] scores their records, and [`write`] writes the report into the folder of a run.
+//! The report on runs of open questions: [`Scores`] scores their records, and [`write()`] writes the report into the folder of a run.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
@@ -24,7 +24,7 @@ use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::outcome::Outcome;
 use crate::runs::outcome::{StdoutFormat, Syntax};
 use crate::runs::predictions::{AnswerState, Prediction, predictions};
-use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort};
+use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials};
 use crate::store::Store;
 use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
@@ -264,7 +264,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         .ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let mut trials = joined.trials;
     let ids = joined.questions.iter().map(|question| &question.id);
-    sort(&mut trials, ids, &first.manifest.models);
+    sort_trials(&mut trials, ids, &first.manifest.models);
     let mut records: Vec<Record<OpenDetail>> = trials.iter().map(TrialRef::record).collect();
     // Marks keep the name under which the judge was asked, because a model listed under two names may also be the judge.
     for record in records

@@ -13,7 +13,7 @@ use crate::report::markdown::MarkdownReport;
 use crate::report::products::PAGE;
 use crate::report::report_length::ReportLength;
 use crate::report::self_agreement::{AgreementReport, products, summary, text};
-use crate::runs::stored::name;
+use crate::runs::stored::run_name;
 use crate::runs::{StdoutFormat, Syntax};
 use crate::text::alert::Alert;
 use crate::types::ChoiceDetail;
@@ -128,6 +128,6 @@ fn markdown(
     runs: &[(&RunManifest, &Path)],
     length: ReportLength,
 ) -> String {
-    let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+    let names = runs.iter().map(|(_, folder)| run_name(folder)).collect();
     MarkdownReport::for_own_answers(report, names, length).text()
 }

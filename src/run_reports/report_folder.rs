@@ -14,14 +14,14 @@ pub(super) enum ReportFolder<'a, D: Detail> {
     /// The folder of the run.
     Run(&'a Store<D>),
     /// The folder with the shards of the run. Each shard has its own manifest; the folder has none.
-    Parts(&'a Path),
+    Shards(&'a Path),
 }
 
 impl<D: Detail> ReportFolder<'_, D> {
     pub(super) fn path(&self) -> &Path {
         match self {
             Self::Run(store) => store.folder(),
-            Self::Parts(folder) => folder,
+            Self::Shards(folder) => folder,
         }
     }
 
@@ -37,7 +37,7 @@ impl<D: Detail> ReportFolder<'_, D> {
         for (name, content) in contents {
             match self {
                 Self::Run(store) => store.write(name, content)?,
-                Self::Parts(folder) => {
+                Self::Shards(folder) => {
                     let path = folder.join(name);
                     refuse_link(folder, &path)?;
                     files::write(&path, content)?;
@@ -46,7 +46,7 @@ impl<D: Detail> ReportFolder<'_, D> {
         }
         match self {
             Self::Run(store) => store.write_manifest(manifest),
-            Self::Parts(_) => Ok(()),
+            Self::Shards(_) => Ok(()),
         }
     }
 }
@@ -79,7 +79,7 @@ pub(super) fn write_in_place<D: Detail>(
             // A run that another process is writing, or in a read-only folder, is still reported on standard output.
             Err(error) => Err(error),
         },
-        RunLayout::Parts => write(&ReportFolder::Parts(folder)),
+        RunLayout::Shards => write(&ReportFolder::Shards(folder)),
     };
     Ok(match written {
         Ok(text) => Some(text),
