@@ -10,7 +10,7 @@ use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::images::frames::input_summary;
 use crate::images::recipes::image_words::ImageWords;
-use crate::runs::renamed::{self, OtherSettings};
+use crate::runs::renamed::{self, SettingsChange};
 use crate::store::now;
 use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
 use crate::types::{InputSummary, ListedModel, StoredDetail as _};
@@ -64,18 +64,18 @@ pub(crate) fn run_manifest<E: Experiment>(
         return Ok(manifest);
     };
     let other_settings = match job.ask.file {
-        Some(_) => OtherSettings::Allowed,
-        None => OtherSettings::Refused,
+        Some(_) => SettingsChange::Allowed,
+        None => SettingsChange::Refused,
     };
     let before = stored.clone();
     let now = experiment.columns().remove("model").unwrap_or_default();
     let views = job.ask.views();
-    let now = renamed::Now {
+    let now = renamed::CurrentModels {
         models: &now,
         views: &views,
         settings: other_settings,
     };
-    renamed::note(&mut manifest, &before, now)?;
+    renamed::note_renamed_models(&mut manifest, &before, now)?;
     let images = merged_flags(&stored.images, manifest.images);
     if stored.status != Status::Complete {
         return Ok(RunManifest {
@@ -90,7 +90,7 @@ pub(crate) fn run_manifest<E: Experiment>(
     }
     stored.settings.extend(notes);
     stored.models.clone_from(&manifest.models);
-    renamed::note(&mut stored, &before, now)?;
+    renamed::note_renamed_models(&mut stored, &before, now)?;
     Ok(RunManifest {
         identity: manifest.identity,
         columns: manifest.columns,

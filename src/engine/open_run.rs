@@ -31,11 +31,11 @@ use crate::images::trials::Plan;
 use crate::images::workers::Workers;
 use crate::report::forecast::money;
 use crate::runs::first_source::first_source;
-use crate::runs::other_parts::OtherParts;
+use crate::runs::other_shards::OtherShards;
 use crate::runs::outcome::Outcome;
 use crate::runs::over_budget::OverBudget;
-use crate::runs::part_cost::PartCost;
 use crate::runs::record_table;
+use crate::runs::shard_budget::ShardBudget;
 use crate::runs::stored::StoredRun;
 use crate::store::now;
 use crate::store::{self, Store, StoredTrial};
@@ -139,7 +139,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             tracing::warn!("{}", over.sentence());
         }
         if settings.shard.is_part() {
-            let cost = PartCost::new(limit, spent);
+            let cost = ShardBudget::new(limit, spent);
             cost.note(&mut self.manifest);
             let shard = settings.shard;
             self.progress
@@ -241,7 +241,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         keys: &[TrialKey],
         answered: &HashSet<TrialKey>,
     ) -> Result<bool> {
-        let others = OtherParts::beside::<DetailOf<E>>(self.store.folder(), &self.manifest)?;
+        let others = OtherShards::find::<DetailOf<E>>(self.store.folder(), &self.manifest)?;
         let wanted = keys.iter().filter(|key| !answered.contains(key));
         let sources = self.experiment.sources().iter();
         let copied = others.copy_into(

@@ -11,9 +11,9 @@ use crate::run_reports::{choice, open};
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
-use crate::runs::placed_trials::append;
 use crate::runs::record_table;
-use crate::runs::run_parts::{MissingParts, RunParts, one_kind, runs_in};
+use crate::runs::shard_records::append_records;
+use crate::runs::sharded_run::{MissingShards, ShardedRun, common_kind, run_folders_in};
 use crate::runs::stored::{ExperimentKind, StoredRun};
 use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
@@ -45,7 +45,7 @@ pub(crate) struct MergeArgs {
 /// If a folder holds no shard, two folders hold the same, one is of another run, or shards are missing without `--partial`.
 pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
     let folders = folders(&args.runs)?;
-    match one_kind(&folders)? {
+    match common_kind(&folders)? {
         ExperimentKind::Open => merge_all::<OpenDetail>(args, &folders, open::write),
         ExperimentKind::Choice => merge_all::<ChoiceDetail>(args, &folders, choice::write),
     }
@@ -57,17 +57,17 @@ fn merge_all<D: Detail>(
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
     let missing = if args.partial {
-        MissingParts::Accepted
+        MissingShards::Accept
     } else {
-        MissingParts::Refused
+        MissingShards::Refuse
     };
-    let parts = RunParts::<D>::read(folders, missing)?;
+    let parts = ShardedRun::<D>::read(folders, missing)?;
     FolderAccess::new(args.shared).create(&args.out)?;
     let mut store = Store::<D>::open(&args.out, &parts.manifest, AddressChange::Refused)?;
     let folders = parts.folders();
     parts.questions.write(&store, &folders)?;
     let records = parts.trials.iter().map(|trial| (trial.key(), trial.text()));
-    append(&mut store, &parts.manifest, &parts.manifests(), records)?;
+    append_records(&mut store, &parts.manifest, &parts.manifests(), records)?;
     store.sync()?;
     let wanted = MissingThumbnails::new(parts.questions.frames(), Vec::new());
     store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
@@ -77,7 +77,7 @@ fn merge_all<D: Detail>(
     let manifest = parts.into_manifest();
     let run = StoredRun::reread(&args.out, manifest)?;
     let outcome = write(&store, run, args.show.format())?;
-    record_table::update(&args.out, args.show.table())?;
+    record_table::update(&args.out, args.show.record_table())?;
     Ok(outcome)
 }
 
@@ -89,7 +89,7 @@ fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
             folders.push(path.clone());
             continue;
         }
-        let inside = runs_in(path)?;
+        let inside = run_folders_in(path)?;
         if inside.is_empty() {
             let problem = "neither a run nor a folder of runs".to_owned();
             let path = path.clone();

@@ -15,7 +15,7 @@ use crate::files::reading;
 use crate::report::site::{DATA, PAGES, SCHEMA, products};
 use crate::run_reports::site as collected;
 use crate::runs::Outcome;
-use crate::runs::run_parts::any_run;
+use crate::runs::sharded_run::open_any_run;
 use crate::types::Decides;
 use crate::types::manifests::Status;
 
@@ -37,7 +37,7 @@ pub(crate) struct SiteArgs {
 pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
     check_distinct(&args.runs)?;
     check_target(&args.out)?;
-    let runs = args.runs.iter().map(|folder| any_run(folder));
+    let runs = args.runs.iter().map(|folder| open_any_run(folder));
     let site = collected(runs.collect::<Result<_>>()?)?;
     let mut output = String::new();
     for (run, why) in &site.others {

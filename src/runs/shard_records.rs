@@ -1,59 +1,57 @@
-//! Trials of parts of a run by the places of their records, so that joining them holds no record: [`read_part`], [`append`].
+//! Trials of shards with the places of their records in the log files, so that shards are joined without keeping records in memory:
+//! [`read_shard`], [`append_records`].
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::Path;
 
-use crate::error::{Error, Result};
-use crate::runs::renamed::rename;
+use crate::error::Result;
+use crate::runs::renamed::rename_record;
 use crate::store::{RecordLog, Store, each_record};
 use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{Record, TextPlace, TrialKey, Trials};
 use darkqa_score::answers::record::Detail;
 
-/// The bytes of records that are written at once. Chosen: fewer calls of the system than records.
+/// Minimum number of bytes in a write. Chosen to make fewer system calls than there are records.
 const CHUNK: usize = 1 << 20;
 
-/// Adds the trials of a run folder, which is the part of this number: each as its last record states, with the name that its model has now.
+/// Adds the trials of a shard to `trials`, with the current names of models. `number` is the shard's index among the folders that are
+/// joined.
 ///
 /// # Errors
 /// If a line is not a record.
-pub(crate) fn read_part<D: Detail>(
+pub(crate) fn read_shard<D: Detail>(
     trials: &mut Trials<D>,
     folder: &Path,
     manifest: &RunManifest,
-    part: usize,
+    number: usize,
 ) -> Result<()> {
     let names = RecordedNames::from_manifest(manifest);
     each_record(folder, |mut record: Record<D>, place| {
-        let shown = names.shown(&record.model);
-        if shown != record.model {
-            let shown = shown.to_owned();
-            record.model = shown;
-        }
-        trials.add(record, TextPlace::new(place.start).in_log(part));
+        rename_record(&mut record, &names);
+        trials.add(record, TextPlace::new(place.start).in_log(number));
     })
 }
 
-/// The trials of a run folder, each as its last record states.
+/// The trials of a run folder, each with its last record.
 ///
 /// # Errors
 /// If a line is not a record.
-pub(crate) fn trials_of<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Trials<D>> {
+pub(crate) fn latest_trials<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Trials<D>> {
     let mut trials = Trials::default();
-    read_part(&mut trials, folder, manifest, 0)?;
+    read_shard(&mut trials, folder, manifest, 0)?;
     trials.each_key_once(|first, later| Ok(first.or_later(later)))?;
     Ok(trials)
 }
 
-/// The records of several run folders, to read single ones.
-pub(crate) struct PartLogs<'a> {
+/// The record files of several run folders, for reading single records.
+pub(crate) struct ShardLogs<'a> {
     folders: Vec<&'a Path>,
     open: HashMap<usize, RecordLog>,
 }
 
-impl<'a> PartLogs<'a> {
-    /// The records in these folders, which are numbered from 0. No file is opened yet.
+impl<'a> ShardLogs<'a> {
+    /// The record files of these folders, by index. Each file is opened when it is first read.
     pub(crate) fn new(folders: &[&'a Path]) -> Self {
         Self {
             folders: folders.to_vec(),
@@ -61,14 +59,14 @@ impl<'a> PartLogs<'a> {
         }
     }
 
-    fn log(&mut self, part: usize) -> Result<&RecordLog> {
-        Ok(match self.open.entry(part) {
+    fn log(&mut self, number: usize) -> Result<&RecordLog> {
+        Ok(match self.open.entry(number) {
             Entry::Occupied(open) => open.into_mut(),
-            Entry::Vacant(first) => first.insert(RecordLog::open(self.folders[part])?),
+            Entry::Vacant(entry) => entry.insert(RecordLog::open(self.folders[number])?),
         })
     }
 
-    /// The line of a trial.
+    /// The line at a place.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -76,7 +74,7 @@ impl<'a> PartLogs<'a> {
         self.log(place.log())?.line_from(place.start())
     }
 
-    /// A record from the line at a place.
+    /// Parses the line at a place.
     ///
     /// # Errors
     /// If the line is not a record.
@@ -85,51 +83,48 @@ impl<'a> PartLogs<'a> {
     }
 }
 
-/// Appends the records at these places to a run that lacks them, one after another. Where a run has the same names of models in its
-/// records as the part that a record is from, its line is copied.
+/// Appends the records at these places to a run, except those that the run already has. A line is copied unchanged if the run and the shard
+/// map the same recorded names of models to current ones.
 ///
 /// # Errors
 /// If a record cannot be read or written.
-pub(crate) fn append<D: Detail>(
+pub(crate) fn append_records<D: Detail>(
     store: &mut Store<D>,
     manifest: &RunManifest,
-    parts: &[(&Path, &RunManifest)],
+    shards: &[(&Path, &RunManifest)],
     trials: impl Iterator<Item = (TrialKey, TextPlace)>,
 ) -> Result<()> {
     let names = RecordedNames::from_manifest(manifest);
-    let is_copied: Vec<bool> = parts
+    let shard_names: Vec<RecordedNames> = shards
         .iter()
-        .map(|(_, part)| RecordedNames::from_manifest(part) == names)
+        .map(|(_, shard)| RecordedNames::from_manifest(shard))
         .collect();
-    let present = trials_of::<D>(store.folder(), manifest)?;
+    let present = latest_trials::<D>(store.folder(), manifest)?;
     let present: HashMap<TrialKey, TextPlace> = present
         .iter()
         .map(|trial| (trial.key(), trial.text()))
         .collect();
-    let own = RecordLog::open(store.folder())?;
-    let mut logs = PartLogs::new(&parts.iter().map(|(folder, _)| *folder).collect::<Vec<_>>());
+    let own_log = RecordLog::open(store.folder())?;
+    let mut logs = ShardLogs::new(&shards.iter().map(|(folder, _)| *folder).collect::<Vec<_>>());
     let mut chunk = Vec::new();
     for (key, place) in trials {
-        let of_part = parts[place.log()].1;
+        let shard_names = &shard_names[place.log()];
         let line = logs.line(place)?;
         let log = logs.log(place.log())?;
-        let shown = |log: &RecordLog, line: &[u8], manifest: &RunManifest| {
-            let mut record = log.record::<D>(line)?;
-            rename(std::slice::from_mut(&mut record), manifest);
-            Ok::<_, Error>(record)
-        };
-        if let Some(place) = present.get(&key) {
-            let present = own.line_from(place.start())?;
-            let is_same =
-                || Ok::<_, Error>(shown(&own, &present, manifest)? == shown(log, &line, of_part)?);
-            if present == line || is_same()? {
+        if let Some(own_place) = present.get(&key) {
+            let own_line = own_log.line_from(own_place.start())?;
+            if own_line == line
+                || renamed_record::<D>(&own_log, &own_line, &names)?
+                    == renamed_record(log, &line, shard_names)?
+            {
                 continue;
             }
         }
-        if is_copied[place.log()] {
+        if *shard_names == names {
             chunk.extend_from_slice(&line);
         } else {
-            chunk.extend_from_slice(&store.line(&shown(log, &line, of_part)?)?);
+            let record = renamed_record::<D>(log, &line, shard_names)?;
+            chunk.extend_from_slice(&store.line(&record)?);
         }
         if chunk.len() >= CHUNK {
             store.append_lines(&chunk)?;
@@ -137,4 +132,15 @@ pub(crate) fn append<D: Detail>(
         }
     }
     store.append_lines(&chunk)
+}
+
+/// Parses a line and gives its model the current name.
+fn renamed_record<D: Detail>(
+    log: &RecordLog,
+    line: &[u8],
+    names: &RecordedNames,
+) -> Result<Record<D>> {
+    let mut record = log.record(line)?;
+    rename_record(&mut record, names);
+    Ok(record)
 }

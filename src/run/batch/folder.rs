@@ -13,7 +13,7 @@ use crate::run_reports::{choice, open};
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
-use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
+use crate::runs::stored::{ExperimentKind, StoredRun, read_run_manifest};
 use crate::store::{AddressChange, Store};
 use crate::types::manifests::Status;
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
@@ -49,7 +49,7 @@ pub(crate) struct BatchFolderArgs {
 /// # Errors
 /// If the folder has no batches that the program submitted, or the server cannot be asked.
 pub(crate) fn status(args: &BatchStatusArgs) -> Result<Outcome> {
-    let manifest = manifest(&args.run)?;
+    let manifest = read_run_manifest(&args.run)?;
     let batches = FolderBatches::open(&args.run, &manifest, &args.access)?;
     Ok(Outcome::text(Status::Complete, batches.status()?))
 }
@@ -84,7 +84,7 @@ fn in_run<D: Detail>(
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
     let folder = &args.run.run;
-    let manifest = manifest(folder)?;
+    let manifest = read_run_manifest(folder)?;
     let mut store = Store::<D>::open(folder, &manifest, AddressChange::Allowed)?;
     let batches = FolderBatches::open(folder, &manifest, &args.run.access)?;
     let text = batches.carry_out(task, &mut store, &args.collect, progress)?;

@@ -13,7 +13,7 @@ use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
 use crate::runs::record_table;
-use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
+use crate::runs::stored::{ExperimentKind, StoredRun, read_run_manifest};
 use crate::store::{AddressChange, Store};
 use crate::types::manifests::{Counts, RunManifest};
 use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
@@ -50,7 +50,7 @@ fn import_into<D: Detail>(
     args: &BatchImportArgs,
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let manifest = manifest(&args.run)?;
+    let manifest = read_run_manifest(&args.run)?;
     let mut store = Store::<D>::open(&args.run, &manifest, AddressChange::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &args.files)?;
     reported(&store, manifest, &args.show, &imported, write)
@@ -69,7 +69,7 @@ fn reported<D: Detail>(
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.count(Counts::new(trials, failed));
     let mut outcome = write(store, run, show.format())?;
-    record_table::update(store.folder(), show.table())?;
+    record_table::update(store.folder(), show.record_table())?;
     if !show.format().is_json() {
         outcome.output.insert_str(0, text);
     }

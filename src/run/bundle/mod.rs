@@ -1,9 +1,9 @@
 //! `bundle`: a run as one ZIP file to pass on.
 
 mod archive;
-mod parts;
 mod readme;
 mod redact;
+mod redacted_run;
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -16,15 +16,15 @@ use crate::files;
 use crate::run_reports::whole_report;
 use crate::runs::Outcome;
 use crate::runs::record_table::RECORDS_PARQUET;
-use crate::runs::stored::name;
+use crate::runs::stored::run_name;
 use crate::types::Decides;
 use crate::types::manifests::Status;
 
 use archive::{is_bundle, zipped};
-use parts::RunParts;
-pub(crate) use parts::ThumbnailChoice;
 use readme::{ReadmeInputs, command, readme};
 use redact::Redactor;
+use redacted_run::RedactedRun;
+pub(crate) use redacted_run::ThumbnailChoice;
 
 /// The flags of `bundle`.
 #[derive(Debug, Args)]
@@ -50,10 +50,10 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         let problem = "exists already and is not a bundle; name another file";
         return Err(Error::data(args.out.display(), problem));
     }
-    let folder_name = file_name(&name(&args.run));
+    let folder_name = file_name(&run_name(&args.run));
     let mut redactor = Redactor::new(&args.run);
-    let parts = RunParts::read(&args.run, &folder_name, args.thumbnails, &mut redactor)?;
-    let RunParts {
+    let parts = RedactedRun::read(&args.run, &folder_name, args.thumbnails, &mut redactor)?;
+    let RedactedRun {
         manifest,
         mut files,
         run,

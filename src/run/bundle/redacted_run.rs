@@ -1,4 +1,4 @@
-//! The files of a run as a bundle has them: [`RunParts`].
+//! A run without private information, for a bundle: [`RedactedRun`].
 
 use std::path::Path;
 
@@ -11,13 +11,13 @@ use super::redact::{Paths, Redactor};
 use crate::error::{Error, Result};
 use crate::report::page::shown_thumbnails;
 use crate::runs::run_files::RunFiles;
-use crate::runs::stored::{AnyRun, ExperimentKind, StoredRun, manifest};
+use crate::runs::stored::{AnyRun, ExperimentKind, StoredRun, read_run_manifest};
 use crate::store;
 use crate::types::manifests::RunManifest;
 use crate::types::{Record, Thumbnail};
 use darkqa_score::answers::record::Detail;
 
-/// The small images that a bundle has.
+/// The thumbnails that a bundle includes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ThumbnailChoice {
     /// No image
@@ -28,32 +28,32 @@ pub(crate) enum ThumbnailChoice {
     All,
 }
 
-/// The name and the content of a file.
+/// Name and content of a file.
 type NamedFile = (String, Vec<u8>);
 
-/// A run without private parts.
-pub(super) struct RunParts {
+/// A run without private information.
+pub(super) struct RedactedRun {
     pub(super) manifest: RunManifest,
-    /// The files from which the run can be read again, by name.
+    /// The files of the run folder.
     pub(super) files: Vec<NamedFile>,
-    /// The run as read from these files, in a folder of its name.
+    /// The run as read from these files, in a folder with the name of the run.
     pub(super) run: AnyRun,
-    /// Number of small images, and of those that are left out.
+    /// Number of thumbnails, and number of thumbnails left out.
     pub(super) thumbnails: [usize; 2],
 }
 
-impl RunParts {
-    /// Reads the run of a folder.
+impl RedactedRun {
+    /// Reads and redacts the run in a folder.
     ///
     /// # Errors
-    /// If the folder holds no run, a line of a file is broken, or two models would get one name without their folders.
+    /// If the folder has no run, a line of a file is broken, or two models would have the same name without their folders.
     pub(super) fn read(
         folder: &Path,
         name: &str,
         thumbnails: ThumbnailChoice,
         redactor: &mut Redactor,
     ) -> Result<Self> {
-        let stored = manifest(folder)?;
+        let stored = read_run_manifest(folder)?;
         let value = serde_json::to_value(&stored).map_err(|e| broken("manifest.json", &e))?;
         let value = redactor.value(value, Paths::Any)?;
         let manifest: RunManifest =
@@ -64,16 +64,20 @@ impl RunParts {
                 let files = RunFiles::read(folder)?;
                 let frames: Vec<_> = files.questions.iter().map(|q| q.frame.clone()).collect();
                 let shown = |all: &[Thumbnail]| shown_thumbnails(all, &frames);
-                let lines = (store::read_records(folder)?, files);
-                let parts = parts(lines, thumbnails, shown, redactor)?;
-                let run = StoredRun::from_records(place, manifest.clone(), parts.lines)?;
-                Self::new(manifest, parts.files, AnyRun::Choice(run), parts.thumbnails)
+                let records = store::read_records(folder)?;
+                let data = RedactedData::new(records, files, thumbnails, shown, redactor)?;
+                let run =
+                    StoredRun::from_records(place, manifest.clone(), data.records, data.lines)?;
+                Self::new(manifest, data.files, AnyRun::Choice(run), data.thumbnails)
             }
             ExperimentKind::Open => {
-                let lines = (store::read_records(folder)?, RunFiles::read(folder)?);
-                let parts = parts(lines, thumbnails, <[Thumbnail]>::to_vec, redactor)?;
-                let run = StoredRun::from_records(place, manifest.clone(), parts.lines)?;
-                Self::new(manifest, parts.files, AnyRun::Open(run), parts.thumbnails)
+                let records = store::read_records(folder)?;
+                let files = RunFiles::read(folder)?;
+                let shown = <[Thumbnail]>::to_vec;
+                let data = RedactedData::new(records, files, thumbnails, shown, redactor)?;
+                let run =
+                    StoredRun::from_records(place, manifest.clone(), data.records, data.lines)?;
+                Self::new(manifest, data.files, AnyRun::Open(run), data.thumbnails)
             }
         }
     }
@@ -97,68 +101,70 @@ impl RunParts {
     }
 }
 
-/// The lines of a run's files without private parts, and the files.
-struct Parts<D> {
-    lines: (Vec<Record<D>>, RunFiles),
+/// Redacted records and other lines of a run, with the files that contain them.
+struct RedactedData<D> {
+    records: Vec<Record<D>>,
+    lines: RunFiles,
     files: Vec<NamedFile>,
     thumbnails: [usize; 2],
 }
 
-fn parts<D: Detail>(
-    (records, lines): (Vec<Record<D>>, RunFiles),
-    thumbnails: ThumbnailChoice,
-    shown: impl Fn(&[Thumbnail]) -> Vec<Thumbnail>,
-    redactor: &mut Redactor,
-) -> Result<Parts<D>> {
-    let all = lines.thumbnails.len();
-    let kept = match thumbnails {
-        ThumbnailChoice::None => Vec::new(),
-        ThumbnailChoice::Shown => shown(&lines.thumbnails),
-        ThumbnailChoice::All => lines.thumbnails,
-    };
-    let (records, records_file) = redacted("records.jsonl", records.into_iter(), redactor)?;
-    let questions = lines.questions.into_iter();
-    let (questions, questions_file) = redacted("questions.jsonl", questions, redactor)?;
-    let (thumbnails, thumbnails_file) = redacted("thumbnails.jsonl", kept.into_iter(), redactor)?;
-    let fidelity = lines.fidelity.into_iter();
-    let (fidelity, fidelity_file) = redacted("fidelity.jsonl", fidelity, redactor)?;
-    let files = [records_file, questions_file, thumbnails_file, fidelity_file];
-    // A run that stores no such lines has no such file.
-    let files = files.into_iter().filter(|(_, content)| !content.is_empty());
-    Ok(Parts {
-        thumbnails: [thumbnails.len(), all - thumbnails.len()],
-        lines: (
+impl<D: Detail> RedactedData<D> {
+    fn new(
+        records: Vec<Record<D>>,
+        lines: RunFiles,
+        thumbnails: ThumbnailChoice,
+        shown: impl Fn(&[Thumbnail]) -> Vec<Thumbnail>,
+        redactor: &mut Redactor,
+    ) -> Result<Self> {
+        let all = lines.thumbnails.len();
+        let included = match thumbnails {
+            ThumbnailChoice::None => Vec::new(),
+            ThumbnailChoice::Shown => shown(&lines.thumbnails),
+            ThumbnailChoice::All => lines.thumbnails,
+        };
+        let (records, records_file) = redact_lines("records.jsonl", records, redactor)?;
+        let (questions, questions_file) =
+            redact_lines("questions.jsonl", lines.questions, redactor)?;
+        let (thumbnails, thumbnails_file) = redact_lines("thumbnails.jsonl", included, redactor)?;
+        let (fidelity, fidelity_file) = redact_lines("fidelity.jsonl", lines.fidelity, redactor)?;
+        Ok(Self {
+            thumbnails: [thumbnails.len(), all - thumbnails.len()],
             records,
-            RunFiles {
+            lines: RunFiles {
                 questions,
                 thumbnails,
                 fidelity,
             },
-        ),
-        files: files.collect(),
-    })
+            // A run without such lines has no such file.
+            files: [records_file, questions_file, thumbnails_file, fidelity_file]
+                .into_iter()
+                .filter(|(_, content)| !content.is_empty())
+                .collect(),
+        })
+    }
 }
 
-/// Lines without private parts, and the file of them.
-fn redacted<T: Serialize + DeserializeOwned>(
+/// Redacts the lines of a file; also returns the file.
+fn redact_lines<T: Serialize + DeserializeOwned>(
     name: &str,
-    lines: impl Iterator<Item = T>,
+    lines: Vec<T>,
     redactor: &mut Redactor,
 ) -> Result<(Vec<T>, NamedFile)> {
-    let (mut kept, mut file) = (Vec::new(), Vec::new());
+    let (mut redacted, mut file) = (Vec::new(), Vec::new());
     for line in lines {
         let value = serde_json::to_value(&line).map_err(|e| broken(name, &e))?;
-        let value = without_private(value, redactor)?;
+        let value = redact_line(value, redactor)?;
         let line: T = serde_json::from_value(value).map_err(|e| broken(name, &e))?;
         serde_json::to_writer(&mut file, &line).map_err(|e| broken(name, &e))?;
         file.push(b'\n');
-        kept.push(line);
+        redacted.push(line);
     }
-    Ok((kept, (name.to_owned(), file)))
+    Ok((redacted, (name.to_owned(), file)))
 }
 
-/// A line without private parts. The message of a failure is of this program or of a server, and any path in it is one of a machine.
-fn without_private(mut value: Value, redactor: &mut Redactor) -> Result<Value> {
+/// Redacts a line. Every path in the message of a failure is redacted, because the message comes from this program or a server.
+fn redact_line(mut value: Value, redactor: &mut Redactor) -> Result<Value> {
     if let Some(Value::String(message)) = value.pointer_mut("/failure/message") {
         *message = redactor.text(message, Paths::Any);
     }

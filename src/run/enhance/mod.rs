@@ -18,7 +18,7 @@ use crate::images::frames::InputTally;
 use crate::images::progress::Progress;
 use crate::images::stored::{ImageCounts, ImageOrigin, Placed, Refusals};
 use crate::runs::Outcome;
-use crate::runs::part_args::{PartArgs, keep_part};
+use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::types::manifests::Status;
 use crate::types::{Decides, Digest, FrameId, InputNote, Rgb};
 use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, SizeArgs, list_of_presets};
@@ -114,7 +114,7 @@ struct EnhanceArgs {
     out: PathBuf,
     /// The part of the images.
     #[command(flatten)]
-    part: PartArgs,
+    part: ShardArgs,
     /// Replace images that exist already, also those of other models and settings
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     force: bool,
@@ -192,7 +192,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let mut enhancer = args.enhancer.open(file)?;
     let (out, loading) = (&args.out, &args.enhancer.loading);
     let mut images = args.images.open()?;
-    keep_part(&mut images.entries, args.part.resolve()?)?;
+    keep_shard(&mut images.entries, args.part.resolve()?)?;
     let sample = sample(&images);
     if !sample.is_empty() {
         enhancer.probe(&darkened(&sample), loading.probe.implausible())?;

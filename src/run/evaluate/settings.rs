@@ -141,7 +141,7 @@ impl EvaluateArgs {
         let mut job = self.job.resolve(&experiment)?;
         let plan = job.place.plan()?;
         if let (Some(plan), Some(whole), true) = (&plan, max_cost, job.shard.is_part()) {
-            job.money.max_cost = Some(whole * plan.share(job.shard));
+            job.money.max_cost = Some(whole * plan.cost_share(job.shard));
         }
         if truths == Truths::Unknown {
             check_without_truths(&job)?;

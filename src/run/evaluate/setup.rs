@@ -21,7 +21,7 @@ use crate::images::progress::Progress;
 use crate::images::recipes::Recipe;
 use crate::images::trials::questions::{QuestionBank, open_data, open_unasked, select};
 use crate::images::trials::{check_enhanced, conditions};
-use crate::runs::part::part;
+use crate::runs::shard_sources::shard_questions;
 use crate::types::manifests::PartPlace;
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 use darkqa_enhance::ModelFile;
@@ -75,12 +75,12 @@ impl<'a> ChoiceSetup<'a> {
         let file_places = file_places(config, &dataset, &selected);
         let other_rooms = OtherRooms::new(&selected, |frame| dataset.scene(frame));
         let controls = AddedControls::new(config, other_rooms.is_some())?;
-        let (questions, part) = part(
+        let (questions, part) = shard_questions(
             selected.clone(),
             job.shard,
             |question| question.frame.0.clone(),
             |question| dataset.scene(&question.frame),
-            |frame| config.plan.as_ref().map_or(1, |plan| plan.cost(frame)),
+            |frame| config.plan.as_ref().map_or(1, |plan| plan.weight(frame)),
         )?;
         let models = open_models(config, &controls, &dataset, &questions)?;
         let mut sources = if shows_images {

@@ -23,8 +23,8 @@ use crate::images::trials::{check_enhanced, check_used, conditions};
 use crate::images::workers::pool;
 use crate::picture::png;
 use crate::runs::Outcome;
-use crate::runs::part_args::{PartArgs, keep_part};
 use crate::runs::shard::Shard;
+use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::text::words::counted;
 use crate::types::manifests::Status;
 use crate::types::{Condition, Decides, FrameId, Question};
@@ -68,7 +68,7 @@ pub(crate) struct ExportArgs {
     pub loading: EnhancerRunArgs,
     /// The part of the frames.
     #[command(flatten)]
-    pub part: PartArgs,
+    pub part: ShardArgs,
     /// Replace sets that exist already
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
@@ -194,7 +194,7 @@ fn part_of_frames(
     shard: Shard,
 ) -> Result<Vec<Question>> {
     let mut own: Vec<&FrameId> = asked.into_iter().collect();
-    keep_part(&mut own, shard)?;
+    keep_shard(&mut own, shard)?;
     let own: BTreeSet<&FrameId> = own.into_iter().collect();
     let own = questions
         .iter()

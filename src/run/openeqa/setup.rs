@@ -15,7 +15,7 @@ use crate::images::frames::{Source, WalkFolder};
 use crate::images::progress::Progress;
 use crate::images::recipes::Recipe;
 use crate::images::trials::{check_enhanced, conditions};
-use crate::runs::part::part;
+use crate::runs::shard_sources::shard_questions;
 use crate::text::words::{counted, first_names};
 use crate::types::manifests::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
@@ -54,7 +54,8 @@ impl<'a> OpenSetup<'a> {
         let ids = selected.iter().map(|question| question.id.clone());
         let question_places = ids.zip(0..).collect();
         let walk = |question: &OpenQuestion| question.episode.clone();
-        let (questions, part) = part(selected, job.shard, walk, |_| String::new(), |_| 1)?;
+        let (questions, part) =
+            shard_questions(selected, job.shard, walk, |_| String::new(), |_| 1)?;
         let models = models::open_all(&job.ask, &[], |name| {
             models::open(name, None, &Parameters::new(String::new()))
         })?;

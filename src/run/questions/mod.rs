@@ -23,8 +23,8 @@ use crate::images::workers::{ThreadArgs, pool};
 use crate::report;
 use crate::report::questions::against::LookComparison;
 use crate::runs::Outcome;
-use crate::runs::part_args::{keep_part, part_of};
 use crate::runs::shard::Shard;
+use crate::runs::shard_args::{keep_shard, shard_from_flag};
 use crate::types::shell_word;
 use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 use darkqa_questions::balance::BalanceMode;
@@ -204,7 +204,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
         Error::data(folder.display(), problem)
     })?;
-    let shard = part_of(args.shard.as_deref())?;
+    let shard = shard_from_flag(args.shard.as_deref())?;
     let (frames, failed) = measured(making, (&dataset, labels), shard, progress)?;
     if shard.is_part() {
         return Ok(part_measured(args, shard, frames.len(), failed));
@@ -305,7 +305,7 @@ fn measured(
     let workers = pool(making.args.threads.threads)?;
     let (mut names, tally): (Vec<&FrameId>, _) =
         (dataset.frames().collect(), InputTally::default());
-    keep_part(&mut names, shard)?;
+    keep_shard(&mut names, shard)?;
     let bar = progress.bar("frames", names.len());
     let context = context(making, labels);
     let results: Vec<Option<FrameStatistics>> = workers.install(|| {

@@ -14,8 +14,8 @@ use crate::images::notes::montage;
 use crate::picture::{Payload, PayloadFormat};
 use crate::run_reports::story_curves;
 use crate::runs::Outcome;
-use crate::runs::rebuild::ImageRebuilder;
-use crate::runs::run_parts::choice_run;
+use crate::runs::image_rebuilder::ImageRebuilder;
+use crate::runs::sharded_run::open_choice_run;
 use crate::types::degradations::Kind;
 use crate::types::manifests::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, Record, Rgb, TrialOutcome, Variant};
@@ -112,7 +112,7 @@ struct SheetItem {
 
 impl SheetItem {
     fn read(args: &ShowArgs) -> Result<Self> {
-        let run = choice_run(&args.run, "--sheet draws questions with choices")?;
+        let run = open_choice_run(&args.run, "--sheet draws questions with choices")?;
         let run =
             run.with_truths("--sheet draws accuracy; leave it out to see the images and replies")?;
         let problem = |problem: String| Error::Run {

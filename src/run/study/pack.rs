@@ -12,7 +12,7 @@ use crate::images::progress::Progress;
 use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::runs::Outcome;
-use crate::runs::rebuild::{ImageRebuilder, RebuildArgs};
+use crate::runs::image_rebuilder::{ImageRebuilder, RebuildArgs};
 use crate::runs::stored::StoredRun;
 use crate::text::words::counted;
 use crate::types::manifests::Status;

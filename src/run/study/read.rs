@@ -133,7 +133,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.count(Counts::new(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;
-    record_table::update(&args.out, args.show.table())?;
+    record_table::update(&args.out, args.show.record_table())?;
     if !args.show.format().is_json() {
         outcome.output.insert_str(0, &summary(&counts));
     }

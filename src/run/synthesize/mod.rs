@@ -22,7 +22,7 @@ use crate::images::stored::{ImageCounts, ImageOutcome, Placed, Refusals, Sidecar
 use crate::images::timings::Timings;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::runs::Outcome;
-use crate::runs::part_args::{PartArgs, keep_part};
+use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::text::words::counted;
 use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 use darkqa_light::{LightArgs, LightSettings, NoiseKey};
@@ -99,7 +99,7 @@ pub(crate) struct SynthesizeArgs {
     pub folders: FolderArgs,
     /// The part of the frames.
     #[command(flatten)]
-    pub part: PartArgs,
+    pub part: ShardArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -145,7 +145,7 @@ fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
         &args.folders.root.data_root,
         args.folders.decode.rule(),
     )?;
-    keep_part(&mut frames.entries, args.part.resolve()?)?;
+    keep_shard(&mut frames.entries, args.part.resolve()?)?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
     let (files, tally) = (files(&making), InputTally::default());

@@ -1,64 +1,74 @@
-//! The parts of a run, read as one run: [`RunParts`].
+//! The shards of a run, joined into one run: [`ShardedRun`]. `report merge` writes this run, and `report` reports on it without writing it.
+
+mod coverage;
+mod joined_manifest;
+mod missing;
+mod open;
+mod questions;
+mod stored_shard;
+mod trials;
 
 use std::path::{Path, PathBuf};
 
-use super::coverage::Coverage;
-use super::joined_manifest;
-use super::missing::{self, MissingParts};
-use super::part::StoredPart;
-use super::questions::PartQuestions;
-use super::trials::each_once;
+use self::coverage::Coverage;
+use self::questions::ShardQuestions;
+use self::stored_shard::StoredShard;
+use self::trials::remove_duplicates;
 use crate::error::Result;
-use crate::runs::placed_trials::read_part;
-use crate::runs::stored::sort;
+use crate::runs::shard_records::read_shard;
+use crate::runs::stored::sort_trials;
 use crate::types::Trials;
 use crate::types::manifests::{Counts, RunManifest, Status};
 use darkqa_score::answers::record::Detail;
 
-/// The parts of one run, of any divisions of it.
-pub(crate) struct RunParts<D: Detail> {
-    parts: Vec<StoredPart>,
-    pub(crate) questions: PartQuestions,
-    /// Each trial once, in the order of the questions, conditions and models. The file of a text is the number of its part.
+pub(crate) use missing::MissingShards;
+pub(crate) use open::{common_kind, open_any_run, open_choice_run, run_folders_in};
+
+/// The shards of one run, which may come from several divisions of it.
+pub(crate) struct ShardedRun<D: Detail> {
+    shards: Vec<StoredShard>,
+    pub(crate) questions: ShardQuestions,
+    /// Distinct trials, in the order of questions, conditions and models. The file number of a text is the index of its shard.
     pub(crate) trials: Trials<D>,
-    /// The manifest of the run that the parts are together.
+    /// The manifest of the whole run.
     pub(crate) manifest: RunManifest,
 }
 
-impl<D: Detail> RunParts<D> {
-    /// Reads the parts in these folders.
+impl<D: Detail> ShardedRun<D> {
+    /// Reads and joins the shards in these folders.
     ///
     /// # Errors
-    /// If a folder holds no part, one is of another run, an image of a trial differs in two, or sources are in no part and that is refused.
-    pub(crate) fn read(folders: &[PathBuf], missing: MissingParts) -> Result<Self> {
-        let parts: Result<Vec<StoredPart>> = folders
+    /// If a folder has no shard, the shards belong to different runs, the same trial has different images in two shards, or sources are in
+    /// no shard and `missing` is [`MissingShards::Refuse`].
+    pub(crate) fn read(folders: &[PathBuf], missing: MissingShards) -> Result<Self> {
+        let mut shards: Vec<StoredShard> = folders
             .iter()
-            .map(|folder| StoredPart::open(folder))
-            .collect();
-        let mut parts = parts?;
-        parts.sort_by_key(|part| (part.shard.count(), part.shard));
-        joined_manifest::check_same_run(&parts)?;
-        let places = parts
-            .iter()
-            .map(|part| (part.shard, &*part.folder, &part.manifest));
-        let coverage = Coverage::from_parts(places)?;
-        let plan = missing::plan(&parts, &coverage)?;
-        let is_missing = missing::check(&parts, &coverage, plan.as_ref(), missing)?;
-        missing::warn_unfinished(&parts, plan.as_ref());
-        let mut manifest = joined_manifest::joined_manifest(&parts, &coverage)?;
-        let folders: Vec<&Path> = parts.iter().map(|part| &*part.folder).collect();
-        let questions = PartQuestions::read(&folders)?;
+            .map(|folder| StoredShard::open(folder))
+            .collect::<Result<_>>()?;
+        shards.sort_by_key(|shard| (shard.shard.count(), shard.shard));
+        joined_manifest::check_same_run(&shards)?;
+        let coverage = Coverage::from_shards(
+            shards
+                .iter()
+                .map(|shard| (shard.shard, &*shard.folder, &shard.manifest)),
+        )?;
+        let plan = missing::plan(&shards, &coverage)?;
+        let is_missing = missing::check(&shards, &coverage, plan.as_ref(), missing)?;
+        missing::warn_unfinished(&shards, plan.as_ref());
+        let mut manifest = joined_manifest::joined_manifest(&shards, &coverage)?;
+        let folders: Vec<&Path> = shards.iter().map(|shard| &*shard.folder).collect();
+        let questions = ShardQuestions::read(&folders)?;
         let mut trials = Trials::default();
-        for (number, part) in parts.iter().enumerate() {
-            read_part(&mut trials, &part.folder, &part.manifest, number)?;
+        for (number, shard) in shards.iter().enumerate() {
+            read_shard(&mut trials, &shard.folder, &shard.manifest, number)?;
         }
-        let twice = each_once(&mut trials, &folders)?;
-        if twice > 0 {
+        let paid_twice = remove_duplicates(&mut trials, &folders)?;
+        if paid_twice > 0 {
             tracing::warn!(
-                "{twice} replies differ in two parts: they were paid for twice; those of the first part are taken"
+                "{paid_twice} replies differ in two parts: they were paid for twice; those of the first part are taken"
             );
         }
-        sort(&mut trials, questions.ids(), &manifest.models);
+        sort_trials(&mut trials, questions.ids(), &manifest.models);
         let failed = trials.iter().filter(|trial| trial.failed()).count();
         manifest.count(Counts {
             trials: coverage.trials().max(trials.len()),
@@ -69,28 +79,28 @@ impl<D: Detail> RunParts<D> {
             manifest.status = Status::Incomplete;
         }
         Ok(Self {
-            parts,
+            shards,
             questions,
             trials,
             manifest,
         })
     }
 
-    /// The folders of the parts, by their numbers.
+    /// The folder of each shard.
     pub(crate) fn folders(&self) -> Vec<&Path> {
-        self.parts.iter().map(|part| &*part.folder).collect()
+        self.shards.iter().map(|shard| &*shard.folder).collect()
     }
 
-    /// The manifest of the run, of which nothing else is needed any more.
+    /// The manifest of the whole run; frees everything else.
     pub(crate) fn into_manifest(self) -> RunManifest {
         self.manifest
     }
 
-    /// The folder and the manifest of each part, by their numbers.
+    /// The folder and the manifest of each shard.
     pub(crate) fn manifests(&self) -> Vec<(&Path, &RunManifest)> {
-        self.parts
+        self.shards
             .iter()
-            .map(|part| (&*part.folder, &part.manifest))
+            .map(|shard| (&*shard.folder, &shard.manifest))
             .collect()
     }
 }

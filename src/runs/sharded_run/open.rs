@@ -1,75 +1,77 @@
-//! The run in a folder, or that of the parts in it: [`any_run`], [`choice_run`], [`runs_in`].
+//! Opens a run folder, or joins the shards in a folder into one run: [`open_any_run`], [`open_choice_run`].
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::joined::RunParts;
-use super::missing::MissingParts;
-use super::part::no_part;
+use super::ShardedRun;
+use super::missing::MissingShards;
+use super::stored_shard::no_shard_error;
 use crate::error::{Error, Result};
 use crate::images::notes::thumbnail::MissingThumbnails;
 use crate::runs::run_texts::RunTexts;
-use crate::runs::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, manifest, open_questions};
+use crate::runs::stored::{
+    AnyRun, ExperimentKind, RunLayout, StoredRun, open_questions_error, read_run_manifest,
+};
 use crate::store;
 use crate::types::{ChoiceDetail, Trials};
 use darkqa_score::answers::record::Detail;
 
-/// The run in a folder; that of all parts in it if the folder itself holds none. What is in no part is said.
+/// Opens the run in a folder. If the folder itself has no run, joins all shards in it, with a warning about missing ones.
 ///
 /// # Errors
-/// If the folder holds neither, or the parts are not of one run.
-pub(crate) fn any_run(folder: &Path) -> Result<AnyRun> {
-    let Some(parts) = parts_in(folder)? else {
+/// If the folder has neither, or the shards belong to different runs.
+pub(crate) fn open_any_run(folder: &Path) -> Result<AnyRun> {
+    let Some(parts) = shard_folders_in(folder)? else {
         return AnyRun::open(folder);
     };
-    Ok(match one_kind(&parts)? {
-        ExperimentKind::Choice => AnyRun::Choice(run_from_parts(folder, &parts)?),
-        ExperimentKind::Open => AnyRun::Open(run_from_parts(folder, &parts)?),
+    Ok(match common_kind(&parts)? {
+        ExperimentKind::Choice => AnyRun::Choice(run_from_shards(folder, &parts)?),
+        ExperimentKind::Open => AnyRun::Open(run_from_shards(folder, &parts)?),
     })
 }
 
-/// The run of questions with choices in a folder, as [`any_run`].
+/// Opens the run of questions with choices in a folder, like [`open_any_run`].
 ///
 /// # Errors
 /// Also if the questions are open. That error tells the user what to do `instead`.
-pub(crate) fn choice_run(folder: &Path, instead: &str) -> Result<StoredRun<ChoiceDetail>> {
-    let Some(parts) = parts_in(folder)? else {
+pub(crate) fn open_choice_run(folder: &Path, instead: &str) -> Result<StoredRun<ChoiceDetail>> {
+    let Some(parts) = shard_folders_in(folder)? else {
         return StoredRun::open_choices(folder, instead);
     };
-    match one_kind(&parts)? {
-        ExperimentKind::Choice => run_from_parts(folder, &parts),
-        ExperimentKind::Open => Err(open_questions(folder, instead)),
+    match common_kind(&parts)? {
+        ExperimentKind::Choice => run_from_shards(folder, &parts),
+        ExperimentKind::Open => Err(open_questions_error(folder, instead)),
     }
 }
 
-/// The run folders in a folder that holds no run itself, if any of them is a part.
+/// The run folders in a folder, if any of them is a shard; `None` if the folder is a run itself or has no shards.
 ///
 /// # Errors
 /// If the manifest of one cannot be read.
-fn parts_in(folder: &Path) -> Result<Option<Vec<PathBuf>>> {
+fn shard_folders_in(folder: &Path) -> Result<Option<Vec<PathBuf>>> {
     let is_folder = fs::metadata(folder).is_ok_and(|entry| entry.is_dir());
     if !is_folder || store::schema(folder)?.is_some() {
         return Ok(None);
     }
-    let inside = runs_in(folder)?;
-    for run in &inside {
-        if manifest(run)?.shard.is_some() {
-            return Ok(Some(inside));
+    let runs = run_folders_in(folder)?;
+    for run in &runs {
+        if read_run_manifest(run)?.shard.is_some() {
+            return Ok(Some(runs));
         }
     }
     Ok(None)
 }
 
-/// The run of these parts, which are in `folder`, as reports need it.
-fn run_from_parts<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<StoredRun<D>> {
-    let parts = RunParts::<D>::read(parts, MissingParts::Accepted)?;
+/// Joins these shards, which are in `folder`, into a run for reports.
+fn run_from_shards<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<StoredRun<D>> {
+    let parts = ShardedRun::<D>::read(parts, MissingShards::Accept)?;
     let folders = parts.folders();
     let texts: Result<Vec<RunTexts<D>>> = folders.iter().map(|part| RunTexts::open(part)).collect();
     let wanted = MissingThumbnails::new(parts.questions.frames(), Vec::new());
     Ok(StoredRun {
         folder: folder.to_owned(),
-        layout: RunLayout::Parts,
-        texts: RunTexts::Parts(texts?),
+        layout: RunLayout::Shards,
+        texts: RunTexts::Shards(texts?),
         thumbnails: store::missing_thumbnails(&[], &folders, |frame| wanted.wants(frame)),
         fidelity: store::more_fidelity(&[], &folders, |_| true),
         left_out: Trials::default(),
@@ -79,34 +81,33 @@ fn run_from_parts<D: Detail>(folder: &Path, parts: &[PathBuf]) -> Result<StoredR
     })
 }
 
-/// The run folders directly in a folder, in order.
+/// The run folders directly in a folder, sorted by path.
 ///
 /// # Errors
 /// If the folder or a manifest cannot be read.
-pub(crate) fn runs_in(folder: &Path) -> Result<Vec<PathBuf>> {
+pub(crate) fn run_folders_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
-    let mut inside = Vec::new();
+    let mut runs = Vec::new();
     for entry in entries {
-        let entry = entry.map_err(|e| Error::file(folder, "read", e))?.path();
-        if store::schema(&entry)?.is_some() {
-            inside.push(entry);
+        let path = entry.map_err(|e| Error::file(folder, "read", e))?.path();
+        if store::schema(&path)?.is_some() {
+            runs.push(path);
         }
     }
-    inside.sort();
-    Ok(inside)
+    runs.sort();
+    Ok(runs)
 }
 
-/// The kind of questions in these runs.
+/// The kind of questions that all these runs have.
 ///
 /// # Errors
-/// If there is no run, or they are not all of one kind.
-pub(crate) fn one_kind(folders: &[PathBuf]) -> Result<ExperimentKind> {
-    let kinds: Result<Vec<ExperimentKind>> = folders
+/// If there is no run, or the runs are of different kinds.
+pub(crate) fn common_kind(folders: &[PathBuf]) -> Result<ExperimentKind> {
+    let kinds: Vec<ExperimentKind> = folders
         .iter()
         .map(|folder| ExperimentKind::read(folder))
-        .collect();
-    let kinds = kinds?;
-    let first = *kinds.first().ok_or_else(no_part)?;
+        .collect::<Result<_>>()?;
+    let first = *kinds.first().ok_or_else(no_shard_error)?;
     if let Some(other) = kinds.iter().position(|kind| *kind != first) {
         let problem = format!(
             "runs of questions with choices and of open questions cannot be merged: {} is of the other kind",
