@@ -1,4 +1,4 @@
-//! `batch import`: reading the output of a Batch API into the records of a run; and the batches of a folder.
+//! `batch import` reads the output of a Batch API into the records of a run; [`folder`] has the commands for submitted batches.
 
 mod folder;
 
@@ -38,7 +38,7 @@ pub(crate) struct BatchImportArgs {
 /// Imports the replies of output and error files. Each reply is imported once, even if a file is imported again.
 ///
 /// # Errors
-/// If the folder holds no run or no batch, or a line is not valid. The replies of the lines before it stay imported.
+/// If the folder has no run or no batch, or a line is invalid. The replies of earlier lines stay imported.
 pub(crate) fn import(args: &BatchImportArgs) -> Result<Outcome> {
     match ExperimentKind::read(&args.run)? {
         ExperimentKind::Choice => import_into::<ChoiceDetail>(args, choice::write),
@@ -53,11 +53,11 @@ fn import_into<D: Detail>(
     let manifest = read_run_manifest(&args.run)?;
     let mut store = Store::<D>::open(&args.run, &manifest, AddressChange::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &args.files)?;
-    reported(&store, manifest, &args.show, &imported, write)
+    report(&store, manifest, &args.show, &imported, write)
 }
 
-/// The report of a run with new replies, behind a text about them.
-fn reported<D: Detail>(
+/// Writes the report of a run with new replies. The text for standard output begins with `text`, which describes the new replies.
+fn report<D: Detail>(
     store: &Store<D>,
     manifest: RunManifest,
     show: &ShowArgs,

@@ -1,4 +1,4 @@
-//! [`ChoiceSetup`]: the data and models of an evaluation, opened and checked.
+//! The data and models of an evaluation, opened and checked: [`ChoiceSetup`].
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -159,7 +159,7 @@ impl<'a> ChoiceSetup<'a> {
     }
 
     /// Prints the inferred column mapping of a ready-made set, and warns about unnamed scenes.
-    pub(super) fn say_reading(&self, progress: &Progress) {
+    pub(super) fn print_reading(&self, progress: &Progress) {
         for line in self.dataset.reading_to_say() {
             progress.note(line);
         }
@@ -193,7 +193,7 @@ impl<'a> ChoiceSetup<'a> {
     }
 }
 
-/// Warns if `room-net` will guess questions, because the rules did not make them.
+/// Warns about the number of questions that `room-net` will guess, because no rule made them.
 fn warn_of_guesses(questions: &[Question], rules: &Rules) {
     let unknown = questions
         .iter()
@@ -207,7 +207,7 @@ fn warn_of_guesses(questions: &[Question], rules: &Rules) {
     }
 }
 
-/// Prints the training data of `room-net` and of the enhancer `lift`, if `room-net` is shown images.
+/// Prints the training data of `room-net`, and of the enhancer `lift` if both are used.
 fn print_training(config: &Evaluation, progress: &Progress) {
     let job = &config.job;
     if !job.ask.shows_images_to(&ModelName::RoomNet) {
@@ -277,7 +277,7 @@ fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
         .collect()
 }
 
-/// Opens the models. Nothing is sent.
+/// Opens the models without sending any request.
 fn open_models(
     config: &Evaluation,
     controls: &AddedControls,
