@@ -284,7 +284,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             models: &all,
             manifest: Some(&self.manifest),
         };
-        let batches = Journal::open(self.store.folder(), &self.manifest)?.most_dollars();
+        let batches = Journal::open(self.store.folder(), &self.manifest)?.max_open_cost();
         let budget = Budget::for_run(&settings.money, models, answering, &stored)?;
         let in_flight_cost = InFlightCost::open(self.store.folder())?;
         let budget = budget.with_unrecorded(batches + in_flight_cost.killed());
