@@ -8,7 +8,7 @@ use std::time::Instant;
 use crate::ask::ImageLimit;
 use crate::engine::batch::journal::Journal;
 use crate::engine::circuit_breaker::EndReason;
-use crate::engine::costs::{Answering, Budget, InFlightCost};
+use crate::engine::costs::{Budget, InFlightCost, RunModels};
 use crate::engine::dark_already;
 use crate::engine::dispatch::{Dispatcher, TrialCounts};
 use crate::engine::experiment::{DetailOf, Experiment};
@@ -121,12 +121,12 @@ impl<E: Experiment> OpenRun<'_, E> {
             return Ok(());
         };
         let models = every_model(self.experiment);
-        let answering = Answering {
+        let run_models = RunModels {
             models: &models,
             manifest: Some(&self.manifest),
         };
         let trials = self.store.trials()?;
-        let budget = Budget::for_run(&settings.money, &[], answering, &trials)?;
+        let budget = Budget::for_run(&settings.money, &[], run_models, &trials)?;
         let spent = budget.charged();
         let over = (budget.spending().overrun() > 0.0).then(|| OverBudget {
             limit,
@@ -280,12 +280,12 @@ impl<E: Experiment> OpenRun<'_, E> {
         let settings = experiment.settings();
         let models = experiment.models(phase);
         let all = every_model(experiment);
-        let answering = Answering {
+        let run_models = RunModels {
             models: &all,
             manifest: Some(&self.manifest),
         };
         let batches = Journal::open(self.store.folder(), &self.manifest)?.max_open_cost();
-        let budget = Budget::for_run(&settings.money, models, answering, &stored)?;
+        let budget = Budget::for_run(&settings.money, models, run_models, &stored)?;
         let in_flight_cost = InFlightCost::open(self.store.folder())?;
         let budget = budget.with_unrecorded(batches + in_flight_cost.killed());
         let counts = TrialCounts {

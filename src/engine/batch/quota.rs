@@ -9,7 +9,7 @@ use super::event::{Event, PartFacts};
 use super::part::Part;
 use super::requests::SHARE_OF_QUOTA;
 use crate::ask::QuotaRefusal;
-use crate::engine::costs::{Answering, Budget, InFlightCost};
+use crate::engine::costs::{Budget, InFlightCost, RunModels};
 use crate::error::Result;
 use darkqa_score::answers::record::Detail;
 
@@ -117,12 +117,12 @@ impl<D: Detail> Driver<'_, D> {
         let charged = if let Some(charged) = self.notes.charged.get() {
             charged
         } else {
-            let answering = Answering {
+            let run_models = RunModels {
                 models: self.models,
                 manifest: Some(self.manifest),
             };
             let trials = self.store.trials()?;
-            Budget::for_run(money, &[], answering, &trials)?.charged()
+            Budget::for_run(money, &[], run_models, &trials)?.charged()
         };
         self.notes.charged.set(Some(charged));
         let killed = InFlightCost::open(self.store.folder())?.killed();

@@ -15,7 +15,7 @@ use super::settings::BatchRunArgs;
 use super::stopped_models::StoppedModels;
 use super::summary;
 use crate::engine::circuit_breaker::EndReason;
-use crate::engine::costs::{Answering, Budget, BudgetNotes};
+use crate::engine::costs::{Budget, BudgetNotes, RunModels};
 use crate::engine::experiment::Experiment;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::models::{self, ModelUnderTest};
@@ -256,13 +256,13 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let experiment = self.run.experiment;
         let (models, money) = (experiment.models(phase), &experiment.settings().money);
         let all = every_model(experiment);
-        let answering = Answering {
+        let run_models = RunModels {
             models: &all,
             manifest: Some(&self.run.manifest),
         };
-        let budget = Budget::for_run(money, models, answering, &remaining.stored)?;
+        let budget = Budget::for_run(money, models, run_models, &remaining.stored)?;
         if self.args.no_scout {
-            BudgetNotes::new(models).say_unlimited(budget.spending());
+            BudgetNotes::new(models).warn_unlimited(budget.spending());
         }
         let replies = reply_lengths(models, &remaining.stored);
         let cost = |trial: &Trial<E::Item>, stimulus: &Stimulus| {

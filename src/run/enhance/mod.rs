@@ -270,7 +270,7 @@ impl ImageOrigin for EnhancedOrigin {
 
 /// Settings of the enhancer that determine the pixels. The digest has a name that is understandable in messages.
 fn pixel_settings(digest: &Digest, size: &SizeArgs) -> Value {
-    let mut settings = identity::enhancer(digest, size);
+    let mut settings = identity::enhancer_definition(digest, size);
     if let Some(fields) = settings.as_object_mut()
         && let Some(digest) = fields.remove("--llie")
     {

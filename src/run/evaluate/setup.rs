@@ -99,7 +99,7 @@ impl<'a> ChoiceSetup<'a> {
         }
         photographs::check_matches(&sources, &job.light.matches)?;
         photographs::tell(&*dataset, &sources, progress);
-        dark_already::tell(job, progress);
+        dark_already::print_note(job, progress);
         if !job.enhancers.is_empty()
             && job.enhancers.on().and(TreatmentSet::DARK).is_none()
             && !photographs::names(&sources).is_empty()

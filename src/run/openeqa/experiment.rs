@@ -124,7 +124,8 @@ impl Experiment for OpenSetup<'_> {
         let mut columns = identity::columns(&self.models, &self.recipe, &self.config.job);
         if let Some(judge) = &self.judge {
             // A model that is its own judge may have other settings as a judge.
-            let content = || BTreeMap::from([(judge.name.to_string(), identity::model(judge))]);
+            let content =
+                || BTreeMap::from([(judge.name.to_string(), identity::model_definition(judge))]);
             columns.insert(JUDGES.to_owned(), content());
             let models = columns.entry("model".to_owned()).or_default();
             for (name, content) in content() {

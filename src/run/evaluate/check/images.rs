@@ -156,7 +156,7 @@ fn check_brightness(
     let Some(median) = sample.get(sample.len() / 2) else {
         return;
     };
-    match advice(*median).filter(|_| dark == DarkImages::Odd) {
+    match advice(*median).filter(|_| dark == DarkImages::Unexpected) {
         Some(advice) => findings.warn(advice),
         None => findings.ok(format!(
             "median brightness {median:.0} of 255 ({})",

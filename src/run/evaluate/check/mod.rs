@@ -166,9 +166,10 @@ fn check_data(
     };
     let enhancers = args.job.enhancers.clone().for_set(light);
     // Contradictory flags are a finding already.
-    let dark = LightSettings::resolve(&args.job.light, light).map_or(DarkImages::Odd, |levels| {
-        DarkImages::new(light, &levels, &enhancers)
-    });
+    let dark = LightSettings::resolve(&args.job.light, light)
+        .map_or(DarkImages::Unexpected, |levels| {
+            DarkImages::new(light, &levels, &enhancers)
+        });
     images::check_images(&dataset, dark, &asked, depth, progress, findings);
     if let Some(path) = &check.save_questions {
         save_questions(path, &dataset, &asked)?;
