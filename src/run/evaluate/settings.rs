@@ -180,7 +180,7 @@ impl EvaluateArgs {
             sampling_seed: None,
             data: self.data.place().path().map(Path::to_owned),
             text_baseline: match self.bank.ask {
-                None => TextBaseline::AsSaid,
+                None => TextBaseline::AsMarked,
                 Some(_) => TextBaseline::Always,
             },
             set_light: SetLight::default(),

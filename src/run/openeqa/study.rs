@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::setup::OpenSetup;
 use crate::engine::experiment::Experiment as _;
-use crate::engine::limit;
+use crate::engine::image_limit;
 use crate::engine::pipeline;
 use crate::error::Result;
 use crate::files::write;
@@ -35,7 +35,7 @@ pub(super) fn pack(
 ) -> Result<Outcome> {
     let settings = setup.settings();
     let mut enhancers = OpenEnhancers::load(files, &settings.loading)?;
-    let limit = limit(settings);
+    let limit = image_limit(settings);
     let timings = Timings::default();
     let images = settings.images.open(settings.access)?;
     let mut pipeline = pipeline(setup, enhancers.take()?, limit, &timings);
