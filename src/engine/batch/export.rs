@@ -8,7 +8,9 @@ use super::journal::Journal;
 use super::requests::{CostOf, Requests, require_remote, summary};
 use crate::engine::dark_already;
 use crate::engine::experiment::Experiment;
-use crate::engine::open_run::{OpenRun, Remaining, every_model, limit, missing_notes, pipeline};
+use crate::engine::open_run::{
+    OpenRun, Remaining, every_model, image_limit, missing_notes, pipeline,
+};
 use crate::error::{Error, Result};
 use crate::images::recipes::Maker;
 use crate::images::stored::StoredImages;
@@ -78,7 +80,7 @@ pub(super) fn write<E: Experiment>(
     } else {
         Vec::new()
     };
-    let limit = limit(settings);
+    let limit = image_limit(settings);
     let maker = Maker::new(run.enhancers.version(), &settings.loading.size);
     let images = run.images.as_ref();
     let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
