@@ -249,7 +249,7 @@ pub(super) struct JoinedRuns {
 pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     judges::check_same_judge(&runs)?;
     check_questions(&runs)?;
-    let joined = join(runs, |trial| trial.is_answer())?;
+    let joined = join(runs, is_answer)?;
     let mut alerts = run_alerts(&joined);
     alerts.extend(joining_alerts(&joined));
     if joined.runs.len() == 1 {
@@ -336,6 +336,11 @@ pub(crate) fn write(
         scores.write(&ReportFolder::Run(store), show)?,
     )
     .in_format(show))
+}
+
+/// True if the trial asked for an answer, false if it asked for a mark. `TrialRef::is_answer` does not coerce to the `Fn` that [`join`] takes.
+fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
+    trial.is_answer()
 }
 
 /// Successful marks by the judge of a run.

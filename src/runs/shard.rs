@@ -221,7 +221,7 @@ mod tests {
         };
         assert_eq!(shares(None), [167, 167, 166]);
         assert_eq!(shares(Some(2)), [250, 250, 250]);
-        // More workers than shards are as many as there are shards.
+        // At most as many workers as shards.
         assert_eq!(shares(Some(16)), [167, 167, 166]);
         assert_eq!(parts[2].quota(whole, None).tokens.unwrap().get(), 1);
         assert_eq!(parts[1].folder(), "shard-2-of-3");

@@ -292,7 +292,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// True if the file or batch of a part has been missing for long enough to conclude that it does not exist. Otherwise warns that the
-    /// search goes on. `what` is `file` or `batch`.
+    /// search continues. `what` is `file` or `batch`.
     pub(super) fn is_missing(&mut self, part: usize, what: &str) -> bool {
         let now = Instant::now();
         let since = *self.notes.missing_since.entry(part).or_insert(now);

@@ -82,7 +82,7 @@ fn check_trials<D: Detail>(journal: &Journal, store: &Store<D>) -> Result<()> {
     Ok(())
 }
 
-/// Completes a file with those of its lines whose trials are recorded. Returns true if there are any.
+/// Completes a file, with only the lines whose trials are recorded. Returns true if there are any.
 fn complete(
     journal: &mut Journal,
     part: usize,

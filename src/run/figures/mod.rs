@@ -203,8 +203,8 @@ fn in_tex(look: &Look) -> Look {
 /// The files of the figures. All are made before any is written.
 #[derive(Default)]
 struct Files {
-    /// Names and contents.
-    files: Vec<(String, Vec<u8>)>,
+    /// Content of each file, with its name.
+    contents: Vec<(String, Vec<u8>)>,
     captions: String,
     left_out: String,
 }
@@ -220,7 +220,7 @@ impl Files {
         self.add(name, &sheet(&drawing.chart, look), formats)?;
         if formats.contains(&FigureFormat::Tex) {
             match &drawing.chart {
-                Drawn::Lines(chart) => self.files.extend(tex(name, chart, &in_tex(look))),
+                Drawn::Lines(chart) => self.contents.extend(tex(name, chart, &in_tex(look))),
                 Drawn::Bars(_) | Drawn::Thresholds(_) | Drawn::Reliability(_) => {
                     self.leave_out(&format!("{name}.tex"), "it is not a chart of lines");
                 }
@@ -249,7 +249,7 @@ impl Files {
             let width = in_tex(look).width / 2.0;
             for (letter, chart) in ('a'..).zip(&overview.charts) {
                 let half = Look { width, ..*look };
-                self.files
+                self.contents
                     .extend(tex(&format!("{PAPER}-{letter}"), chart, &half));
             }
         }
@@ -270,7 +270,7 @@ impl Files {
             return;
         }
         let (files, long) = tables(all, &in_tex(look), args.columns == Some(2));
-        self.files.extend(files);
+        self.contents.extend(files);
         if long > 0 {
             let why = format!(
                 "{long} of more than 40 rows are in tables-full.tex, for text in one column"
@@ -283,11 +283,12 @@ impl Files {
     fn add(&mut self, name: &str, sheet: &Sheet, formats: &[FigureFormat]) -> Result<()> {
         sheet.check_letters()?;
         if formats.contains(&FigureFormat::Pdf) {
-            self.files.push((format!("{name}.pdf"), pdf(sheet, name)?));
+            self.contents
+                .push((format!("{name}.pdf"), pdf(sheet, name)?));
         }
         if formats.contains(&FigureFormat::Svg) {
             let file = (format!("{name}.svg"), svg(sheet, &png)?.into_bytes());
-            self.files.push(file);
+            self.contents.push(file);
         }
         Ok(())
     }
@@ -299,7 +300,7 @@ impl Files {
     /// Writes the files; returns a line for each.
     fn write(self, out: &Path) -> Result<String> {
         let mut lines = String::new();
-        for (name, content) in &self.files {
+        for (name, content) in &self.contents {
             files::write(&out.join(name), content)?;
             let _ = writeln!(lines, "{}", out.join(name).display());
         }

@@ -115,7 +115,7 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
         let severity = kind.severity(level).map_err(|e| e.to_string())?;
         Degradation::new(kind, severity, None).map_err(|e| e.to_string())
     };
-    // The kinds that have this level: those of its axis.
+    // Kinds on the axis of the level.
     let mut degradations: Vec<Degradation> = Kind::ALL
         .into_iter()
         .filter_map(|kind| of_kind(kind).ok())

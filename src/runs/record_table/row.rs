@@ -142,14 +142,13 @@ impl<D: TableDetail> Rows<D> {
     pub(super) fn row(&mut self, mut record: Record<D>) -> Option<Row<D>> {
         rename_record(&mut record, &self.names);
         let extra = D::extra(&self.context, &record)?;
-        let condition = match self.conditions.get(&record.condition) {
-            Some(known) => Arc::clone(known),
-            None => {
-                let cells = Arc::new(ConditionCells::new(record.condition.as_ref()));
-                self.conditions
-                    .insert(record.condition.clone(), Arc::clone(&cells));
-                cells
-            }
+        let condition = if let Some(known) = self.conditions.get(&record.condition) {
+            Arc::clone(known)
+        } else {
+            let cells = Arc::new(ConditionCells::new(record.condition.as_ref()));
+            self.conditions
+                .insert(record.condition.clone(), Arc::clone(&cells));
+            cells
         };
         Some(Row {
             question: self.questions.get(&record.question).map(Arc::clone),

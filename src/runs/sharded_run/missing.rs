@@ -7,7 +7,7 @@ use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
 use crate::types::manifests::Status;
 
-/// What to do about sources of a run that are in no shard.
+/// Treatment of sources of a run that are in no shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum MissingShards {
     /// Return an error.
