@@ -8,31 +8,33 @@ use crate::error::Error;
 use crate::types::manifests::{Counts, Status};
 use crate::types::{Failure, FailureKind};
 
-/// Failed trials after which a model is stopped if none has succeeded: the next would fail, too.
+/// Number of failed trials after which a model without any success is stopped, because further trials would fail, too.
 const FAILURES_AT_START: usize = 5;
 
-/// Minimum of failures in a row after which a model is stopped if a trial has succeeded: servers recover from shorter outages.
+/// Minimum number of consecutive failures after which a model that has succeeded before is stopped. Servers recover from shorter outages.
 const FAILURES_IN_A_ROW: usize = 20;
 
-/// Failures in a row about one frame or walk that count: the server may fail for it alone. Chosen: its other trials are set aside then.
-const FAILURES_OF_ONE: usize = 2;
+/// Maximum number of consecutive failures about one frame or walk that count, because the server may fail for it alone. Chosen: the other
+/// trials about it are set aside after as many.
+const MAX_FAILURES_PER_SOURCE: usize = 2;
 
-/// How the asking ended.
+/// Reason why no more trials are asked.
 #[derive(Debug)]
 pub(crate) enum EndReason {
     /// All trials of the plan were asked.
     AllAsked,
     /// The user or the batch system interrupted it.
     Interrupted,
-    /// The next question would have gone beyond `--max-cost`.
+    /// The next question could have exceeded `--max-cost`.
     OverBudget,
-    /// No model could be asked any further, or too much had failed.
+    /// All models were stopped, too many trials had failed, or this machine had a problem.
     Stopped(Error),
-    /// These models could not be asked any further; the others were.
+    /// Some models were stopped, for these reasons; the others were asked all trials.
     ModelsStopped(Vec<Error>),
 }
 
 impl EndReason {
+    /// Status of a run that ended for this reason with these numbers of trials.
     pub(crate) fn status(&self, counts: Counts) -> Status {
         match self {
             // Truncated replies that are asked again count as answered.
@@ -49,15 +51,15 @@ impl EndReason {
 #[derive(Debug, Default)]
 struct ModelHealth {
     succeeded: bool,
-    /// Failures since the last success that the server or the network caused.
+    /// Number of failures since the last success that the server or the network caused.
     outage: usize,
-    /// The same failures by frame or walk: a single one may be the cause, so that it counts at most [`FAILURES_OF_ONE`] times.
+    /// The same failures by frame or walk. One frame may be the cause, so it adds at most [`MAX_FAILURES_PER_SOURCE`] to `outage`.
     outage_sources: BTreeMap<String, usize>,
-    /// Requests that the server refused, in the whole run.
+    /// Number of requests that the server refused, in the whole run.
     refusals: usize,
-    /// Frames or walks of the refused requests. A single one does not count, because it may be the cause.
+    /// Frames or walks of the refused requests. If there is only one, it may be the cause, and the model is not stopped.
     refused_sources: BTreeSet<String>,
-    /// Whether the model is asked nothing more.
+    /// True if no more trials of the model are asked.
     stopped: bool,
 }
 
@@ -70,40 +72,42 @@ struct ModelState {
     health: ModelHealth,
 }
 
-/// Checks each outcome for a reason to stop asking one model, or all.
+/// Counts failed trials, and stops one model or the run when too many have failed.
 #[derive(Debug)]
 pub(crate) struct CircuitBreaker {
     max_failures: Option<usize>,
-    /// Whether the first model that is stopped ends the run.
+    /// True if the run ends when the first model is stopped.
     fails_fast: bool,
-    /// Failures in a row after which a model that has succeeded is stopped.
+    /// Number of consecutive failures after which a model that has succeeded before is stopped.
     max_outage: usize,
     models: Vec<ModelState>,
     failures: usize,
-    /// Whether nothing more is asked of any model.
+    /// True if no more trials of any model are asked.
     stopped: bool,
     end: Option<EndReason>,
-    /// Why each of the stopped models was stopped.
+    /// The reason for each stopped model.
     model_errors: Vec<Error>,
 }
 
 impl CircuitBreaker {
-    /// A circuit breaker for these models. `concurrency` requests may fail together, for one cause.
+    /// A circuit breaker for these models. Up to `concurrency` requests in flight may fail for the same cause.
     pub(crate) fn new(
         models: &[ModelUnderTest],
         concurrency: usize,
         max_failures: Option<usize>,
     ) -> Self {
-        let states = models.iter().map(|model| ModelState {
-            name: model.name.to_string(),
-            endpoint: model.endpoint_name(),
-            health: ModelHealth::default(),
-        });
         Self {
             max_failures,
             fails_fast: false,
             max_outage: FAILURES_IN_A_ROW.max(3 * concurrency),
-            models: states.collect(),
+            models: models
+                .iter()
+                .map(|model| ModelState {
+                    name: model.name.to_string(),
+                    endpoint: model.endpoint_name(),
+                    health: ModelHealth::default(),
+                })
+                .collect(),
             failures: 0,
             stopped: false,
             end: None,
@@ -111,17 +115,17 @@ impl CircuitBreaker {
         }
     }
 
-    /// The same circuit breaker; if `fails_fast`, the first model that is stopped ends the run.
-    pub(crate) fn failing_fast(self, fails_fast: bool) -> Self {
+    /// Sets whether the run ends when the first model is stopped.
+    pub(crate) fn with_fail_fast(self, fails_fast: bool) -> Self {
         Self { fails_fast, ..self }
     }
 
-    /// Whether nothing more is asked of any model.
+    /// True if no more trials of any model are asked.
     pub(crate) fn stopped(&self) -> bool {
         self.stopped
     }
 
-    /// Whether a model is asked nothing more.
+    /// True if no more trials of a model are asked.
     pub(crate) fn is_stopped(&self, model: usize) -> bool {
         self.models[model].health.stopped
     }
@@ -131,6 +135,7 @@ impl CircuitBreaker {
         self.failures
     }
 
+    /// The reason why the run ended; [`EndReason::AllAsked`] if nothing stopped it.
     pub(crate) fn into_end(self) -> EndReason {
         match self.end {
             Some(EndReason::Stopped(_)) if !self.stopped => {
@@ -140,6 +145,7 @@ impl CircuitBreaker {
         }
     }
 
+    /// Stops the run because of an interrupt.
     pub(crate) fn interrupted(&mut self) {
         self.stop(EndReason::Interrupted);
     }
@@ -154,7 +160,7 @@ impl CircuitBreaker {
         self.stop(EndReason::OverBudget);
     }
 
-    /// Ends the run. The first reason counts; that one of several models was stopped before is not the end of the run.
+    /// Ends the run. The first call decides the reason; it replaces the reason of a model that was stopped before.
     fn stop(&mut self, reason: EndReason) {
         if !self.stopped {
             self.stopped = true;
@@ -162,13 +168,15 @@ impl CircuitBreaker {
         }
     }
 
+    /// Records a reply of a model.
     pub(crate) fn succeeded(&mut self, model: usize) {
         let health = &mut self.models[model].health;
         (health.succeeded, health.outage) = (true, 0);
         health.outage_sources.clear();
     }
 
-    /// Records a failure about a frame or walk, which may be its cause ([`Suspects::may_be_cause`](super::suspects::Suspects)) or not.
+    /// Records a failed trial about a frame or walk. `may_be_cause` is the result of
+    /// [`Suspects::may_be_cause`](super::suspects::Suspects).
     pub(crate) fn failed(
         &mut self,
         model: usize,
@@ -199,10 +207,11 @@ impl CircuitBreaker {
                 health.refused_sources.insert(source.to_owned());
             }
             _ => {
-                let of_source = health.outage_sources.entry(source.to_owned()).or_default();
-                *of_source += 1;
+                let source_failures = health.outage_sources.entry(source.to_owned()).or_default();
+                *source_failures += 1;
                 let is_down = *kind == FailureKind::Connection && message.contains("connect error");
-                let counts = *of_source <= FAILURES_OF_ONE || !may_be_cause || is_down;
+                let counts =
+                    *source_failures <= MAX_FAILURES_PER_SOURCE || !may_be_cause || is_down;
                 health.outage += usize::from(counts);
             }
         }
@@ -228,7 +237,7 @@ impl CircuitBreaker {
             None
         };
         // Replies that were in flight may fail after the model was stopped.
-        let newly = problem.is_some() && !health.stopped;
+        let is_newly_stopped = problem.is_some() && !health.stopped;
         health.stopped |= problem.is_some();
         let too_many = self.max_failures.is_some_and(|max| self.failures >= max);
         let too_many = too_many.then(|| {
@@ -238,12 +247,12 @@ impl CircuitBreaker {
             )
         });
         let endpoint = endpoint.clone();
-        self.stopped |= self.fails_fast && newly;
+        self.stopped |= self.fails_fast && is_newly_stopped;
         self.stopped |= too_many.is_some() || self.models.iter().all(|model| model.health.stopped);
         if let Some(problem) = problem.or(too_many) {
             let problem =
                 format!("{problem} (replies so far are stored; the same command continues)");
-            if newly {
+            if is_newly_stopped {
                 let (endpoint, problem) = (endpoint.clone(), problem.clone());
                 self.model_errors
                     .push(Error::Endpoint { endpoint, problem });
@@ -274,7 +283,7 @@ mod tests {
         }
     }
 
-    /// Whether one of two models is stopped after it has failed `times` times, over `frames` frames.
+    /// True if one of two models is stopped after `times` failures, about `frames` frames.
     fn stopped_after(kind: FailureKind, times: usize, frames: usize, succeeded: bool) -> bool {
         let mut breaker = breaker(2, None);
         if succeeded {

@@ -12,12 +12,12 @@ use darkqa_enhance::{EnhancerArgs, brightness as brightness_in_codes};
 use darkqa_light::{LightSettings, mean_luminance};
 
 /// Maximum number of frames that are measured; chosen.
-const SAMPLED: usize = 24;
+const MAX_SAMPLED: usize = 24;
 
-/// Mean luma, of 255, below which a frame is dark. Chosen: a well-lit frame has about 100.
+/// Mean luma, from 0 to 255, below which a frame is dark. Chosen: a well-lit frame has about 100.
 const DARK: f64 = 40.0;
 
-/// Advice for images with this median of the mean luma, of 255; `None` if they are not dark.
+/// Advice for images whose mean luma, from 0 to 255, has this median; `None` if they are not dark.
 pub(crate) fn advice(median: f64) -> Option<String> {
     (median < DARK).then(|| {
         format!(
@@ -27,8 +27,8 @@ pub(crate) fn advice(median: f64) -> Option<String> {
     })
 }
 
-/// Prints what a set in the dark is asked by default, and why, or what is odd about the levels that are named.
-pub(crate) fn tell(job: &JobSettings, progress: &Progress) {
+/// Prints a note about photographs taken in the dark if they are asked as they are, or a warning if they are darkened further.
+pub(crate) fn print_note(job: &JobSettings, progress: &Progress) {
     if job.set_light == SetLight::Lit {
         return;
     }
@@ -44,39 +44,39 @@ pub(crate) fn tell(job: &JobSettings, progress: &Progress) {
     }
 }
 
-/// Mean linear luminance of up to [`SAMPLED`] frames, evenly spread, and their number; `None` without frames that can be decoded.
+/// Mean linear luminance of up to [`MAX_SAMPLED`] evenly spaced frames, and their number; `None` if none can be decoded.
 pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64, usize)> {
-    let sample = sampled(frames, sources, |picture| {
+    let sample = sample_frames(frames, sources, |picture| {
         Some(mean_luminance(&picture.decode().ok()?))
     });
     let mean = sample.iter().sum::<f64>() / sample.len() as f64;
     (!sample.is_empty()).then_some((mean, sample.len()))
 }
 
-/// Whether dark images are expected of a set.
+/// Tells whether dark images in a data set are expected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum DarkImages {
-    /// They are said to be, or they are asked about as they are, raw and enhanced, and no others are.
+    /// The data set is declared as dark, or its images are asked undarkened only, both raw and enhanced.
     Expected,
-    /// They may not be what the user takes them for.
-    Odd,
+    /// The user may take the images for well-lit ones.
+    Unexpected,
 }
 
 impl DarkImages {
-    /// For a set in this light, asked with these levels and enhancers.
+    /// Judges a data set by its declared light, and by the levels and enhancers that it is asked with.
     pub(crate) fn new(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
-        let as_they_are = light.levels == [AxisLevel::L0]
+        let is_undarkened_only = light.levels == [AxisLevel::L0]
             && !enhancers.is_empty()
             && enhancers.on().includes(None);
-        if set == SetLight::Dark || as_they_are {
+        if set == SetLight::Dark || is_undarkened_only {
             Self::Expected
         } else {
-            Self::Odd
+            Self::Unexpected
         }
     }
 }
 
-/// Warns if the frames of an experiment are dark already, and it does more than to ask about them as they are and enhanced.
+/// Warns if the frames of an experiment are dark, unless that is expected ([`DarkImages`]).
 pub(crate) fn warn<E: Experiment>(experiment: &E) {
     let settings = experiment.settings();
     let dark = DarkImages::new(settings.set_light, &settings.light, &settings.enhancers);
@@ -89,10 +89,11 @@ pub(crate) fn warn<E: Experiment>(experiment: &E) {
     }
 }
 
-/// The median of the mean luma of up to [`SAMPLED`] frames, evenly spread; the upper of two. `None` without frames in files. Built-in
-/// rooms are lit. A file that cannot be decoded is left out: the trial that needs its image states it.
+/// Median over up to [`MAX_SAMPLED`] evenly spaced frames of their mean luma, from 0 to 255; of an even number the upper middle value.
+/// Built-in rooms are skipped, because they are lit, and so are files that cannot be decoded, which their trials report. `None` if no
+/// frame is left.
 fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
-    let mut sample = sampled(frames, sources, |picture| match picture {
+    let mut sample = sample_frames(frames, sources, |picture| match picture {
         Picture::Encoded(_) => Some(brightness_in_codes(&picture.decode().ok()?)),
         Picture::Drawn(..) => None,
     });
@@ -100,19 +101,19 @@ fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
     sample.get(sample.len() / 2).copied()
 }
 
-/// A number of up to [`SAMPLED`] frames that have one, evenly spread.
-fn sampled(
+/// Measures up to [`MAX_SAMPLED`] evenly spaced frames. Frames that cannot be read or for which `measure` returns `None` are left out.
+fn sample_frames(
     frames: &dyn Frames,
     sources: &[Source],
-    of: impl Fn(&Picture) -> Option<f64> + Sync,
+    measure: impl Fn(&Picture) -> Option<f64> + Sync,
 ) -> Vec<f64> {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
-    let number = all.len().min(SAMPLED);
+    let number = all.len().min(MAX_SAMPLED);
     (0..number)
         .into_par_iter()
         .filter_map(|index| {
             let frame = all[index * all.len() / number];
-            of(&frames.picture(&frame.id).ok()?)
+            measure(&frames.picture(&frame.id).ok()?)
         })
         .collect()
 }

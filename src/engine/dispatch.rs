@@ -1,4 +1,4 @@
-//! The asynchronous part: asks about the images from the pipeline, and stores every reply when it arrives.
+//! The asynchronous part of a run: sends the trials of prepared groups, and stores each reply when it arrives ([`Dispatcher`]).
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -34,10 +34,10 @@ use crate::types::{Digest, FailureKind, Finish, LostAttempts, Record, Reply, Set
 use darkqa_score::answers::record::answered;
 use darkqa_score::answers::{ImageDependence, LitReply};
 
-/// Number of finished groups that may wait until they are asked about.
+/// Maximum number of prepared groups that wait in the channel.
 const GROUPS_AHEAD: usize = 2;
 
-/// Models and settings that one phase of a run is asked with.
+/// Models and settings of one phase of a run.
 pub(crate) struct Dispatcher<'a> {
     pub(crate) models: &'a [ModelUnderTest],
     pub(crate) progress: &'a Progress,
@@ -48,7 +48,7 @@ pub(crate) struct Dispatcher<'a> {
     pub(crate) token_flag: &'static str,
 }
 
-/// The numbers of all trials and of those answered, in one phase.
+/// Numbers of trials in one phase.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TrialCounts {
     /// Number of trials, answered or not.
@@ -61,8 +61,8 @@ pub(crate) struct TrialCounts {
 type Finished<I> = (PreparedTrial<I>, Result<Reply, AskError>);
 
 impl Dispatcher<'_> {
-    /// Asks about the groups that `make` sends. `make` runs on a separate thread until the channel is closed. `stoppers` end an
-    /// enhancement in progress.
+    /// Asks the trials of the groups that `make` sends. `make` runs on a separate thread until the channel is closed. `stoppers` cancel
+    /// enhancements in progress.
     pub(crate) fn run<I: Item>(
         &self,
         counts: TrialCounts,
@@ -89,7 +89,7 @@ impl Dispatcher<'_> {
             truncation: TruncationCheck::new(self.token_flag),
             measured: MeasuredTokens::new(self.models.len()),
             dependence: vec![ImageDependence::default(); self.models.len()],
-            said_difference: vec![Said::NotYet; self.models.len()],
+            is_estimate_compared: vec![false; self.models.len()],
             first_questions: vec![FirstQuestion::NotAsked; self.models.len()],
             limits: BudgetNotes::new(self.models),
             given_up: watch::Sender::new(false),
@@ -114,12 +114,12 @@ impl Dispatcher<'_> {
             most.unwrap_or(self.settings.concurrency.max()),
             self.settings.money.max_failures,
         )
-        .failing_fast(self.settings.money.fail_fast)
+        .with_fail_fast(self.settings.money.fail_fast)
     }
 }
 
-/// How long trials that wait may take to end after their models are closed; chosen: they need microseconds.
-const CLOSING: Duration = Duration::from_millis(50);
+/// Time for waiting trials to end after their models are closed; chosen: they need microseconds.
+const CLOSING_TIME: Duration = Duration::from_millis(50);
 
 /// Asks trials, and stores their replies.
 struct ReplySink<'a, I: Item> {
@@ -127,9 +127,9 @@ struct ReplySink<'a, I: Item> {
     store: &'a mut Store<I::Detail>,
     bar: TrialProgress,
     breaker: CircuitBreaker,
-    /// Images for which the server fails again and again.
+    /// Images for which the server fails repeatedly.
     suspects: Suspects,
-    /// Numbers of trials that were not asked for that, by frame or walk.
+    /// Number of trials by frame or walk that were not asked because the server fails for it.
     not_asked: BTreeMap<String, usize>,
     budget: Budget,
     stoppers: Vec<EnhancerStopper>,
@@ -138,22 +138,23 @@ struct ReplySink<'a, I: Item> {
     truncation: TruncationCheck,
     /// Tokens charged for the images of the replies.
     measured: MeasuredTokens,
-    /// Of each model, whether its replies depend on the image.
+    /// Check of each model that its replies depend on the image.
     dependence: Vec<ImageDependence>,
-    /// Of each model, whether the user knows how far the estimate is from the charge.
-    said_difference: Vec<Said>,
-    /// The first question to each model.
+    /// True for models whose estimated tokens have been compared with the charged ones.
+    is_estimate_compared: Vec<bool>,
+    /// State of the first question to each model.
     first_questions: Vec<FirstQuestion>,
     /// Notices about the limit of cost.
     limits: BudgetNotes<'a>,
-    /// Whether the requests in flight are given up.
+    /// True once the requests in flight are given up.
     given_up: watch::Sender<bool>,
     in_flight_cost: InFlightCost,
-    /// Whether a note about an image could not be written.
+    /// True if a note about an image could not be written.
     are_notes_lost: bool,
 }
 
-/// The first question to a model. With `--max-cost` others wait for its end, as the tokens of prompts are only estimated before.
+/// State of the first question to a model. With `--max-cost`, other questions wait until it ends, because the charged tokens of prompts
+/// are not known before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FirstQuestion {
     NotAsked,
@@ -161,14 +162,8 @@ enum FirstQuestion {
     Ended,
 }
 
-/// Whether something was said, or need not be said any more.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Said {
-    NotYet,
-    Done,
-}
-
 impl<I: Item> ReplySink<'_, I> {
+    /// Asks the trials of all groups until they end or the circuit breaker stops the run.
     async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
         let concurrency = self.dispatcher.settings.concurrency.max();
         let mut lanes = Lanes::<I>::new(self.dispatcher.models, concurrency);
@@ -177,16 +172,16 @@ impl<I: Item> ReplySink<'_, I> {
         let mut interrupt = Interrupt::listen()?;
         let mut grace = None;
         let mut more_groups = true;
-        // Counts are shown again when it ticks, although nothing has happened.
+        // Refreshes the counts shown even if no trial ends.
         let mut tick = tokio::time::interval(LINE_INTERVAL);
         let spending = Arc::clone(self.budget.spending());
-        self.limits.say_unlimited(&spending);
+        self.limits.warn_unlimited(&spending);
         loop {
             while let Some(ready) = self.next(&mut lanes) {
                 match self.permit(&ready) {
                     Permit::Refused => lanes.put_back(ready),
                     permit => {
-                        // What is in flight is paid for: it is waited for.
+                        // Requests in flight are already paid for, so the loop below waits for them.
                         if let Err(e) = self.note_in_flight() {
                             self.breaker.ended(e);
                             break;
@@ -201,9 +196,9 @@ impl<I: Item> ReplySink<'_, I> {
             if in_flight.is_empty() && !lanes.is_empty() {
                 self.breaker.over_budget();
             }
-            if !more_groups && lanes.is_empty() && in_flight.is_empty() && lanes.has_aside() {
+            if !more_groups && lanes.is_empty() && in_flight.is_empty() && lanes.has_deferred() {
                 lanes.requeue_deferred();
-                self.suspects.asks_last();
+                self.suspects.start_deferred();
                 continue;
             }
             let all_asked = !more_groups && lanes.is_empty() && in_flight.is_empty();
@@ -241,7 +236,7 @@ impl<I: Item> ReplySink<'_, I> {
                 _ = tick.tick() => self.record_wait(state, since),
             }
         }
-        // The image pipeline ends as soon as this channel is closed.
+        // Ends the image pipeline.
         drop(groups);
         if self.breaker.stopped() {
             self.stoppers.iter().for_each(EnhancerStopper::stop);
@@ -258,7 +253,7 @@ impl<I: Item> ReplySink<'_, I> {
         Ok(self.breaker.into_end())
     }
 
-    /// The next trial. Those about an image for which the server fails again and again come last, and are not asked if it still does.
+    /// The next trial to send. Trials about an image for which the server fails repeatedly come last, and are dropped if it still fails.
     fn next(&mut self, lanes: &mut Lanes<'_, I>) -> Option<PreparedTrial<I>> {
         let Self {
             breaker,
@@ -276,11 +271,11 @@ impl<I: Item> ReplySink<'_, I> {
                 }
                 is_given_up || breaker.is_stopped(trial.model)
             },
-            |trial| suspects.is_aside(trial.model, trial.item.source()),
+            |trial| suspects.is_deferred(trial.model, trial.item.source()),
         )
     }
 
-    /// Whether a trial may be asked now.
+    /// Permission to ask a trial now, within `--max-cost`.
     fn permit(&mut self, ready: &PreparedTrial<I>) -> Permit {
         let index = ready.trial.model;
         let is_limited = self.budget.spending().limit().is_some();
@@ -298,7 +293,7 @@ impl<I: Item> ReplySink<'_, I> {
         permit
     }
 
-    /// Notes the cost of the requests in flight, if it is limited.
+    /// Records the cost of the requests in flight in the run folder, if `--max-cost` is set.
     fn note_in_flight(&mut self) -> Result<()> {
         let spending = self.budget.spending();
         if spending.limit().is_none() {
@@ -308,7 +303,7 @@ impl<I: Item> ReplySink<'_, I> {
         self.in_flight_cost.raise(self.store.folder(), reserved)
     }
 
-    /// Shows the numbers of trials and the cost so far, and whether `--max-cost` keeps requests back.
+    /// Shows the numbers of trials and the cost so far, and whether `--max-cost` delays requests.
     fn show_counts(&self, is_held_back: bool) {
         let pace = if is_held_back {
             " · slowed by --max-cost"
@@ -320,15 +315,15 @@ impl<I: Item> ReplySink<'_, I> {
             .count(self.answered, failures, self.budget.spent(), pace);
     }
 
-    /// Adds the time waited in a state to the timings.
+    /// Adds the time since `since` to the timings of a state.
     fn record_wait(&self, state: Option<TimedStep>, since: Instant) {
         if let Some(state) = state {
             self.dispatcher.timings.add(state, since.elapsed());
         }
     }
 
-    /// Waits for the requests in flight, because they may be paid for already, for as long as `grace` at most, if there is one. A further
-    /// interrupt aborts them. Requests that wait for their turn or for a retry are aborted at once.
+    /// Waits for the requests in flight, because they may be paid for already, up to the time `grace` if it is set. A further interrupt
+    /// aborts them. Requests that wait for their turn or for a retry are aborted at once.
     async fn drain(
         &mut self,
         mut in_flight: JoinSet<Finished<I>>,
@@ -339,8 +334,8 @@ impl<I: Item> ReplySink<'_, I> {
         for model in self.dispatcher.models {
             model.model.close();
         }
-        // Those that have only waited end now, and are not counted.
-        while let Ok(Some(done)) = timeout(CLOSING, in_flight.join_next()).await {
+        // Requests that were only waiting end now, and are not counted as in flight.
+        while let Ok(Some(done)) = timeout(CLOSING_TIME, in_flight.join_next()).await {
             self.store_result(done)?;
         }
         if !in_flight.is_empty() {
@@ -388,7 +383,7 @@ impl<I: Item> ReplySink<'_, I> {
         Ok(())
     }
 
-    /// The trials of a group, ready to be asked. If the images could not be made, all of them fail instead.
+    /// Prepares the trials of a group. If the images could not be made, records all trials as failed, and returns none.
     fn accept(&mut self, group: PreparedGroup<I>) -> Result<Vec<PreparedTrial<I>>> {
         let PreparedGroup {
             stimulus,
@@ -405,7 +400,7 @@ impl<I: Item> ReplySink<'_, I> {
         let Some(problem) = problem else {
             return Ok(ready.collect());
         };
-        // Its trials are asked when the command is given again.
+        // The trials are asked when the command is repeated.
         if let Error::EnhancerEnded { .. } = problem {
             self.breaker.ended(problem);
             return Ok(Vec::new());
@@ -420,7 +415,7 @@ impl<I: Item> ReplySink<'_, I> {
         Ok(Vec::new())
     }
 
-    /// Stores the notes about an image, unless an earlier one could not be written: no trial depends on them.
+    /// Stores the notes about an image, unless an earlier note could not be written. Trials do not depend on notes.
     fn store_notes(&mut self, notes: &ImageNotes) {
         if self.are_notes_lost {
             return;
@@ -433,14 +428,14 @@ impl<I: Item> ReplySink<'_, I> {
         }
     }
 
-    /// Compares what the images of a prompt were charged with the estimate. Warns once for each model if they differ.
+    /// Compares the charged tokens of images with the estimate, once for each model, and warns if they differ.
     fn compare_with_estimate(&mut self, ready: &PreparedTrial<I>, reply: &Reply) {
         let model = ready.trial.model;
         let charged = reply.usage.and_then(|usage| usage.prompt_tokens);
         let Some(charged) = charged.filter(|_| !ready.stimulus.images.is_empty()) else {
             return;
         };
-        if self.said_difference[model] == Said::Done {
+        if self.is_estimate_compared[model] {
             return;
         }
         let text = text_tokens(&ready.trial.prompt);
@@ -449,12 +444,12 @@ impl<I: Item> ReplySink<'_, I> {
         if self.measured.image(model).is_none() {
             return;
         }
-        self.said_difference[model] = Said::Done;
+        self.is_estimate_compared[model] = true;
         let images = ready.stimulus.images.iter().map(|image| image.facts());
-        let of_model = (model, &self.dispatcher.models[model]);
-        let expected = self.budget.expected_image_tokens(of_model, images);
-        let difference =
-            expected.and_then(|tokens| self.measured.difference(model, text, (shown, tokens)));
+        let difference = self
+            .budget
+            .expected_image_tokens(model, &self.dispatcher.models[model], images)
+            .and_then(|tokens| self.measured.difference(model, text, shown, tokens));
         if let Some(difference) = difference {
             tracing::warn!(
                 "{}: a prompt is charged {:.0} tokens, where {:.0} were estimated (median of the first 10 with images); --dry-run \
@@ -474,15 +469,15 @@ impl<I: Item> ReplySink<'_, I> {
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
         let trial = &ready.trial;
-        // Trials without an image are not asked.
-        if result
-            .as_ref()
-            .map_or_else(|error| error.attempts, |reply| reply.attempts)
-            > 0
-        {
+        // Zero attempts: the image could not be made, and nothing was sent.
+        let attempts = match &result {
+            Ok(reply) => reply.attempts,
+            Err(error) => error.attempts,
+        };
+        if attempts > 0 {
             self.first_questions[trial.model] = FirstQuestion::Ended;
         }
-        self.limits.say_exceeded(trial.model, &self.budget);
+        self.limits.warn_exceeded(trial.model, &self.budget);
         match &result {
             Ok(_) => {
                 self.breaker.succeeded(trial.model);
@@ -491,7 +486,7 @@ impl<I: Item> ReplySink<'_, I> {
             Err(error) => {
                 let source = trial.item.source();
                 let is_set_aside = self.suspects.failed(trial.model, error, source);
-                // A server that answers nothing is the cause, not the image.
+                // If the server has answered nothing, it is the cause, and not the image.
                 if is_set_aside && self.suspects.has_answered(trial.model) {
                     tracing::warn!(
                         "{source}: trials about it failed twice; the others about it are asked last ({})",
@@ -535,7 +530,8 @@ impl<I: Item> ReplySink<'_, I> {
         Ok(())
     }
 
-    /// Warns once of each model at an endpoint if its replies do not depend on the image. Photographs taken in the dark do not show that.
+    /// Warns once for each model at an endpoint if its replies do not depend on the image. Skipped for photographs taken in the dark, where
+    /// such replies are no evidence.
     fn check_dependence(&mut self, trial: &Trial<I>, record: &Record<I::Detail>) {
         let model = &self.dispatcher.models[trial.model];
         if !model.model.is_remote() || self.dispatcher.settings.set_light == SetLight::Dark {
@@ -550,7 +546,8 @@ impl<I: Item> ReplySink<'_, I> {
     }
 }
 
-/// Sends one trial to its model, unless it is given up before; the trial with its reply or error, and all that either may have cost.
+/// Sends one trial to its model, unless it is given up first. Returns the trial with its reply or error, including the cost of lost
+/// attempts.
 async fn send<I: Item>(
     model: ModelUnderTest,
     ready: PreparedTrial<I>,

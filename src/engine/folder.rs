@@ -18,7 +18,7 @@ pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     let settings = experiment.settings();
     match settings.place.for_shard(settings.shard) {
         RunPlace::Named(path) => Ok(path),
-        // It is made again.
+        // The manifest is restored later, when the folder is opened.
         RunPlace::Resume(path) if store::manifest_damage(&path)?.is_some() => Ok(path),
         RunPlace::Resume(path) => match store::read_manifest(&path, DetailOf::<E>::SCHEMA)? {
             Some(_) => Ok(path),
@@ -34,7 +34,7 @@ pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     }
 }
 
-/// Makes the folder of a run, and of a part also the folder of all parts.
+/// Creates the folder of a run; for a shard, also the folder of the whole run.
 ///
 /// # Errors
 /// If it cannot be created.
@@ -45,37 +45,41 @@ pub(crate) fn make(folder: &Path, settings: &JobSettings) -> Result<()> {
     settings.access.create(folder)
 }
 
+/// The newest folder under [`RESULTS`] with the identity and plan of an experiment, else the path of a new one.
 fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
     let settings = experiment.settings();
-    let notes: Vec<_> = experiment.notes();
     let facts = json!({
         "identity": experiment.identity(),
         "columns": experiment.columns(),
         "shard": settings.shard.to_string(),
         "trials": Plan::new(experiment.plan(0, || Ok(Vec::new()))?).keys,
-        "notes": notes,
+        "notes": experiment.notes(),
     });
     let hash = &Digest::canonical("darkqa.command/2", &facts)?.to_string()[..8];
     let base = Path::new(RESULTS);
     Ok(store::find(base, hash).unwrap_or_else(|| {
         let time = Timestamp::now().strftime("%Y%m%d-%H%M%S");
-        let (models, data) = (label(&settings.ask), experiment.data());
+        let (models, data) = (models_label(&settings.ask), experiment.data());
         let name = format!("{time}-{models}-{data}-{hash}");
         base.join(name.replace(|c: char| !(c.is_alphanumeric() || "-_.".contains(c)), "_"))
     }))
 }
 
-/// Names of the first two models, for the name of a folder.
-fn label(ask: &AskSettings) -> String {
-    let names = ask.models.iter().map(|model| match &model.id {
-        ModelName::Remote(_) => model.name.clone(),
-        built_in => built_in.label(),
-    });
-    let names: Vec<String> = names.take(2).collect();
+/// The models' part of a folder name: the names of the first two models, cut at 60 characters.
+fn models_label(ask: &AskSettings) -> String {
+    let names: Vec<String> = ask
+        .models
+        .iter()
+        .take(2)
+        .map(|model| match &model.id {
+            ModelName::Remote(_) => model.name.clone(),
+            built_in => built_in.label(),
+        })
+        .collect();
     names.join("-").chars().take(60).collect()
 }
 
-/// Whether the endpoint may have another address than before: only with `--resume`.
+/// Allows another address of the endpoint than in the manifest only with `--resume`.
 pub(crate) fn address_change(place: &RunPlace) -> AddressChange {
     match place {
         RunPlace::Resume(_) => AddressChange::Allowed,

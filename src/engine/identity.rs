@@ -1,4 +1,5 @@
-//! The settings that define a run: those that all trials share ([`images`]), and those behind each value of a column ([`columns`]).
+//! The settings that define a run: those that all trials share ([`images`]), and the definitions of the values in its columns
+//! ([`columns`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,11 +16,11 @@ use crate::types::{Degradation, Digest, PairDark, ReadingName};
 use darkqa_enhance::{self, SizeArgs, Tiling};
 use darkqa_light::{KindSettings, Synthesis, version};
 
-/// The kinds of the paper, whose versions stand in the identity. Those of the others stand in the column of variants, where they
-/// are asked, so that a run may get them later.
-const PAPER: [Kind; 2] = [Kind::Exposure, Kind::Sensor];
+/// The kinds of degradation in the paper. Their versions are part of the identity of every run. The versions of other kinds are in the
+/// column `variant` of runs that use them, so that they can be added to an existing run.
+const PAPER_KINDS: [Kind; 2] = [Kind::Exposure, Kind::Sensor];
 
-/// Settings of this recipe that all trials share.
+/// Settings of a recipe that all trials share.
 pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
     let scaling = match recipe.scaling {
         Scaling::Never => None,
@@ -29,7 +30,7 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
     let fields = [
         ("--image", json!(recipe.format.to_string())),
         ("--seed", json!(recipe.seed)),
-        ("synthesis", json!(PAPER.map(version))),
+        ("synthesis", json!(PAPER_KINDS.map(version))),
         ("enhancement", json!(darkqa_enhance::VERSION)),
     ];
     fields
@@ -38,7 +39,7 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
         .map(|(field, value)| (field.to_owned(), value))
 }
 
-/// Definitions of the models, enhancers, noise profiles and further variants of a run.
+/// Definitions of the models, enhancers, noise profiles and other kinds of degradation of a run.
 pub(crate) fn columns<'a>(
     models: impl IntoIterator<Item = &'a ModelUnderTest>,
     recipe: &Recipe,
@@ -46,9 +47,9 @@ pub(crate) fn columns<'a>(
 ) -> Columns {
     let models = models
         .into_iter()
-        .map(|entry| (entry.name.to_string(), model(entry)));
+        .map(|model| (model.name.to_string(), model_definition(model)));
     let enhancers = recipe.enhancers.iter().map(|(name, digest)| {
-        let content = enhancer(digest, &settings.loading.size);
+        let content = enhancer_definition(digest, &settings.loading.size);
         (name.as_str().to_owned(), content)
     });
     let elsewhere = recipe.elsewhere.iter().map(|images| {
@@ -69,20 +70,22 @@ pub(crate) fn columns<'a>(
         .map(Degradation::kind)
         .chain(settings.light.matches.iter().filter_map(PairDark::kind))
         .collect();
-    let kinds = kinds.into_iter().filter(|kind| !PAPER.contains(kind));
-    let kinds = kinds.map(|kind| (kind.word().to_owned(), variant(kind, &recipe.kinds)));
+    let variants = kinds
+        .into_iter()
+        .filter(|kind| !PAPER_KINDS.contains(kind))
+        .map(|kind| (kind.word().to_owned(), kind_definition(kind, &recipe.kinds)));
     let noise = recipe
         .kinds
         .sensor
         .readings
         .iter()
         .filter(|(name, _)| readings.contains(name))
-        .map(|(name, content)| (name.to_string(), reading(content)));
+        .map(|(name, content)| (name.to_string(), noise_definition(content)));
     let columns: [(&str, BTreeMap<String, Value>); 4] = [
         ("model", models.collect()),
         ("enhancer", enhancers.collect()),
         ("reading", noise.collect()),
-        ("variant", kinds.collect()),
+        ("variant", variants.collect()),
     ];
     columns
         .into_iter()
@@ -91,8 +94,8 @@ pub(crate) fn columns<'a>(
         .collect()
 }
 
-/// Settings that decide the replies of a model besides question and images, by flag; with the address of its endpoint.
-pub(crate) fn model(model: &ModelUnderTest) -> Value {
+/// Settings by flag that affect the replies of a model, other than question and images, and the address of its endpoint.
+pub(crate) fn model_definition(model: &ModelUnderTest) -> Value {
     let mut content = model.model.content();
     if let (Some(address), Some(fields)) = (model.address(), content.as_object_mut()) {
         *fields = by_flag(std::mem::take(fields));
@@ -101,16 +104,16 @@ pub(crate) fn model(model: &ModelUnderTest) -> Value {
     content
 }
 
-/// Settings that decide the pixels of an enhancer. Automatic tiles are not among them: at most one sample in a thousand differs from
-/// those of the whole image.
-pub(crate) fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
+/// Settings by flag that affect the pixels of an enhancer. Automatic tiling is left out: it changes at most one sample in a thousand,
+/// compared with enhancement of the whole image.
+pub(crate) fn enhancer_definition(digest: &Digest, size: &SizeArgs) -> Value {
     let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
     let mut content = json!({
         "--llie": digest,
         "--tile": tile,
         "--llie-max-side": size.llie_max_side,
     });
-    // Left out if unset, so that runs from before the flag go on.
+    // Left out if unset, so that runs of versions without the flag can be continued.
     if size.llie_resize {
         content["--llie-resize"] = json!(true);
     }
@@ -118,7 +121,7 @@ pub(crate) fn enhancer(digest: &Digest, size: &SizeArgs) -> Value {
 }
 
 /// Settings of a noise profile, by flag.
-fn reading(synthesis: &Synthesis) -> Value {
+fn noise_definition(synthesis: &Synthesis) -> Value {
     json!({
         "--amplify": synthesis.amplify,
         "--tone": synthesis.tone,
@@ -128,8 +131,8 @@ fn reading(synthesis: &Synthesis) -> Value {
     })
 }
 
-/// Settings of a kind that the paper does not have, by flag.
-fn variant(kind: Kind, kinds: &KindSettings) -> Value {
+/// Settings of a kind of degradation outside the paper, by flag.
+fn kind_definition(kind: Kind, kinds: &KindSettings) -> Value {
     let mut content = json!({"synthesis": version(kind), "--motion": kinds.motion.to_string()});
     if kind == Kind::Auto {
         content["--auto"] = json!(kinds.auto.to_string());
@@ -138,7 +141,7 @@ fn variant(kind: Kind, kinds: &KindSettings) -> Value {
     content
 }
 
-/// Settings that do not decide a reply, but may explain how a run went.
+/// Settings that do not affect replies, but may explain the course of a run.
 pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
     let mut settings = vec![
         ("--concurrency", json!(job.concurrency.to_string())),

@@ -3,15 +3,15 @@
 
 use crate::error::{Error, Result};
 
-/// A listener for interrupts. While it exists, they do not end the process. It keeps those that come while nobody waits: an interrupt
-/// is never lost between two calls of [`Self::next`].
+/// A listener for interrupts. While it exists, interrupts do not end the process. An interrupt between two calls of [`Self::next`] is
+/// kept for the second.
 #[derive(Debug)]
 pub(crate) struct Interrupt {
     #[cfg(unix)]
     ctrl_c: tokio::signal::unix::Signal,
     #[cfg(unix)]
     terminate: tokio::signal::unix::Signal,
-    /// `None` if it is ignored, as under `nohup`.
+    /// `None` if the process ignores SIGHUP, as under `nohup`.
     #[cfg(unix)]
     hang_up: Option<tokio::signal::unix::Signal>,
     #[cfg(windows)]
@@ -19,6 +19,10 @@ pub(crate) struct Interrupt {
 }
 
 impl Interrupt {
+    /// Starts to listen.
+    ///
+    /// # Errors
+    /// If the system does not allow it.
     pub(crate) fn listen() -> Result<Self> {
         #[cfg(unix)]
         {
@@ -54,17 +58,19 @@ impl Interrupt {
     }
 }
 
-/// Whether the process was started with SIGHUP ignored, as `nohup` does; a listener would undo that.
+/// True if the process was started with SIGHUP ignored, as by `nohup`; a listener would undo that.
 ///
-/// Linux tells the ignored signals in /proc. Elsewhere a terminal as standard error states that there was no `nohup`.
+/// Linux lists the ignored signals in /proc. Other systems are assumed to have no `nohup` if standard error is a terminal.
 #[cfg(unix)]
 fn is_hang_up_ignored() -> bool {
     /// The bit of SIGHUP, signal 1.
     const HANG_UP: u64 = 1;
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    mask.map_or_else(
+    let ignored = status
+        .lines()
+        .find_map(|line| line.strip_prefix("SigIgn:"))
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    ignored.map_or_else(
         || !std::io::IsTerminal::is_terminal(&std::io::stderr()),
         |mask| mask & HANG_UP != 0,
     )

@@ -1,4 +1,4 @@
-//! The engine that carries out an experiment: [`Job`].
+//! An experiment in its run folder: [`Job`].
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ use crate::types::manifests::{RunManifest, Status};
 use crate::types::{StoredDetail as _, TrialKey};
 use darkqa_enhance::ModelFile;
 
-/// An experiment that is carried out in a run folder.
+/// An experiment and its run folder.
 pub(crate) struct Job<'a, E: Experiment> {
     experiment: &'a E,
     /// Files of the enhancement models, not yet loaded.
@@ -63,19 +63,20 @@ impl<'a, E: Experiment> Job<'a, E> {
         }
     }
 
-    /// Writes the remaining requests as files of a Batch API, and records in the run that these trials are sent.
+    /// Writes the remaining requests as files of a Batch API, and marks their trials in the run as sent.
     ///
     /// # Errors
-    /// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
+    /// If a model is built in, an image is larger than the endpoint accepts, or a file cannot be written.
     pub(crate) fn export_batch(self, files: &BatchFileArgs) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
         batch::export::export(self.open()?, files)
     }
 
-    /// Asks the remaining requests in batches that are submitted here, and waits for their replies.
+    /// Submits the remaining requests in batches, and waits for their replies.
     ///
     /// # Errors
-    /// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+    /// If a model is built in, or a server refuses a request that every further call would repeat. Submitted batches are kept, and the
+    /// same command continues.
     pub(crate) fn run_batch(self, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
         if self.experiment.settings().money.dry_run {
@@ -84,7 +85,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         batch::run::run(self.open()?, files, args)
     }
 
-    /// An estimate of the remaining requests and their cost, printed. Sends nothing and writes no file.
+    /// Estimates the remaining requests and their cost, as the text to print. Sends nothing and writes no file.
     fn estimate(self) -> Result<Outcome> {
         let show = self.experiment.settings().show;
         let forecast = self.forecast()?;
@@ -98,7 +99,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         ))
     }
 
-    /// An estimate of the remaining requests and their cost. Sends nothing and writes no file.
+    /// Estimates the remaining requests and their cost. Sends nothing and writes no file.
     ///
     /// # Errors
     /// If the run has other settings, an enhancer cannot be opened, or an image cannot be made.
@@ -135,10 +136,10 @@ impl<'a, E: Experiment> Job<'a, E> {
         estimate::estimate(experiment, &plans, &measured, &stored, &mut pipeline)
     }
 
-    /// Checks that the run in the folder, if there is one, could be gone on with.
+    /// Checks that this command can continue the run in the folder, if there is one.
     ///
     /// # Errors
-    /// If it has other settings.
+    /// If the run has other settings.
     fn check_same_run(&self) -> Result<()> {
         if store::manifest_damage(&self.folder)?.is_some() {
             return Ok(());
@@ -171,12 +172,15 @@ impl<'a, E: Experiment> Job<'a, E> {
         let images = settings.images.open(settings.access)?;
         let mut enhancers = OpenEnhancers::deferred(files, &settings.loading);
         if !complete {
-            // Loaded before the folder is created, so that a broken enhancer leaves no folder; one that was loaded before is not broken.
+            // Loaded before the folder is created, so that a broken enhancer leaves no folder. Enhancers with stored findings were loaded
+            // by an earlier run, and are not loaded here.
             enhancers.open_runtime()?;
             let maker = Maker::new(enhancers.version(), &settings.loading.size);
-            let known = images.as_ref();
-            let known = known.map(|store| StoredFindings::new(store, &maker).know_all(&enhancers));
-            if !known.unwrap_or(Ok(false))? {
+            let are_all_known = match &images {
+                Some(store) => StoredFindings::new(store, &maker).know_all(&enhancers)?,
+                None => false,
+            };
+            if !are_all_known {
                 enhancers.open()?;
             }
         }
@@ -223,11 +227,11 @@ fn planned_keys<E: Experiment>(experiment: &E, folder: &Path) -> Result<HashSet<
     Ok(keys)
 }
 
-/// Writes the manifest of this command into a run folder that has lost its own. The key of a trial is a digest of all that decides its
-/// reply: if the command has the keys of all replies, it is the one that made them.
+/// Writes the manifest of this command into a run folder whose manifest is damaged. The command is taken for the one that made the run if
+/// it plans the trials of all stored replies, because the key of a trial is a digest of everything that affects its reply.
 ///
 /// # Errors
-/// If a reply is not one to a trial of this command.
+/// If a stored reply belongs to a trial that this command does not plan.
 fn restore_manifest<E: Experiment>(
     experiment: &E,
     folder: &Path,

@@ -1,4 +1,4 @@
-//! All that decides a reply, whose digest is the key of its trial: [`KeyFacts`].
+//! The inputs that affect a reply, whose digest is the key of its trial: [`KeyFacts`].
 
 use serde::Serialize;
 
@@ -8,8 +8,8 @@ use crate::error::Result;
 use crate::images::trials::Prompt;
 use crate::types::{Condition, Digest, QuestionId, TrialKey};
 
-/// All that decides a reply, as it enters the key of a trial. Question and condition are included, because built-in models answer by
-/// their names. The fields are sorted, as [`Digest::sorted`] expects.
+/// The inputs that affect a reply, from which the key of a trial is computed. Question and condition are included, because built-in
+/// models answer by their names. The fields are sorted by name, as [`Digest::sorted`] requires.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct KeyFacts<'a> {
     before: &'a str,
@@ -21,13 +21,13 @@ pub(crate) struct KeyFacts<'a> {
     /// Condition of the images; `None` if only text is sent.
     #[serde(skip_serializing_if = "Option::is_none")]
     condition: Option<&'a Condition>,
-    /// Digest of all that decides the images; `None` if only text is sent.
+    /// Digest of the settings and inputs that determine the images; `None` if only text is sent.
     #[serde(skip_serializing_if = "Option::is_none")]
     image: Option<Digest>,
     model: &'a str,
-    /// Digest of the settings that decide the model's replies.
+    /// Digest of the settings that affect the model's replies.
     parameters: &'a str,
-    /// Where the images stand; `None` if they stand together.
+    /// Positions of the images in the prompt; `None` if they are together.
     #[serde(skip_serializing_if = "Option::is_none")]
     places: Option<ImagePlaces>,
     question: &'a QuestionId,
@@ -37,7 +37,7 @@ pub(crate) struct KeyFacts<'a> {
 }
 
 impl<'a> KeyFacts<'a> {
-    /// The facts of an open question that is asked for the first time.
+    /// Facts of an open question that is asked for the first time.
     pub(crate) fn new(
         model: &'a ModelUnderTest,
         question: &'a QuestionId,
@@ -59,7 +59,7 @@ impl<'a> KeyFacts<'a> {
         }
     }
 
-    /// The facts of a question with these choices in the order shown, asked `repeat` times before.
+    /// Sets the choices in the order shown, and the number of earlier trials with the same question.
     pub(crate) fn with_choices(self, choices: &'a [String], repeat: u32) -> Self {
         Self {
             choices: Some(choices),
@@ -68,7 +68,7 @@ impl<'a> KeyFacts<'a> {
         }
     }
 
-    /// The digest of all these facts, which is the key of the trial.
+    /// Computes the key of the trial, a digest of all facts.
     pub(crate) fn key(&self) -> Result<TrialKey> {
         Digest::sorted("darkqa.trial/2", self).map(Into::into)
     }

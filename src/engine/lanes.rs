@@ -134,11 +134,11 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// Takes the next trial from a lane that has room and is not held by the budget. Trials for which `is_dropped` is true are dropped;
-    /// those for which `is_aside` is true are set aside until [`Self::requeue_deferred`].
+    /// those for which `is_deferred` is true are set aside until [`Self::requeue_deferred`].
     pub(crate) fn next(
         &mut self,
         is_dropped: impl Fn(&Trial<I>) -> bool,
-        is_aside: impl Fn(&Trial<I>) -> bool,
+        is_deferred: impl Fn(&Trial<I>) -> bool,
     ) -> Option<PreparedTrial<I>> {
         for index in 0..self.by_endpoint.len() {
             let lane = &self.by_endpoint[index];
@@ -150,7 +150,7 @@ impl<'a, I> Lanes<'a, I> {
                 if is_dropped(&ready.trial) {
                     continue;
                 }
-                if is_aside(&ready.trial) {
+                if is_deferred(&ready.trial) {
                     lane.deferred.push_back(ready);
                     continue;
                 }
@@ -162,7 +162,7 @@ impl<'a, I> Lanes<'a, I> {
     }
 
     /// True if any trial is set aside.
-    pub(crate) fn has_aside(&self) -> bool {
+    pub(crate) fn has_deferred(&self) -> bool {
         self.by_endpoint
             .iter()
             .any(|lane| !lane.deferred.is_empty())

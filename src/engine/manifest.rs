@@ -10,13 +10,14 @@ use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::images::frames::input_summary;
 use crate::images::recipes::image_words::ImageWords;
-use crate::runs::renamed::{self, OtherSettings};
+use crate::runs::renamed::{self, SettingsChange};
 use crate::store::now;
 use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
 use crate::types::{InputSummary, ListedModel, StoredDetail as _};
 use darkqa_score::answers::record::Detail as _;
 
-/// The manifest of a run. A stored one passes on its date, columns and image flags; one of a complete run all but its identity.
+/// The manifest of a run that starts, or that continues the run of the `stored` manifest. It keeps the date, columns and image flags of
+/// the stored one; after a complete run, it keeps everything but the identity.
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
@@ -47,7 +48,7 @@ pub(crate) fn run_manifest<E: Experiment>(
         platform: identity::platform(),
         identity: experiment.identity(),
         columns,
-        models: listed(job, stored.as_ref()),
+        models: listed_models(job, stored.as_ref()),
         enhancers: BTreeMap::new(),
         inputs: inputs(experiment),
         shard: job.shard.is_part().then(|| job.shard.to_string()),
@@ -64,18 +65,18 @@ pub(crate) fn run_manifest<E: Experiment>(
         return Ok(manifest);
     };
     let other_settings = match job.ask.file {
-        Some(_) => OtherSettings::Allowed,
-        None => OtherSettings::Refused,
+        Some(_) => SettingsChange::Allowed,
+        None => SettingsChange::Refused,
     };
     let before = stored.clone();
-    let now = experiment.columns().remove("model").unwrap_or_default();
+    let models = experiment.columns().remove("model").unwrap_or_default();
     let views = job.ask.views();
-    let now = renamed::Now {
-        models: &now,
+    let current_models = renamed::CurrentModels {
+        models: &models,
         views: &views,
         settings: other_settings,
     };
-    renamed::note(&mut manifest, &before, now)?;
+    renamed::note_renamed_models(&mut manifest, &before, current_models)?;
     let images = merged_flags(&stored.images, manifest.images);
     if stored.status != Status::Complete {
         return Ok(RunManifest {
@@ -83,14 +84,14 @@ pub(crate) fn run_manifest<E: Experiment>(
             enhancers: stored.enhancers,
             inputs: manifest.inputs.or(stored.inputs),
             images,
-            // Stored records keep their readings until they are read again.
+            // Stored replies keep their parsed answers until they are parsed again.
             reply_reading: stored.reply_reading,
             ..manifest
         });
     }
     stored.settings.extend(notes);
     stored.models.clone_from(&manifest.models);
-    renamed::note(&mut stored, &before, now)?;
+    renamed::note_renamed_models(&mut stored, &before, current_models)?;
     Ok(RunManifest {
         identity: manifest.identity,
         columns: manifest.columns,
@@ -103,21 +104,21 @@ pub(crate) fn run_manifest<E: Experiment>(
     })
 }
 
-/// The models of the file of models; without one those of the command before.
-fn listed(job: &JobSettings, stored: Option<&RunManifest>) -> Vec<ListedModel> {
+/// Models listed in the models file; without a file, those in the stored manifest.
+fn listed_models(job: &JobSettings, stored: Option<&RunManifest>) -> Vec<ListedModel> {
     match &job.ask.file {
         Some(file) => file.listed.clone(),
         None => stored.map_or_else(Vec::new, |stored| stored.models.clone()),
     }
 }
 
-/// Changes made to the frames when they were read; `None` without changes.
+/// Summary of the changes made to the frames when they were read; `None` without changes.
 fn inputs<E: Experiment>(experiment: &E) -> Option<InputSummary> {
     let summary = input_summary(experiment.sources());
     (!summary.is_plain()).then_some(summary)
 }
 
-/// Records that a run continues, with the settings of this command and this version.
+/// Marks a run as started, with the settings of this command and this version.
 pub(crate) fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunManifest) {
     manifest.status = Status::Started;
     manifest.updated = now();
@@ -126,10 +127,11 @@ pub(crate) fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunMani
     manifest.settings.extend(settings);
 }
 
-/// The image flags of this call, with the stored ones. A list has the stored values first.
-fn merged_flags(stored: &ImageWords, now: ImageWords) -> ImageWords {
+/// Image flags of the stored manifest and of this call. Lists are joined, with the stored values first; other values are those of this
+/// call.
+fn merged_flags(stored: &ImageWords, current: ImageWords) -> ImageWords {
     let mut all = stored.clone();
-    for (flag, value) in now {
+    for (flag, value) in current {
         let value = match (all.remove(&flag), value) {
             (Some(Value::Array(mut known)), Value::Array(more)) => {
                 let more: Vec<Value> = more

@@ -27,4 +27,4 @@ pub(crate) mod suspects;
 pub(crate) mod truncation;
 
 pub(crate) use job::Job;
-pub(crate) use open_run::{limit, pipeline};
+pub(crate) use open_run::{image_limit, pipeline};

@@ -1,6 +1,6 @@
 //! The models of a run: their flags ([`ModelArgs`]), their settings ([`AskSettings`]) and the opened models (`ModelUnderTest`).
 //!
-//! Flags and a file of models make one list of settings; a model that a flag names is an entry like those of the file.
+//! Models that flags name and models of a models file are merged into one list of settings.
 
 mod args;
 mod asking;
@@ -33,28 +33,28 @@ pub(crate) use name::ModelName;
 pub(crate) use run_defaults::{RunDefault, run_defaults};
 pub(crate) use settings::{AskSettings, KeyUse, ResolveContext, TextBaseline};
 
-/// Name of the endpoint of built-in models in messages.
+/// Name in messages for the endpoint of built-in models.
 const BUILT_IN: &str = "built-in models";
 
-/// One model and whether it sees the images.
+/// An opened model, with its view: with or without images.
 #[derive(Debug, Clone)]
 pub(crate) struct ModelUnderTest {
     pub(crate) model: Arc<Model>,
     /// The name in records and tables.
     pub(crate) name: Arc<str>,
-    /// Digest of the settings that decide the model's replies ([`Model::digest`]). Computed once, because it enters every trial key.
+    /// Digest of the settings that affect the model's replies ([`Model::digest`]). Cached, because every trial key contains it.
     pub(crate) digest: Arc<str>,
     pub(crate) view: View,
-    /// Its endpoint; `None` if it is built in.
+    /// The endpoint; `None` for a built-in model.
     pub(crate) server: Option<Arc<Server>>,
-    /// The price, if it is not that of the table of prices.
+    /// The model's own price; `None` for the price in the table.
     pub(crate) price: Option<Price>,
-    /// The number of questions that it is asked; `None` for all.
+    /// Number of questions that the model is asked; `None` for all.
     pub(crate) limit: Option<usize>,
 }
 
 impl ModelUnderTest {
-    /// A model under its own name, at this endpoint if it is remote.
+    /// A model under its own name. `server` is its endpoint if it is remote, and ignored for built-in models.
     pub(crate) fn new(model: Model, view: View, server: Option<&Arc<Server>>) -> Result<Self> {
         let server = server.filter(|_| model.is_remote());
         Ok(Self {
@@ -68,22 +68,23 @@ impl ModelUnderTest {
         })
     }
 
-    /// Address of its endpoint; `None` if it is built in.
+    /// Addresses of the endpoint, separated by spaces; `None` for a built-in model.
     pub(crate) fn address(&self) -> Option<String> {
         let server = self.server.as_ref();
         server.map(|server| server.addresses().join(" "))
     }
 
-    /// Name of its endpoint for messages: the address, or that it is built in.
+    /// Name of the endpoint in messages: its addresses, or [`BUILT_IN`].
     pub(crate) fn endpoint_name(&self) -> String {
         self.address().unwrap_or_else(|| BUILT_IN.to_owned())
     }
 
-    /// The price of its tokens; `None` if it is built in or the price is unknown.
+    /// Price of the model's tokens; `None` if it is built in or the price is unknown.
     pub(crate) fn price(&self, prices: &Prices) -> Option<Price> {
-        let remote = self.model.is_remote();
-        let of_table = || prices.find(self.model.name());
-        remote.then(|| self.price.or_else(of_table)).flatten()
+        if !self.model.is_remote() {
+            return None;
+        }
+        self.price.or_else(|| prices.find(self.model.name()))
     }
 
     /// The record of a trial, without an outcome.
@@ -98,17 +99,17 @@ impl ModelUnderTest {
         }
     }
 
-    /// Whether it is asked the question at this place among the selected ones.
+    /// True if the model is asked the question with this index among the selected ones.
     pub(crate) fn is_asked(&self, place: usize) -> bool {
         self.limit.is_none_or(|limit| place < limit)
     }
 }
 
-/// The opened models, those that see images and those that do not. Nothing is sent. `added` are asked too, with images, although no
-/// flag names them. `built_in` makes the built-in models that only one experiment has.
+/// Opens all models, with and without images. Sends nothing. `added` names further models, which are asked with images. `built_in` makes
+/// the built-in models that only one type of experiment has.
 ///
 /// # Errors
-/// If a model cannot be opened, or two differ in nothing that decides a reply.
+/// If a model cannot be opened, or two models differ in no setting that affects replies.
 pub(crate) fn open_all(
     ask: &AskSettings,
     added: &[ModelName],
@@ -132,7 +133,7 @@ pub(crate) fn open_all(
             ..opened
         });
     }
-    // Behind the last model that sees images.
+    // Added models follow the last model that sees images.
     let last = models.iter().rposition(|model| model.view == View::Image);
     let place = last.map_or(models.len(), |last| last + 1);
     for (i, name) in added.iter().enumerate() {
@@ -167,11 +168,12 @@ fn refuse_same_trials(models: &[ModelUnderTest]) -> Result<()> {
     Ok(())
 }
 
-/// The opened endpoints, each once: all its models share its connections and its pauses.
+/// The opened endpoints. Each is opened once, so that its models share its connections and its pauses.
 #[derive(Default)]
 struct Endpoints(Vec<(Arc<Server>, Arc<Endpoint>)>);
 
 impl Endpoints {
+    /// The endpoint of a server, opened on the first call; `None` for a built-in model.
     fn get(&mut self, server: Option<&Arc<Server>>) -> Result<Option<Arc<Endpoint>>> {
         let Some(server) = server else {
             return Ok(None);
@@ -186,7 +188,7 @@ impl Endpoints {
     }
 }
 
-/// The models that are asked in a condition, or without images if it is `None`; each with its index among all.
+/// The models that are asked in a condition, each with its index in `models`. Without a condition, those that are asked without images.
 pub(crate) fn asked_in<'a>(
     models: &'a [ModelUnderTest],
     condition: Option<&Condition>,
@@ -199,12 +201,15 @@ pub(crate) fn asked_in<'a>(
         .collect()
 }
 
-/// The opened endpoint.
+/// Opens an endpoint.
 pub(crate) fn endpoint(server: &Server) -> Result<Arc<Endpoint>> {
     Endpoint::from_addresses(server.replicas.clone(), server.sending).map(Arc::new)
 }
 
-/// A model that can answer open questions, opened.
+/// Opens a model that can answer open questions.
+///
+/// # Errors
+/// If the model answers multiple-choice questions only, or cannot be opened.
 pub(crate) fn open(
     name: &ModelName,
     endpoint: Option<&Arc<Endpoint>>,
@@ -229,8 +234,8 @@ pub(crate) fn open(
     }
 }
 
-/// Changes to requests that the endpoint made necessary, by name; for the manifest. Those of a model that is asked with images and
-/// without stand together.
+/// Changes to requests that the endpoint required, by model, as settings for the manifest. The changes of a model that is asked both with
+/// and without images are merged.
 pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
     let mut by_name: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for model in models {

@@ -33,10 +33,10 @@ pub(crate) fn name(control: Option<Control>) -> String {
 }
 
 impl Observer {
-    /// Opens the observer of a data set. It answers by the rules that make its questions.
+    /// Opens the observer of a data set. It answers by the rules from which the questions were made.
     ///
     /// # Errors
-    /// If the frames have no maps, or a question is not one of the rulebook's.
+    /// If the frames have no maps, or a question does not follow from the rules.
     pub(crate) fn open(
         dataset: &Arc<Dataset>,
         place: &DataPlace,
@@ -76,7 +76,7 @@ impl Observer {
         Ok(Arc::new(observer))
     }
 
-    /// The observer as a model, or one of its controls. Guesses, and what a control draws at random, follow from the seed.
+    /// The observer as a model, or one of its controls. The seed of `prior` determines the guesses and the random choices of a control.
     pub(crate) fn model(self: &Arc<Self>, control: Option<Control>, prior: Random) -> Local {
         let (observer, seed) = (Arc::clone(self), prior.seed);
         let rules = self.rules.digest();
@@ -128,7 +128,7 @@ impl Observer {
     }
 }
 
-/// The part of an observation that is kept in the record of an answer.
+/// The part of an observation that the record of an answer stores.
 fn observed(observation: &Observation, choice: Option<usize>) -> Observed {
     let outlines = observation.outlines();
     Observed {

@@ -78,7 +78,7 @@ pub(crate) fn raise_limit() -> Option<usize> {
     None
 }
 
-/// Number of files that are open now. [`RESERVED_FILES`] stands in for it on systems that do not list open files.
+/// Number of files that are open now; [`RESERVED_FILES`] on systems that do not list them.
 fn open_files() -> usize {
     std::fs::read_dir("/dev/fd").map_or(RESERVED_FILES, Iterator::count)
 }

@@ -8,7 +8,7 @@ use std::time::Instant;
 use crate::ask::ImageLimit;
 use crate::engine::batch::journal::Journal;
 use crate::engine::circuit_breaker::EndReason;
-use crate::engine::costs::{Answering, Budget, InFlightCost};
+use crate::engine::costs::{Budget, InFlightCost, RunModels};
 use crate::engine::dark_already;
 use crate::engine::dispatch::{Dispatcher, TrialCounts};
 use crate::engine::experiment::{DetailOf, Experiment};
@@ -31,11 +31,11 @@ use crate::images::trials::Plan;
 use crate::images::workers::Workers;
 use crate::report::forecast::money;
 use crate::runs::first_source::first_source;
-use crate::runs::other_parts::OtherParts;
+use crate::runs::other_shards::OtherShards;
 use crate::runs::outcome::Outcome;
 use crate::runs::over_budget::OverBudget;
-use crate::runs::part_cost::PartCost;
 use crate::runs::record_table;
+use crate::runs::shard_budget::ShardBudget;
 use crate::runs::stored::StoredRun;
 use crate::store::now;
 use crate::store::{self, Store, StoredTrial};
@@ -48,17 +48,17 @@ use darkqa_score::answers::MIN_REPLIES;
 /// Share of `--max-cost` below which a cost that no server stated is not mentioned; chosen.
 const SMALL_SHARE: f64 = 0.01;
 
-/// Number of trials about untouched images that each model is asked first, if the run has as many; chosen, so that a server that drops
-/// every second image is noticed by then.
+/// Number of trials about undegraded images that each model is asked first, if the run has that many; chosen so that a server that drops
+/// every second image is noticed within them.
 const UNTOUCHED_FIRST: usize = 128;
 
-/// A run folder that no other process writes to, with all that asking needs.
+/// A run folder that is locked for this process, and the state needed to ask its trials.
 pub(crate) struct OpenRun<'a, E: Experiment> {
     pub(crate) experiment: &'a E,
     pub(crate) progress: &'a Progress,
     pub(crate) enhancers: OpenEnhancers<'a>,
     pub(crate) store: Store<DetailOf<E>>,
-    /// Whether notes about images were lost before this command.
+    /// True if notes about images were lost before this command.
     pub(crate) lacks_notes: bool,
     pub(crate) manifest: RunManifest,
     /// Keys of all trials planned so far, in all phases.
@@ -71,7 +71,7 @@ pub(crate) struct OpenRun<'a, E: Experiment> {
 pub(crate) struct Remaining<E: Experiment> {
     pub(crate) plan: Plan<E::Item>,
     pub(crate) stored: Vec<StoredTrial>,
-    /// Number of trials that wait for a batch, and are not in `plan`.
+    /// Number of trials that wait for a batch and are therefore not in `plan`.
     pub(crate) in_batch: usize,
 }
 
@@ -88,7 +88,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             }
             match self.ask_phase(phase, remaining)? {
                 EndReason::AllAsked => {}
-                // The next phases go on with the answers of the other models.
+                // The next phases continue with the answers of the other models.
                 EndReason::ModelsStopped(errors) => stopped.extend(errors),
                 early => {
                     end = early;
@@ -114,19 +114,19 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.finish(end)
     }
 
-    /// Notes in the manifest what the run cost beyond its limit, and what a shard has left of its share.
+    /// Records in the manifest by how much the run exceeded `--max-cost`, and how much a shard has left of its share.
     pub(crate) fn note_cost(&mut self) -> Result<()> {
         let settings = self.experiment.settings();
         let Some(limit) = settings.money.max_cost else {
             return Ok(());
         };
         let models = every_model(self.experiment);
-        let answering = Answering {
+        let run_models = RunModels {
             models: &models,
             manifest: Some(&self.manifest),
         };
         let trials = self.store.trials()?;
-        let budget = Budget::for_run(&settings.money, &[], answering, &trials)?;
+        let budget = Budget::for_run(&settings.money, &[], run_models, &trials)?;
         let spent = budget.charged();
         let over = (budget.spending().overrun() > 0.0).then(|| OverBudget {
             limit,
@@ -134,12 +134,12 @@ impl<E: Experiment> OpenRun<'_, E> {
             longer_replies: longer_replies(&models, &trials),
         });
         OverBudget::note(over.as_ref(), &mut self.manifest);
-        self.say_unstated(&budget)?;
+        self.warn_unstated(&budget)?;
         if let Some(over) = over {
             tracing::warn!("{}", over.sentence());
         }
         if settings.shard.is_part() {
-            let cost = PartCost::new(limit, spent);
+            let cost = ShardBudget::new(limit, spent);
             cost.note(&mut self.manifest);
             let shard = settings.shard;
             self.progress
@@ -148,19 +148,19 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(())
     }
 
-    /// Prints how much of the cost is not stated by a server, if that is more than a small part of it.
-    fn say_unstated(&self, budget: &Budget) -> Result<()> {
+    /// Warns of costs that no server has stated, if they are more than [`SMALL_SHARE`] of `--max-cost`.
+    fn warn_unstated(&self, budget: &Budget) -> Result<()> {
         let killed = InFlightCost::open(self.store.folder())?.killed();
-        let least = SMALL_SHARE * budget.spending().limit().unwrap_or(0.0);
+        let threshold = SMALL_SHARE * budget.spending().limit().unwrap_or(0.0);
         let (requests, dollars) = budget.unstated();
-        if dollars > least {
+        if dollars > threshold {
             tracing::warn!(
                 "--max-cost: {} without stated tokens may have cost up to {}, and count so",
                 counted(requests as usize, "request"),
                 money(dollars)
             );
         }
-        if killed > least {
+        if killed > threshold {
             tracing::warn!(
                 "--max-cost: requests that were in flight when this run was killed may have cost up to {}, and count so (in_flight.json)",
                 money(killed)
@@ -169,7 +169,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(())
     }
 
-    /// The trials of a phase that have no reply and wait for no batch. Replies that parts of another division have are copied first.
+    /// The trials of a phase that have no reply and do not wait for a batch. Replies that shards of another division have are copied first.
     pub(crate) fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let mut stored = self.store.trials()?;
         let mut plan = Plan::new(self.experiment.plan(phase, || self.store.records())?);
@@ -179,7 +179,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             }
         }
         let mut answered = answered(&stored);
-        if self.copy_from_other_parts(&plan.keys, &answered)? {
+        if self.copy_from_other_shards(&plan.keys, &answered)? {
             stored = self.store.trials()?;
             answered = self::answered(&stored);
         }
@@ -208,7 +208,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
         let sent = self.store.pending_in_batches()?;
         let in_batch = plan.exclude(|key| sent.contains(key));
-        // After the sets of this function and the excluded trials are dropped: of a million trials each is 70 MB.
+        // Dropped before the set of keys grows, because each of these sets takes 70 MB for a million trials.
         drop((answered, again, paid_for));
         self.keys.extend(&plan.keys);
         Ok(Remaining {
@@ -218,7 +218,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         })
     }
 
-    /// Adds the images about which notes were lost to a plan, without trials.
+    /// Adds the images whose notes were lost to a plan, without trials.
     fn add_lost_notes(&self, phase: usize, plan: &mut Plan<E::Item>) -> Result<()> {
         if !self.lacks_notes {
             return Ok(());
@@ -229,19 +229,19 @@ impl<E: Experiment> OpenRun<'_, E> {
         plan.add_images(all, |source, condition| {
             let Source { name, frames, .. } = &sources[source];
             let wanted = missing.wanted(name, condition);
-            // Several images of one source are not measured.
+            // Fidelity is measured only for sources of one image.
             wanted.thumbnail || (wanted.fidelity && frames.len() == 1)
         });
         Ok(())
     }
 
-    /// Copies the replies to these trials that parts of another division have; returns whether there are any.
-    fn copy_from_other_parts(
+    /// Copies the replies to these trials from shards of another division of the run. Returns true if any were copied.
+    fn copy_from_other_shards(
         &mut self,
         keys: &[TrialKey],
         answered: &HashSet<TrialKey>,
     ) -> Result<bool> {
-        let others = OtherParts::beside::<DetailOf<E>>(self.store.folder(), &self.manifest)?;
+        let others = OtherShards::find::<DetailOf<E>>(self.store.folder(), &self.manifest)?;
         let wanted = keys.iter().filter(|key| !answered.contains(key));
         let sources = self.experiment.sources().iter();
         let copied = others.copy_into(
@@ -259,7 +259,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(copied > 0)
     }
 
-    /// Warns about trials that wait for a batch. If they were asked here as well, they would be paid for twice.
+    /// Warns about trials that wait for a batch. They are not asked here, because they would be paid for twice.
     fn warn_of_batches(&self, in_batch: usize) {
         if in_batch > 0 {
             let verb = if in_batch == 1 { " is" } else { "s are" };
@@ -272,6 +272,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
     }
 
+    /// Asks the remaining trials of a phase.
     pub(crate) fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
         let Remaining {
             mut plan, stored, ..
@@ -280,12 +281,12 @@ impl<E: Experiment> OpenRun<'_, E> {
         let settings = experiment.settings();
         let models = experiment.models(phase);
         let all = every_model(experiment);
-        let answering = Answering {
+        let run_models = RunModels {
             models: &all,
             manifest: Some(&self.manifest),
         };
-        let batches = Journal::open(self.store.folder(), &self.manifest)?.most_dollars();
-        let budget = Budget::for_run(&settings.money, models, answering, &stored)?;
+        let batches = Journal::open(self.store.folder(), &self.manifest)?.max_open_cost();
+        let budget = Budget::for_run(&settings.money, models, run_models, &stored)?;
         let in_flight_cost = InFlightCost::open(self.store.folder())?;
         let budget = budget.with_unrecorded(batches + in_flight_cost.killed());
         let counts = TrialCounts {
@@ -302,7 +303,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         drop(stored);
         let workers = Workers::start(settings.loading.threads.threads)?;
         let timings = Timings::default();
-        let limit = limit(settings);
+        let limit = image_limit(settings);
         let sources = experiment.sources();
         let maker = Maker::new(self.enhancers.version(), &settings.loading.size);
         let images = self.images.as_ref();
@@ -323,10 +324,11 @@ impl<E: Experiment> OpenRun<'_, E> {
             plan.sources.rotate_left(first);
         }
         if models.iter().any(|model| model.model.is_remote()) {
-            let of_all = |trials: usize| trials * models.len();
-            plan.ask_untouched_first(of_all(MIN_REPLIES), of_all(UNTOUCHED_FIRST), |source| {
-                sources[source].frames.len() == 1
-            });
+            plan.ask_untouched_first(
+                MIN_REPLIES * models.len(),
+                UNTOUCHED_FIRST * models.len(),
+                |source| sources[source].frames.len() == 1,
+            );
         }
         let stoppers = pipeline.stoppers();
         let dispatcher = Dispatcher {
@@ -358,7 +360,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(end)
     }
 
-    /// Adds to the manifest how the enhancers were used.
+    /// Adds the use of the enhancers to the manifest.
     pub(crate) fn note_enhancers(&mut self, usages: Vec<(EnhancerName, Usage)>) {
         for (name, usage) in usages {
             let name = name.to_string();
@@ -368,7 +370,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         }
     }
 
-    /// Writes the numbers of trials into the manifest, so that those of a killed run are known.
+    /// Writes the numbers of trials into the manifest, so that they are known even if the process is killed.
     pub(crate) fn write_counts(&mut self, stored: &[StoredTrial]) -> Result<()> {
         self.manifest.counts = Counts {
             failed: 0,
@@ -392,9 +394,8 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(())
     }
 
-    /// Numbers of trials of the run: those planned, and those answered under an earlier command. A failed trial that is no longer
-    /// planned, because its images have changed, does not count.
-    /// The stored trials are given by their keys, and whether they failed.
+    /// Numbers of trials of the run, from the keys of the stored trials and whether each failed. Trials that an earlier command planned
+    /// count only if they are answered.
     fn counts(&self, stored: impl Iterator<Item = (TrialKey, bool)>) -> Counts {
         let (mut unplanned, mut answered, mut failed) = (0, 0, 0);
         for (key, has_failed) in stored {
@@ -430,7 +431,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         match end {
             EndReason::Stopped(error) => Err(error),
             EndReason::ModelsStopped(errors) => {
-                // The last lines, below results that may be long.
+                // Printed last, because the results may be long.
                 for error in errors {
                     if settings.show.is_document() {
                         tracing::warn!("not asked any further: {error}");
@@ -488,8 +489,8 @@ pub(crate) fn pipeline<'a, E: Experiment>(
     pipeline
 }
 
-/// Largest image that all endpoints take; `None` if all models are built in. Each image is made once, for all of them.
-pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
+/// The strictest image limit of all endpoints, because each image is made once for all of them; `None` if all models are built in.
+pub(crate) fn image_limit(settings: &JobSettings) -> Option<ImageLimit> {
     let limit = settings
         .ask
         .servers()
@@ -501,7 +502,7 @@ pub(crate) fn limit(settings: &JobSettings) -> Option<ImageLimit> {
             stated.or_else(|| known.reduce(ImageLimit::stricter))
         })
         .reduce(ImageLimit::stricter)?;
-    // A model that is shown none may have any.
+    // Limits on requests matter only for models that see images.
     let replicas = settings
         .ask
         .models
@@ -522,7 +523,7 @@ pub(crate) fn missing_notes<E: Experiment>(experiment: &E, folder: &Path) -> Mis
 
 /// Keys of the trials without a reply that were charged as often as `--retries paid` allows.
 pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> HashSet<TrialKey> {
-    let Some(most) = settings
+    let Some(max_lost) = settings
         .ask
         .servers()
         .into_iter()
@@ -533,24 +534,24 @@ pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> H
     };
     stored
         .iter()
-        .filter(|trial| trial.failed() && trial.lost_attempts() > most)
+        .filter(|trial| trial.failed() && trial.lost_attempts() > max_lost)
         .map(|trial| trial.key)
         .collect()
 }
 
-/// Keys of the trials whose reply was truncated at a limit below that of their model now.
+/// Keys of the trials whose reply was truncated at a lower limit than the current one of their model.
 pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> HashSet<TrialKey> {
     let limits: HashMap<&str, u32> = models
         .iter()
         .filter_map(|model| Some((&*model.name, model.model.raised_limit()?)))
         .collect();
-    let is_truncated = |trial: &&StoredTrial| {
-        let limit = limits.get(trial.model.as_str());
-        limit.is_some_and(|limit| trial.is_truncated_below(*limit))
-    };
     stored
         .iter()
-        .filter(is_truncated)
+        .filter(|trial| {
+            limits
+                .get(trial.model.as_str())
+                .is_some_and(|limit| trial.is_truncated_below(*limit))
+        })
         .map(|trial| trial.key)
         .collect()
 }

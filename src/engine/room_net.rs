@@ -1,7 +1,8 @@
-//! The built-in model that sees, `--model room-net`: [`RoomNet`].
+//! A built-in model that sees images, `--model room-net`: [`RoomNet`].
 //!
-//! A small network, trained on well-lit drawn rooms, predicts the class and the distance of each pixel and the type of the room; the
-//! rules answer from these. Its only input is the image of the request. It is a demonstration and no vision-language model.
+//! A small network, trained on well-lit drawn rooms, predicts the class and the distance of each pixel and the type of the room. The
+//! answers are derived from these by rules. The only input is the image of the request. The model is a demonstration, and not a
+//! vision-language model.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -18,7 +19,7 @@ use darkqa_questions::rules::Rules;
 /// The name in flags, records and tables.
 pub(crate) const NAME: &str = "room-net";
 
-/// Version of feeding the network and answering from its maps; it enters the digest of the model.
+/// Version of the code that prepares the input and answers from the maps; part of the digest of the model.
 const VERSION: u32 = 1;
 
 /// Width and height of the network's input and maps, in pixels.
@@ -37,10 +38,10 @@ const ROOMS: [&str; 6] = [
 /// Number of cached predictions. A few are enough, because questions about one image follow each other.
 const PREDICTIONS: usize = 16;
 
-/// The network with the rules that answer from its maps.
+/// The network and the rules by which its maps answer a question.
 pub(crate) struct RoomNet {
     runtime: RuntimeSearch,
-    /// Loaded for the first image.
+    /// Loaded when the first image is shown.
     network: Mutex<Option<Arc<Network>>>,
     rules: Rules,
     palette: Palette,
@@ -48,7 +49,7 @@ pub(crate) struct RoomNet {
 }
 
 impl RoomNet {
-    /// The model that answers by these rules. The runtime is searched for when it is first shown an image.
+    /// A model that answers by these rules. ONNX Runtime is searched for when the first image is shown.
     ///
     /// # Errors
     /// If the names of colours cannot be read.
@@ -62,7 +63,7 @@ impl RoomNet {
         }))
     }
 
-    /// The model. What it cannot find in the image, it guesses as `prior` does, and the record states so.
+    /// The network as a model. If the image does not show the answer, the model guesses as `prior` does, and the record marks the guess.
     pub(crate) fn model(self: &Arc<Self>, prior: Random) -> Local {
         let net = Arc::clone(self);
         let digest = Digest::from_parts([
@@ -85,10 +86,10 @@ impl RoomNet {
         let Some(image) = call.message.images.first() else {
             return Ok(None);
         };
-        let seen = self.predictions.get(&image.facts().digest, || {
+        let frame = self.predictions.get(&image.facts().digest, || {
             Ok::<_, Error>(Arc::new(self.predict(&image.decode()?)?))
         })?;
-        Ok(seen.answer(question, &self.rules, &self.palette))
+        Ok(frame.answer(question, &self.rules, &self.palette))
     }
 
     fn network(&self) -> Result<Arc<Network>> {
@@ -100,7 +101,7 @@ impl RoomNet {
         Ok(Arc::clone(network.insert(Arc::new(opened))))
     }
 
-    /// The network's maps of an image, measured.
+    /// Runs the network on an image, and measures its maps.
     fn predict(&self, image: &Rgb) -> Result<PredictedFrame> {
         let [width, height] = SIZE;
         let image = area_mean(image, SIZE).into_owned();

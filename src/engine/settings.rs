@@ -302,7 +302,7 @@ impl JobArgs {
             show_timings: self.scale.timings,
             images: self.stored,
             show: self.output.show.format(),
-            table: self.output.show.table(),
+            table: self.output.show.record_table(),
             access: FolderAccess::new(self.output.shared),
             place,
             image_flags: self.image_flags,

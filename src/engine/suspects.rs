@@ -1,35 +1,36 @@
-//! Images for which a server fails again and again: [`Suspects`].
+//! Images for which a server fails repeatedly: [`Suspects`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ask::{AskError, Reach};
 use crate::types::FailureKind;
 
-/// Failed trials about an image after which its others are set aside and asked last. A single failure may be that of the server.
+/// Number of failed trials about an image after which its other trials are asked last. A single failure may have another cause.
 const ASIDE_AFTER: usize = 2;
 
-/// Failed trials about an image, while others are answered, after which no more are asked; chosen.
+/// Number of failed trials about an image after which no more are asked, if the model answers about other images; chosen.
 const GIVEN_UP_AFTER: usize = 3;
 
-/// Failures of the server or the network, by model and by the frame or walk that the trials were about.
+/// Counts of failures by model and by frame or walk, to find images that make a server fail.
 #[derive(Debug, Default)]
 pub(crate) struct Suspects {
+    /// Number of failures of the server or the network, by model and source.
     failures: BTreeMap<(usize, String), usize>,
-    /// The models that have answered a trial, with its frame or walk. Such an image is not suspected: the server had an outage.
+    /// Models with the sources that they have answered a trial about. Such a source is not suspected: the server had an outage.
     answered: BTreeSet<(usize, String)>,
-    /// Whether only trials that were set aside are left.
-    is_last: bool,
+    /// True once only the trials that were set aside are left.
+    asks_deferred: bool,
 }
 
 impl Suspects {
-    /// Notes a reply.
+    /// Records a reply.
     pub(crate) fn succeeded(&mut self, model: usize, source: &str) {
         let key = (model, source.to_owned());
         self.failures.remove(&key);
         self.answered.insert(key);
     }
 
-    /// Notes a failure; those that reveal nothing about the image are ignored. Returns whether the others about it are now set aside.
+    /// Records a failure, unless its cause cannot be the image. Returns true if the other trials about the image are set aside from now on.
     pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str) -> bool {
         use FailureKind::{Connection, Response, Server, Timeout};
         let may_be_image = matches!(error.failure.kind, Connection | Response | Server | Timeout);
@@ -39,33 +40,37 @@ impl Suspects {
         }
         let count = self.failures.entry(key).or_default();
         *count += 1;
-        *count == ASIDE_AFTER && !self.is_last
+        *count == ASIDE_AFTER && !self.asks_deferred
     }
 
-    /// Whether a failure may be that of the image alone: the model has not answered about it, and others are still asked.
+    /// True if the image alone may be the cause of a failure: the model has not answered about it, and trials about others are left.
     pub(crate) fn may_be_cause(&self, model: usize, source: &str) -> bool {
-        !self.is_last && !self.answered.contains(&(model, source.to_owned()))
+        !self.asks_deferred && !self.answered.contains(&(model, source.to_owned()))
     }
 
-    /// Whether a trial waits until the others are asked.
-    pub(crate) fn is_aside(&self, model: usize, source: &str) -> bool {
-        !self.is_last && self.count(model, source) >= ASIDE_AFTER
+    /// True if the trials about a source wait until all others have been asked.
+    pub(crate) fn is_deferred(&self, model: usize, source: &str) -> bool {
+        !self.asks_deferred && self.count(model, source) >= ASIDE_AFTER
     }
 
-    /// Whether a trial is not asked in this call, because the server failed for its image and not for others.
+    /// True if no more trials about a source are asked in this call, because the server fails for it and answers others.
     pub(crate) fn is_given_up(&self, model: usize, source: &str) -> bool {
-        self.is_last && self.has_answered(model) && self.count(model, source) >= GIVEN_UP_AFTER
+        self.asks_deferred
+            && self.has_answered(model)
+            && self.count(model, source) >= GIVEN_UP_AFTER
     }
 
-    /// Only trials that were set aside are left.
-    pub(crate) fn asks_last(&mut self) {
-        self.is_last = true;
+    /// Begins the trials that were set aside; no others are left.
+    pub(crate) fn start_deferred(&mut self) {
+        self.asks_deferred = true;
     }
 
-    /// Whether a model has answered any trial.
+    /// True if a model has answered any trial.
     pub(crate) fn has_answered(&self, model: usize) -> bool {
-        let mut from = self.answered.range((model, String::new())..);
-        from.next().is_some_and(|(answered, _)| *answered == model)
+        self.answered
+            .range((model, String::new())..)
+            .next()
+            .is_some_and(|(answered, _)| *answered == model)
     }
 
     fn count(&self, model: usize, source: &str) -> usize {
@@ -89,10 +94,10 @@ mod tests {
         assert!(!suspects.failed(0, &failure, "i0"));
         assert!(suspects.failed(0, &failure, "i0"), "said once");
         assert!(!suspects.failed(0, &failure, "i0"));
-        assert!(suspects.is_aside(0, "i0") && !suspects.is_aside(1, "i0"));
+        assert!(suspects.is_deferred(0, "i0") && !suspects.is_deferred(1, "i0"));
         assert!(!suspects.is_given_up(0, "i0"));
-        suspects.asks_last();
-        assert!(!suspects.is_aside(0, "i0") && !suspects.is_given_up(0, "i0"));
+        suspects.start_deferred();
+        assert!(!suspects.is_deferred(0, "i0") && !suspects.is_given_up(0, "i0"));
         suspects.succeeded(0, "i1");
         assert!(suspects.is_given_up(0, "i0"), "others are answered");
     }
@@ -105,12 +110,12 @@ mod tests {
         for _ in 0..9 {
             assert!(!suspects.failed(0, &error(FailureKind::Server), "i0"));
         }
-        assert!(!suspects.is_aside(0, "i0"));
+        assert!(!suspects.is_deferred(0, "i0"));
         for _ in 0..9 {
             suspects.failed(0, &error(FailureKind::RateLimit), "i1");
         }
         assert!(
-            !suspects.is_aside(0, "i1"),
+            !suspects.is_deferred(0, "i1"),
             "the rate is not about the image"
         );
     }

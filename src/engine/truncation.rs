@@ -1,27 +1,27 @@
-//! The warnings about replies that are cut at the token limit: [`TruncationCheck`].
+//! Warnings about replies that are cut at the token limit: [`TruncationCheck`].
 
 use crate::types::{Finish, Reply};
 
-/// Counts replies that the token limit cut. A share that is large shows that the limit is too low.
+/// Counts the replies that were cut at the token limit, and warns if their share shows that the limit is too low.
 #[derive(Debug)]
 pub(crate) struct TruncationCheck {
     /// The flag that sets the limit.
     flag: &'static str,
     replies: usize,
     cut: usize,
-    /// Replies that were cut before any text.
+    /// Number of replies that were cut before any text.
     empty: usize,
     has_warned: bool,
 }
 
 impl TruncationCheck {
-    /// Number of replies at which those without any text are judged.
+    /// Number of first replies among which those without any text are counted.
     const FIRST: usize = 10;
 
-    /// Smallest number of replies at which all that were cut are judged; chosen.
-    const FEWEST: usize = 20;
+    /// Minimum number of replies for a warning about the share that were cut; chosen.
+    const MIN_REPLIES: usize = 20;
 
-    /// No replies so far, of models whose token limit this flag sets.
+    /// A check without replies, for models whose token limit this flag sets.
     pub(crate) fn new(flag: &'static str) -> Self {
         Self {
             flag,
@@ -32,7 +32,8 @@ impl TruncationCheck {
         }
     }
 
-    /// Counts a reply, and warns once: if most of the first ones were cut before any text, or later if a quarter of all were cut.
+    /// Counts a reply. Warns once: if more than half of the first [`Self::FIRST`] replies have no text, or later if a quarter of all
+    /// replies were cut.
     pub(crate) fn count(&mut self, reply: &Reply) {
         self.replies += 1;
         if reply.finish == Finish::Length {
@@ -51,7 +52,7 @@ impl TruncationCheck {
                 self.replies,
                 self.flag
             );
-        } else if self.is_large() {
+        } else if self.is_share_large() {
             self.has_warned = true;
             tracing::warn!(
                 "{} of {} replies so far were cut at the token limit: the same command with a larger {} and --resume DIR asks these \
@@ -63,9 +64,9 @@ impl TruncationCheck {
         }
     }
 
-    /// Whether a quarter of at least [`Self::FEWEST`] replies were cut.
-    fn is_large(&self) -> bool {
-        self.replies >= Self::FEWEST && self.cut * 4 >= self.replies
+    /// True if there are at least [`Self::MIN_REPLIES`] replies, and a quarter of them were cut.
+    fn is_share_large(&self) -> bool {
+        self.replies >= Self::MIN_REPLIES && self.cut * 4 >= self.replies
     }
 }
 

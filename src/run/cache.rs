@@ -1,4 +1,4 @@
-//! `cache`: what an image store holds, and emptying it.
+//! `cache`: lists or removes the images of an image store.
 
 use std::path::PathBuf;
 
@@ -24,7 +24,7 @@ pub(crate) struct CacheArgs {
 /// Lists or removes the images of a store.
 ///
 /// # Errors
-/// If the folder is not that of a store or cannot be read, or a file cannot be removed.
+/// If the folder is not an image store or cannot be read, or a file cannot be removed.
 pub(crate) fn cache(args: &CacheArgs) -> Result<Outcome> {
     let text = if args.clear {
         clear(&args.folder)?

@@ -1,4 +1,4 @@
-//! `calibrate`: measuring a camera from frames of its sensor, as a file for `--noise camera`.
+//! `calibrate`: measures a camera from frames of its sensor, and writes a file for `--noise camera`.
 
 use std::path::{Path, PathBuf};
 
@@ -60,7 +60,7 @@ pub(crate) struct CalibrateArgs {
 /// Measures a camera and writes its file and figure.
 ///
 /// # Errors
-/// If a frame cannot be used, the recording is refused, or a file cannot be written.
+/// If a frame cannot be used, the recording is unsuitable, or a file cannot be written.
 pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Outcome> {
     if args
         .out
@@ -107,7 +107,7 @@ fn settings(args: &CalibrateArgs) -> Result<CalibrateSettings> {
     })
 }
 
-/// The name of a folder, also of `.`.
+/// The name of a folder, also for `.`.
 fn folder_name(folder: &Path) -> Result<String> {
     let whole = folder
         .canonicalize()

@@ -1,4 +1,4 @@
-//! `import`: writing the frames of another data set in the common interface.
+//! `import`: writes the frames of another data set in the common interface.
 
 mod camera_facts;
 mod frame_writer;
@@ -35,14 +35,14 @@ use crate::text::words::{counted, first_names};
 use crate::types::manifests::Status;
 use crate::types::{Decides, FrameId, InputNote, Rgb, shell_word};
 
-/// Plausible median depths of a frame in millimetres (chosen). Outside this range the scale is wrong, or it shows a wall.
-const ROOM: std::ops::RangeInclusive<u32> = 300..=15_000;
+/// Plausible typical depths of indoor frames, in millimetres (chosen). Outside this range, the depth scale is probably wrong.
+const ROOM_DEPTHS: std::ops::RangeInclusive<u32> = 300..=15_000;
 
 /// The script that renders HM3D with habitat-sim in the layout that `import habitat` reads.
 const HM3D_SCRIPT: &str = include_str!("../import/hm3d_frames.py");
 
-/// The maximum number of words without a class that are printed.
-const NAMED: usize = 12;
+/// Maximum number of words without a class that are printed.
+const MAX_NAMED: usize = 12;
 
 /// `import`, or another form of it.
 #[derive(Debug, Args)]
@@ -118,16 +118,16 @@ struct ImportArgs {
 /// read; or if the kind has no script.
 pub(crate) fn import(command: &ImportCommand, progress: &Progress) -> Result<Outcome> {
     match (&command.form, &command.import) {
-        (Some(ImportForm::Script { kind }), _) => script(*kind),
+        (Some(ImportForm::Script { kind }), _) => print_script(*kind),
         (Some(ImportForm::Mcap(args)), _) => recording::import(args, progress),
-        (Some(ImportForm::Rosbag { file }), _) => Err(rosbag(file)?),
+        (Some(ImportForm::Rosbag { file }), _) => Err(rosbag_error(file)?),
         (Some(ImportForm::Video(args)), _) => video::import(args, progress),
         (None, Some(args)) => import_frames(args, progress),
         (None, None) => Err(Error::usage("KIND", "a kind of data set is missing")),
     }
 }
 
-fn script(kind: DataSetKind) -> Result<Outcome> {
+fn print_script(kind: DataSetKind) -> Result<Outcome> {
     if kind != DataSetKind::Habitat {
         let problem = format_args!("only the kind habitat has a script, not {kind}");
         return Err(Error::usage("KIND", problem));
@@ -135,11 +135,12 @@ fn script(kind: DataSetKind) -> Result<Outcome> {
     Ok(Outcome::text(Status::Complete, HM3D_SCRIPT.to_owned()))
 }
 
-/// The conversion of a bag of ROS 1. The crate rosbag (0.6.3) maps whole files into memory, and needs bzip2 and lz4 in C.
+/// The error that explains how to convert a ROS 1 bag. Bags are not read directly, because the crate rosbag (0.6.3) maps whole files into
+/// memory and needs bzip2 and lz4 in C.
 ///
 /// # Errors
 /// If the file cannot be read.
-fn rosbag(file: &Path) -> Result<Error> {
+fn rosbag_error(file: &Path) -> Result<Error> {
     let mut start = [0; 7];
     let read = open(file).and_then(|mut file| file.read_exact(&mut start));
     match read {
@@ -158,7 +159,7 @@ fn rosbag(file: &Path) -> Result<Error> {
     Ok(Error::data(file.display(), problem))
 }
 
-/// If one frame fails, the error is logged and counted, and the others continue.
+/// Imports frames. If one fails, the error is logged and counted, and the others continue.
 fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let (src, out) = (&args.src, &args.out);
     let list = out.join("frames.jsonl");
@@ -201,9 +202,9 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
             "no frame of it could be read",
         ));
     }
-    let note = depths(&written)?
-        + &without_maps(&written)
-        + &depth_folders(&written)
+    let note = depth_note(&written)?
+        + &missing_maps_note(&written)
+        + &depth_folders_note(&written)
         + &unread_files(src, &*adapter)?.line();
     let mut scenes: Vec<&str> = frames.iter().map(|frame| frame.scene.as_str()).collect();
     scenes.dedup();
@@ -242,7 +243,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
             format!(", {failed} failed")
         }
     );
-    output.push_str(&words(&listing.unlisted));
+    output.push_str(&unlisted_note(&listing.unlisted));
     Ok(Outcome::wrote(
         out,
         Outcome::complete_if(failed == 0),
@@ -252,16 +253,16 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
 
 /// A frame that was written.
 struct WrittenFrame {
-    /// The line of the frame in `frames.jsonl`.
+    /// Line in `frames.jsonl`.
     line: Map<String, Value>,
-    /// The median depth in millimetres; `None` without a depth map.
+    /// Median depth in millimetres; `None` without a depth map.
     depth: Option<u32>,
-    /// The folder of its depth, for data sets that have several depths of a frame.
+    /// Folder of the depth map, for data sets with several depths per frame.
     depth_folder: Option<&'static str>,
 }
 
-/// The image of a frame with its maps. Maps belong to the image as it is stored; an image without maps is turned as its file
-/// states.
+/// The image of a frame with its maps. An image with maps keeps its stored orientation, which the maps have; an image without maps is
+/// turned as its file states.
 struct ImportedImage {
     file: ImageFile,
     rgb: Rgb,
@@ -308,7 +309,7 @@ fn write_frame(
     let mut line = output.line((rgb.width(), rgb.height()));
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
-    // All but plain PNG files are copied as they are, so that they are read here as anywhere else.
+    // Files other than plain PNG are copied unchanged, so that they are decoded as everywhere else.
     let image = if file.ending() == "png" && note == InputNote::default() {
         output.write("rgb", "png", &png(&rgb)?)?
     } else {
@@ -332,7 +333,7 @@ fn write_frame(
     if let Some(segments) = &segments {
         output.write_segments(&mut line, segments, adapter.listing().segmentation)?;
     }
-    // The camera of a data set is that of the image as it is stored.
+    // Intrinsics belong to the stored orientation of the image.
     let is_stored = note.orientation.is_none();
     let intrinsics = is_stored.then(|| adapter.camera(frame, &rgb)).flatten();
     for (key, value) in [
@@ -353,15 +354,18 @@ fn write_frame(
     })
 }
 
-/// The median of all depths above 0, in millimetres; `None` if there are none.
+/// The median of all depths above 0, in millimetres; `None` if no depth is above 0.
 fn median(depth: &Array2<u32>) -> Option<u32> {
     let mut depths: Vec<u32> = depth.iter().copied().filter(|depth| *depth > 0).collect();
     let middle = depths.len().checked_sub(1)? / 2;
     Some(*depths.select_nth_unstable(middle).1)
 }
 
-/// A note about the typical depth; an error if it is not that of a room.
-fn depths(written: &[WrittenFrame]) -> Result<String> {
+/// The note about the typical depth.
+///
+/// # Errors
+/// If the typical depth is not plausible for rooms.
+fn depth_note(written: &[WrittenFrame]) -> Result<String> {
     let mut medians: Vec<u32> = written.iter().filter_map(|written| written.depth).collect();
     let Some(middle) = medians.len().checked_sub(1) else {
         return Ok("no depth: there will be no questions about the closest object\n".to_owned());
@@ -369,20 +373,20 @@ fn depths(written: &[WrittenFrame]) -> Result<String> {
     medians.sort_unstable();
     let typical = medians[middle / 2];
     let metres = |depth: u32| f64::from(depth) / 1000.0;
-    if !ROOM.contains(&typical) {
+    if !ROOM_DEPTHS.contains(&typical) {
         let problem = format_args!(
             "the typical depth of the frames is {} m, but that of rooms is between {} and {} m; set --depth-scale to the metres per unit of depth",
             metres(typical),
-            metres(*ROOM.start()),
-            metres(*ROOM.end())
+            metres(*ROOM_DEPTHS.start()),
+            metres(*ROOM_DEPTHS.end())
         );
         return Err(Error::data("depth", problem));
     }
     Ok(format!("typical depth: {:.2} m\n", metres(typical)))
 }
 
-/// A note of how many frames lack a map; empty if all have the same kinds, depth aside if none has any.
-fn without_maps(written: &[WrittenFrame]) -> String {
+/// The note about frames without a map, for each kind of map that only some frames have, and about missing class maps.
+fn missing_maps_note(written: &[WrittenFrame]) -> String {
     let mut note = String::new();
     for (key, noun) in [
         ("depth", "depth"),
@@ -403,8 +407,8 @@ fn without_maps(written: &[WrittenFrame]) -> String {
     note
 }
 
-/// A note of the folders that depth was read from; empty if the data set has one depth of each frame.
-fn depth_folders(written: &[WrittenFrame]) -> String {
+/// The note about the folders that depth was read from; empty if the data set has one depth per frame.
+fn depth_folders_note(written: &[WrittenFrame]) -> String {
     let mut counts = BTreeMap::new();
     for folder in written.iter().filter_map(|written| written.depth_folder) {
         *counts.entry(folder).or_insert(0_usize) += 1;
@@ -422,8 +426,8 @@ fn depth_folders(written: &[WrittenFrame]) -> String {
     )
 }
 
-/// A note of the words for which no table has a class.
-fn words(unlisted: &BTreeMap<String, usize>) -> String {
+/// The note about words for which no table has a class; empty if there are none.
+fn unlisted_note(unlisted: &BTreeMap<String, usize>) -> String {
     if unlisted.is_empty() {
         return String::new();
     }
@@ -435,6 +439,6 @@ fn words(unlisted: &BTreeMap<String, usize>) -> String {
         .collect();
     format!(
         "without a class of mpcat40, taken as misc: {}\n",
-        first_names(&named, NAMED)
+        first_names(&named, MAX_NAMED)
     )
 }

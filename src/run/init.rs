@@ -1,4 +1,4 @@
-//! `init`: a folder of data that a run takes as it is, to put one's own images and questions in.
+//! `init`: creates a runnable example data set, to be filled with the user's own images and questions.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use crate::runs::Outcome;
 use crate::text::words::counted;
 use crate::types::manifests::Status;
 use crate::types::questions::letter;
-use crate::types::{Choices, Decides, FrameId, Question, shell_word};
+use crate::types::{Decides, FrameId, Question, shell_word};
 use darkqa_questions::rules::Rules;
 
 /// The flags of `init`.
@@ -31,17 +31,18 @@ pub(crate) struct InitArgs {
     pub frames: Option<PathBuf>,
 }
 
-/// The rooms whose pictures are written.
+/// The built-in rooms whose images are written.
 const ROOMS: &str = "frames=3,seed=20,size=480x360";
-/// The number of questions about each picture, and of images of a folder that are copied.
-const EACH: usize = 2;
-const PICTURES: usize = 3;
-/// The files of the pictures of rooms.
-const ROOM_FILES: [&str; PICTURES] = ["room1.png", "room2.png", "room3.png"];
-/// The number of columns of choices.
-const COLUMNS: usize = 4;
+/// Number of questions about each image.
+const QUESTIONS_PER_IMAGE: usize = 2;
+/// Number of images.
+const IMAGES: usize = 3;
+/// File names of the images of rooms.
+const ROOM_FILES: [&str; IMAGES] = ["room1.png", "room2.png", "room3.png"];
+/// Number of choice columns.
+const CHOICE_COLUMNS: usize = 4;
 
-/// Why a file is not written.
+/// The error about an existing file.
 const EXISTS: &str = "exists already; init overwrites nothing: name another folder";
 
 const README: &str = "\
@@ -60,7 +61,7 @@ dataset.json    the name of the data set
 Replace the images and the lines with your own, then run the check again.
 ";
 
-/// Writes the folder. Nothing is overwritten.
+/// Creates the folder. Nothing is overwritten.
 ///
 /// # Errors
 /// If a file exists already, or cannot be read or written.
@@ -73,9 +74,9 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
     if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
         return Err(Error::data(exists.display(), EXISTS));
     }
-    let lines = match &args.frames {
-        Some(frames) => frame_lines(frames, &args.folder)?,
-        None => room_lines(&args.folder, progress)?,
+    let rows = match &args.frames {
+        Some(frames) => image_rows(frames, &args.folder)?,
+        None => room_rows(&args.folder, progress)?,
     };
     let mut table = csv::Writer::from_writer(Vec::new());
     let wrong = |e: csv::Error| Error::data("questions.csv", e);
@@ -83,8 +84,8 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         "image", "question", "A", "B", "C", "D", "answer", "category",
     ];
     table.write_record(header).map_err(wrong)?;
-    for line in &lines {
-        table.write_record(line).map_err(wrong)?;
+    for row in &rows {
+        table.write_record(row).map_err(wrong)?;
     }
     let table = table
         .into_inner()
@@ -106,24 +107,24 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         format!(
             "{}: {}\n\nnext:\n  darkqa-eval check {data}\n  darkqa-eval --data {data} --model gpt-4o --dry-run\n  darkqa-eval --data {data} --model gpt-4o\n",
             folder,
-            counted(lines.len(), "question")
+            counted(rows.len(), "question")
         ),
     ))
 }
 
-/// A line of the table.
-type Line = Vec<String>;
+/// A row of the question table.
+type Row = Vec<String>;
 
-fn line(image: &str, question: &str, choices: &[String], truth: usize, category: &str) -> Line {
-    let mut line = vec![image.to_owned(), question.to_owned()];
-    line.extend(choices.iter().cloned());
-    line.resize(2 + COLUMNS, String::new());
-    line.extend([letter(truth).to_string(), category.to_owned()]);
-    line
+fn row(image: &str, question: &str, choices: &[String], truth: usize, category: &str) -> Row {
+    let mut row = vec![image.to_owned(), question.to_owned()];
+    row.extend(choices.iter().cloned());
+    row.resize(2 + CHOICE_COLUMNS, String::new());
+    row.extend([letter(truth).to_string(), category.to_owned()]);
+    row
 }
 
-/// Writes pictures of built-in rooms, and returns lines about them: what the rules ask, with true answers.
-fn room_lines(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
+/// Writes images of built-in rooms, and returns rows with questions by rule about them.
+fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
     let rooms = ROOMS.parse().map_err(|e: String| Error::data("rooms", e))?;
     let (place, rules) = (DataPlace::Rooms(rooms), Rules::built_in()?);
     let (set, selection) = (SetArgs::default(), SelectionArgs::default());
@@ -134,66 +135,68 @@ fn room_lines(folder: &Path, progress: &Progress) -> Result<Vec<Line>> {
         ReadingRule::default(),
         progress,
     )?;
-    let mut lines = Vec::new();
+    let mut rows = Vec::new();
     for (number, (frame, name)) in dataset.frames().zip(ROOM_FILES).enumerate() {
         write(
             &folder.join(name),
             &png(&dataset.picture(frame)?.decode()?)?,
         )?;
-        let of_frame = dataset
+        let mut by_family: BTreeMap<&str, &Question> = BTreeMap::new();
+        for question in dataset
             .questions()
             .iter()
-            .filter(|question| question.frame == *frame);
-        let mut families: BTreeMap<&str, &Question> = BTreeMap::new();
-        for question in of_frame.filter(|question| question.choices.len() <= COLUMNS) {
-            families.entry(question.family.name()).or_insert(question);
+            .filter(|question| question.frame == *frame && question.choices.len() <= CHOICE_COLUMNS)
+        {
+            by_family.entry(question.family.name()).or_insert(question);
         }
-        let families: Vec<&Question> = families.into_values().collect();
-        let start = number.min(families.len().saturating_sub(EACH));
-        lines.extend(families[start..].iter().take(EACH).map(|question| {
-            let choices: &Choices = &question.choices;
-            let family = question.family.name();
-            line(
-                name,
-                &question.text,
-                choices.texts(),
-                choices.truth().unwrap_or_default(),
-                family,
-            )
-        }));
+        let questions: Vec<&Question> = by_family.into_values().collect();
+        let start = number.min(questions.len().saturating_sub(QUESTIONS_PER_IMAGE));
+        rows.extend(
+            questions[start..]
+                .iter()
+                .take(QUESTIONS_PER_IMAGE)
+                .map(|question| {
+                    row(
+                        name,
+                        &question.text,
+                        question.choices.texts(),
+                        question.choices.truth().unwrap_or_default(),
+                        question.family.name(),
+                    )
+                }),
+        );
     }
-    Ok(lines)
+    Ok(rows)
 }
 
-/// Copies images of a folder, and returns lines about them that are true of any image: whether it has colours, and its form.
-fn frame_lines(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
+/// Copies images of a folder, and returns rows with questions about their colours and shape, which can be asked about any image.
+fn image_rows(frames: &Path, folder: &Path) -> Result<Vec<Row>> {
     let dataset = Dataset::from_images(frames, &[])?;
-    let copied: Vec<(&FrameId, &Path, PathBuf)> = dataset
+    let copies: Vec<(&FrameId, &Path, PathBuf)> = dataset
         .frames()
-        .take(PICTURES)
+        .take(IMAGES)
         .map(|frame| {
             let path = dataset.image_file(frame).unwrap_or(frames);
             let name = path.file_name().unwrap_or_default();
             (frame, path, folder.join(name))
         })
         .collect();
-    // The folder may be that of the images.
-    let is_itself = |path: &Path, copy: &Path| path.canonicalize().ok() == copy.canonicalize().ok();
-    let mut others = copied
-        .iter()
-        .filter(|(_, path, copy)| copy.exists() && !is_itself(path, copy));
-    if let Some((_, _, copy)) = others.next() {
+    // The images may already be in the folder.
+    if let Some((_, _, copy)) = copies.iter().find(|(_, path, copy)| {
+        copy.exists() && path.canonicalize().ok() != copy.canonicalize().ok()
+    }) {
         return Err(Error::data(copy.display(), EXISTS));
     }
-    let (mut lines, yes_no) = (Vec::new(), ["yes".to_owned(), "no".to_owned()]);
-    for (number, (frame, path, copy)) in copied.into_iter().enumerate() {
+    let (mut rows, yes_no) = (Vec::new(), ["yes".to_owned(), "no".to_owned()]);
+    for (number, (frame, path, copy)) in copies.into_iter().enumerate() {
         let image = copy.file_name().unwrap_or_default().to_string_lossy();
         let picture = dataset.picture(frame)?.decode()?;
         if !copy.exists() {
             write(&copy, &reading::bytes(path)?)?;
         }
-        let mut pixels = picture.samples().chunks_exact(3);
-        let has_colours = pixels
+        let has_colours = picture
+            .samples()
+            .chunks_exact(3)
             .any(|p| p.iter().max() > p.iter().min().map(|least| least.saturating_add(8)).as_ref());
         let (width, height) = (picture.width(), picture.height());
         let form = [
@@ -204,11 +207,11 @@ fn frame_lines(frames: &Path, folder: &Path) -> Result<Vec<Line>> {
             ("Is this photograph black and white?", !has_colours),
             ("Does this photograph have colours?", has_colours),
         ];
-        // By turns, so that neither answer is always the true one.
+        // Alternate the questions, so that neither answer is always the true one.
         for (question, is_true) in [form[number % 2], colours[number % 2]] {
             let truth = usize::from(!is_true);
-            lines.push(line(&image, question, &yes_no, truth, "form"));
+            rows.push(row(&image, question, &yes_no, truth, "form"));
         }
     }
-    Ok(lines)
+    Ok(rows)
 }

@@ -11,9 +11,9 @@ use crate::run_reports::{choice, open};
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
-use crate::runs::placed_trials::append;
 use crate::runs::record_table;
-use crate::runs::run_parts::{MissingParts, RunParts, one_kind, runs_in};
+use crate::runs::shard_records::append_records;
+use crate::runs::sharded_run::{MissingShards, ShardedRun, common_kind, run_folders_in};
 use crate::runs::stored::{ExperimentKind, StoredRun};
 use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
@@ -39,13 +39,13 @@ pub(crate) struct MergeArgs {
     pub show: ShowArgs,
 }
 
-/// Merges shards: the records of all in the order of the questions, with the report that one run would have written.
+/// Merges shards into one run, with all records in the order of the questions and the report that a single run would have written.
 ///
 /// # Errors
-/// If a folder holds no shard, two folders hold the same, one is of another run, or shards are missing without `--partial`.
+/// If a folder has no shard, the shards belong to different runs or have different images, or shards are missing without `--partial`.
 pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
-    let folders = folders(&args.runs)?;
-    match one_kind(&folders)? {
+    let folders = run_folders(&args.runs)?;
+    match common_kind(&folders)? {
         ExperimentKind::Open => merge_all::<OpenDetail>(args, &folders, open::write),
         ExperimentKind::Choice => merge_all::<ChoiceDetail>(args, &folders, choice::write),
     }
@@ -57,39 +57,42 @@ fn merge_all<D: Detail>(
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
     let missing = if args.partial {
-        MissingParts::Accepted
+        MissingShards::Accept
     } else {
-        MissingParts::Refused
+        MissingShards::Refuse
     };
-    let parts = RunParts::<D>::read(folders, missing)?;
+    let shards = ShardedRun::<D>::read(folders, missing)?;
     FolderAccess::new(args.shared).create(&args.out)?;
-    let mut store = Store::<D>::open(&args.out, &parts.manifest, AddressChange::Refused)?;
-    let folders = parts.folders();
-    parts.questions.write(&store, &folders)?;
-    let records = parts.trials.iter().map(|trial| (trial.key(), trial.text()));
-    append(&mut store, &parts.manifest, &parts.manifests(), records)?;
+    let mut store = Store::<D>::open(&args.out, &shards.manifest, AddressChange::Refused)?;
+    let folders = shards.folders();
+    shards.questions.write(&store, &folders)?;
+    let records = shards
+        .trials
+        .iter()
+        .map(|trial| (trial.key(), trial.text()));
+    append_records(&mut store, &shards.manifest, &shards.manifests(), records)?;
     store.sync()?;
-    let wanted = MissingThumbnails::new(parts.questions.frames(), Vec::new());
+    let wanted = MissingThumbnails::new(shards.questions.frames(), Vec::new());
     store.add_thumbnails_of(&folders, |frame| wanted.wants(frame))?;
     store.add_fidelity_of(&folders, |_| true)?;
     drop(folders);
-    // The trials are read again from the folder of the run.
-    let manifest = parts.into_manifest();
+    // The trials are read again from the merged run.
+    let manifest = shards.into_manifest();
     let run = StoredRun::reread(&args.out, manifest)?;
     let outcome = write(&store, run, args.show.format())?;
-    record_table::update(&args.out, args.show.table())?;
+    record_table::update(&args.out, args.show.record_table())?;
     Ok(outcome)
 }
 
-/// The run folders among those named, and directly in them.
-fn folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
+/// The run folders among the named folders and directly in them.
+fn run_folders(named: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut folders = Vec::new();
     for path in named {
         if store::schema(path)?.is_some() {
             folders.push(path.clone());
             continue;
         }
-        let inside = runs_in(path)?;
+        let inside = run_folders_in(path)?;
         if inside.is_empty() {
             let problem = "neither a run nor a folder of runs".to_owned();
             let path = path.clone();

@@ -1,4 +1,4 @@
-//! The resolved settings of each model of a file: [`models`].
+//! `models`: prints the resolved settings of each model in a models file ([`models`]).
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -36,11 +36,11 @@ pub(crate) struct ModelsArgs {
     pub check: bool,
 }
 
-/// Prints what each model of a file comes to: endpoint, where its key comes from, request and digest. Sends nothing without `--check`.
+/// Prints endpoint, source of the key, request and digest of each model in a file. Sends nothing without `--check`.
 ///
 /// # Errors
-/// If the file cannot be used, or a key is missing that `--check` needs, or the file may be a stranger's and names what is not its
-/// own.
+/// If the file is invalid, a key that `--check` needs is missing, or the file is not trusted and names variables or files outside of its
+/// folder.
 pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> {
     let named = ModelArgs {
         models: Some(args.file.clone()),
@@ -58,7 +58,7 @@ pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> 
         } else {
             KeyUse::NotNeeded
         },
-        // The data are not known here: they may lie where the file does. Without requests nobody gets anything.
+        // The data are unknown here, but may be next to the models file. Without requests, nothing can leak.
         data: args.check.then_some(args.file.as_path()),
         text_baseline: TextBaseline::default(),
     };

@@ -1,4 +1,4 @@
-//! `rooms`: writing the built-in rooms as files.
+//! `rooms`: writes the built-in rooms as files.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -35,10 +35,10 @@ pub(crate) struct RoomsArgs {
     pub threads: ThreadArgs,
 }
 
-/// Writes the rooms in the common interface. Each thread holds one frame in memory.
+/// Writes the rooms in the common interface. Each thread keeps one frame in memory.
 ///
 /// # Errors
-/// If the folder holds frames already, or a file cannot be written.
+/// If the folder has frames already, or a file cannot be written.
 pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     let list = args.out.join(FRAMES);
     if !args.force && list.exists() {
@@ -62,7 +62,7 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
             .collect::<Result<_>>()
     })?;
     drop(bar);
-    // The frames of a scene share a file of names, which two threads must not write at once.
+    // The frames of a scene share a file of names, which two threads must not write at the same time.
     let scenes = frames.iter().map(|frame| (&*frame.scene, &frame.names));
     for (scene, names) in scenes.collect::<BTreeMap<_, _>>() {
         frame_folder::write_segment_names(&args.out, scene, names)?;
@@ -85,10 +85,10 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
 
 /// A frame whose files are written.
 struct WrittenFrame {
-    /// Its line in `frames.jsonl`.
+    /// Line in `frames.jsonl`.
     line: Map<String, Value>,
     scene: String,
-    /// The names of the segments of the scene.
+    /// Names of the segments of the scene.
     names: Arc<BTreeMap<u32, SegmentName>>,
 }
 
@@ -101,7 +101,7 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
     };
     let mut line = output.line((frame.rgb.width(), frame.rgb.height()));
     let codes = output.write("rgb", "png", &png(&frame.rgb)?)?;
-    // The frame is its light; the PNG file beside it is for looking at.
+    // The EXR file is the frame if the room has one; the PNG file is then only a preview.
     let image = match room.light() {
         Some(light) => output.write("rgb", "exr", &exr(&light)?)?,
         None => codes,

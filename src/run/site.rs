@@ -1,4 +1,4 @@
-//! `site`: a leaderboard and the pages of many runs, as files.
+//! `site`: writes a leaderboard and the report pages of many runs.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -13,9 +13,9 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::files::reading;
 use crate::report::site::{DATA, PAGES, SCHEMA, products};
-use crate::run_reports::site as collected;
+use crate::run_reports;
 use crate::runs::Outcome;
-use crate::runs::run_parts::any_run;
+use crate::runs::sharded_run::open_any_run;
 use crate::types::Decides;
 use crate::types::manifests::Status;
 
@@ -33,12 +33,16 @@ pub(crate) struct SiteArgs {
 /// Writes a site.
 ///
 /// # Errors
-/// If a folder holds no run of this version or a run is named twice, if a record is broken, or if `--out` holds something else.
+/// If a folder has no run of this version, a run is named twice, a record is broken, or `--out` has other files.
 pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
     check_distinct(&args.runs)?;
     check_target(&args.out)?;
-    let runs = args.runs.iter().map(|folder| any_run(folder));
-    let site = collected(runs.collect::<Result<_>>()?)?;
+    let runs = args
+        .runs
+        .iter()
+        .map(|folder| open_any_run(folder))
+        .collect::<Result<_>>()?;
+    let site = run_reports::site(runs)?;
     let mut output = String::new();
     for (run, why) in &site.others {
         let _ = writeln!(output, "{}: in no table: {why}", run.name);
@@ -49,7 +53,7 @@ pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
     for (name, content) in contents {
         files::write(&args.out.join(name), &content)?;
     }
-    for page in stale(&args.out, &names)? {
+    for page in stale_pages(&args.out, &names)? {
         let _ = writeln!(
             output,
             "{page}: this page belongs to no run of this site; it can be deleted"
@@ -64,7 +68,7 @@ pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
     Ok(Outcome::wrote(index, Status::Complete, output))
 }
 
-/// Refuses a run that is named twice: its models would be compared with themselves.
+/// Refuses a run that is named twice, because its models would be compared with themselves.
 fn check_distinct(folders: &[PathBuf]) -> Result<()> {
     let mut known = BTreeSet::new();
     for folder in folders {
@@ -77,7 +81,7 @@ fn check_distinct(folders: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a folder with anything else than a site in it, and links that lead out of it.
+/// Refuses a folder with other files than a site, and a folder of pages that is a symbolic link.
 fn check_target(out: &Path) -> Result<()> {
     let unreadable = |e: std::io::Error| Error::file(out, "read", e);
     let mut entries = match fs::read_dir(out) {
@@ -89,10 +93,10 @@ fn check_target(out: &Path) -> Result<()> {
     if is_empty {
         return Ok(());
     }
-    let data = reading::read(&out.join(DATA)).ok();
-    let data = data.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
-    let is_site =
-        data.is_some_and(|data| data.get("schema").and_then(Value::as_str) == Some(SCHEMA));
+    let is_site = reading::read(&out.join(DATA))
+        .ok()
+        .and_then(|text| serde_json::from_slice::<Value>(&text).ok())
+        .is_some_and(|data| data.get("schema").and_then(Value::as_str) == Some(SCHEMA));
     if !is_site {
         let problem = "the folder is not empty and holds no site; name another --out";
         return Err(Error::data(out.display(), problem));
@@ -109,8 +113,8 @@ fn check_target(out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Pages in the folder of a site that it does not write.
-fn stale(out: &Path, names: &BTreeSet<String>) -> Result<Vec<String>> {
+/// Pages in the folder of a site that belong to no run of the site, sorted.
+fn stale_pages(out: &Path, names: &BTreeSet<String>) -> Result<Vec<String>> {
     let pages = out.join(PAGES);
     let unreadable = |e: std::io::Error| Error::file(&pages, "read", e);
     let mut stale = Vec::new();

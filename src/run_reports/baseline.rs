@@ -1,10 +1,10 @@
-//! `--baseline`: new runs against an old one ([`Baseline`]).
+//! `report --baseline`: comparison of new runs with an old one ([`Baseline`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::alerts::run_alerts;
 use super::combine::{Combined, check_comparable, clusters};
-use super::cost::{Charged, PricedRun};
+use super::cost::{PricedRun, TrialCost};
 use super::join::join;
 use crate::error::{Error, Result};
 use crate::report::choice_report::ChoiceReport;
@@ -21,31 +21,31 @@ use darkqa_score::grid::Grid;
 use darkqa_score::significance::Significance;
 use darkqa_score::subject::{ModelInCondition, is_control, is_observer};
 
-/// The flag that makes a worse model a failure.
+/// The flag that makes the command fail if a model got worse.
 pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";
 
-/// The most conditions that a message names; chosen.
+/// Maximum number of conditions in a message; chosen.
 const MAX_NAMED: usize = 3;
 
-/// New runs against an old one.
+/// Comparison of new runs with an old one.
 pub(super) struct Baseline {
     rows: Vec<BaselineRow>,
     /// The name of the old run.
     old: String,
     /// Differences between the new runs and the old one.
     alerts: Vec<Alert>,
-    /// Models under test in conditions of the old run that are not compared, with their names there.
+    /// Models under test in conditions of the old run that are not compared, by their names in the old run.
     missing: Vec<ModelInCondition>,
-    /// Models under test of the new runs that the old one does not have.
+    /// Models under test that only the new runs have.
     added: BTreeSet<String>,
 }
 
-/// The cost of each model in each condition, in US dollars. A subject of which no trial states its cost has none.
+/// Cost of each model in each condition, in US dollars. Subjects without a trial of known cost are missing.
 #[derive(Default)]
 struct SubjectCosts(BTreeMap<ModelInCondition, f64>);
 
 impl SubjectCosts {
-    /// The costs of joined runs, each trial at the prices of the first run that has it.
+    /// The costs of joined runs. A trial that several runs share counts once, at the prices of the first one.
     ///
     /// # Errors
     /// If the prices in a manifest are broken.
@@ -57,19 +57,20 @@ impl SubjectCosts {
             for place in run.trials.iter() {
                 if !std::mem::replace(&mut is_counted[place], true) {
                     let trial = combined.trials.at(place);
-                    let model = combined.models.asked(trial.model());
-                    costs.add(trial, priced.charged(model, trial));
+                    let model = combined.model_names.original_name(trial.model());
+                    costs.add(trial, priced.trial_cost(model, trial));
                 }
             }
         }
         Ok(costs)
     }
 
-    fn add(&mut self, trial: TrialRef<'_>, charged: Option<Charged>) {
-        let parts = charged
+    fn add(&mut self, trial: TrialRef<'_>, cost: Option<TrialCost>) {
+        for dollars in cost
             .into_iter()
-            .flat_map(|charged| [charged.reply, charged.lost]);
-        for dollars in parts.flatten() {
+            .flat_map(|cost| [cost.reply, cost.lost])
+            .flatten()
+        {
             *self
                 .0
                 .entry(ModelInCondition::from_trial(trial))
@@ -79,10 +80,10 @@ impl SubjectCosts {
 }
 
 impl Baseline {
-    /// The new runs, which `combined` joins, against the old one.
+    /// Compares the new runs with the old one. `combined` joins the runs of `new`.
     ///
     /// # Errors
-    /// If they share no question, or one has other choices or another truth.
+    /// If they share no question, or a shared question has other choices or another true choice.
     pub(super) fn new(
         combined: &Combined,
         new: Vec<StoredRun<ChoiceDetail>>,
@@ -92,7 +93,7 @@ impl Baseline {
         let mut runs = new;
         runs.push(old.clone());
         check_comparable(&runs)?;
-        // The names of models and conditions tell nothing apart here: a new model is held against the old one of its name.
+        // Models and conditions are matched by name: a new model is compared with the old one of the same name.
         let alerts = run_alerts(&join(runs, |_| true)?);
         let mark = |model: &str| format!("{model} (baseline {name})");
         let (mut trials, mut old_trials) = (combined.trials.clone(), old.trials);
@@ -108,22 +109,23 @@ impl Baseline {
             .subjects
             .iter()
             .enumerate()
-            // A control shows whether the observer can be trusted, not whether a model got worse.
+            // Controls test the observer, not models.
             .filter(|(_, subject)| !is_control(&subject.model))
             .filter_map(|(index, subject)| {
                 let old = ModelInCondition {
-                    model: mark(combined.models.asked(&subject.model)),
+                    model: mark(combined.model_names.original_name(&subject.model)),
                     ..subject.in_any_light()
                 };
                 Some((index, grid.find(&old)?))
             })
             .collect();
         let mut costs = SubjectCosts::from_joined(combined)?;
-        let mut run = PricedRun::new(&old.manifest)?;
+        let suffix = mark("");
+        let mut old_run = PricedRun::new(&old.manifest)?;
         for trial in old_trials.iter() {
             let marked = trial.model();
-            let model = marked.strip_suffix(&mark("")).unwrap_or(marked);
-            costs.add(trial, run.charged(model, trial));
+            let model = marked.strip_suffix(&suffix).unwrap_or(marked);
+            costs.add(trial, old_run.trial_cost(model, trial));
         }
         let rows = baseline_rows(&grid, &healths(&grid), &pairs, |index| {
             costs.0.get(&grid.subjects[index]).copied()
@@ -133,7 +135,6 @@ impl Baseline {
             .filter(|(new, _)| rows.iter().any(|row| row.subject == grid.subjects[*new]))
             .map(|(_, old)| *old)
             .collect();
-        let suffix = mark("");
         let is_tested =
             |subject: &ModelInCondition| !subject.is_reference() && !is_control(&subject.model);
         let missing = grid
@@ -166,8 +167,8 @@ impl Baseline {
         })
     }
 
-    /// The conditions of the old run that are not compared, with the reason; `None` if all are.
-    fn gap(&self) -> Option<String> {
+    /// The sentence about conditions of the old run that are not compared, with the reason; `None` if all are.
+    fn missing_sentence(&self) -> Option<String> {
         let old = &self.old;
         let missing: Vec<String> = self.missing.iter().map(name).collect();
         let are = match missing.len() {
@@ -195,23 +196,24 @@ impl Baseline {
         Some(format!("{conditions}: {reason}"))
     }
 
-    /// Puts the comparison first among the sentences of a report, and below its table of levels. The observer is left out where a
-    /// control shows that it proves nothing.
+    /// Adds the comparison to a report: its sentences first, its table below the table of levels. The observer is left out if a control
+    /// has invalidated it.
     pub(super) fn add_to(&self, report: &mut ChoiceReport<'_>) {
         let is_hidden = report.findings.observer.is_hidden();
-        let rows = self
+        let rows: Vec<BaselineRow> = self
             .rows
             .iter()
-            .filter(|row| !(is_hidden && is_observer(&row.subject.model)));
-        let rows: Vec<BaselineRow> = rows.cloned().collect();
+            .filter(|row| !(is_hidden && is_observer(&row.subject.model)))
+            .cloned()
+            .collect();
         let sentences = against_baseline(&rows, &self.old, report.findings.unit);
         report.sentences.splice(..0, sentences);
         let place = report.tables.len().min(2);
         report.tables.insert(place, baseline(&rows, &self.old));
-        let gap = self
-            .gap()
+        let missing_alert = self
+            .missing_sentence()
             .map(|text| Alert::new(AlertKind::Items, format!("{text}.")));
-        for alert in self.alerts.iter().chain(&gap) {
+        for alert in self.alerts.iter().chain(&missing_alert) {
             if !report.alerts.contains(alert) {
                 report.alerts.push(alert.clone());
             }
@@ -219,10 +221,10 @@ impl Baseline {
         report.alerts.sort_by_key(|alert| alert.kind);
     }
 
-    /// Whether any model is shown to be worse. `random`, the observer and its controls are no models.
+    /// True if any model is significantly worse in any condition. `random`, the observer and its controls do not count as models.
     ///
     /// # Errors
-    /// If a model in a condition of the old run is not compared, none can be, or no verdict is possible about any.
+    /// If a condition of the old run is not compared, no model can be compared, or no test can reach significance.
     pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
         let models: Vec<&BaselineRow> = self
             .rows
@@ -230,25 +232,27 @@ impl Baseline {
             .filter(|row| !row.subject.is_reference())
             .collect();
         let old = &self.old;
-        let none = |problem: String| {
+        let refuse = |problem: String| {
             let problem = format!("{problem}; leave the flag out to see the report");
             Err(Error::usage(FAIL_IF_WORSE, problem))
         };
-        let mut verdicts = models.iter().map(|row| row.significance);
-        if verdicts.any(|verdict| verdict == Significance::Worse) {
+        if models
+            .iter()
+            .any(|row| row.significance == Significance::Worse)
+        {
             return Ok(true);
         }
-        if let Some(gap) = self.gap() {
-            return none(gap);
+        if let Some(missing) = self.missing_sentence() {
+            return refuse(missing);
         }
         if models.is_empty() {
-            return none(format!(
+            return refuse(format!(
                 "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
                  observer do not count)"
             ));
         }
         if !models.iter().any(|row| row.significance.is_possible()) {
-            return none(format!(
+            return refuse(format!(
                 "no verdict against {old} is possible: {}",
                 no_verdict(&models, unit)
             ));

@@ -1,4 +1,4 @@
-//! The report of a run of questions with choices, from its records alone.
+//! The report on one run of questions with choices, made from its records alone.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::report::report_length::ReportLength;
 use crate::report::short;
 use crate::runs::outcome::Outcome;
 use crate::runs::outcome::{StdoutFormat, Syntax};
-use crate::runs::stored::{ShownModels, StoredRun, name};
+use crate::runs::stored::{ShownModels, StoredRun, run_name};
 use crate::store::Store;
 use crate::tables::{FLIPS, write_flips};
 use crate::types::manifests::RunManifest;
@@ -35,7 +35,7 @@ pub(crate) fn write(
     Ok(Outcome::wrote(
         store.folder(),
         manifest.status,
-        in_its_folder(
+        write_report(
             &ReportFolder::Run(store),
             &manifest,
             &combine(vec![run])?,
@@ -45,24 +45,24 @@ pub(crate) fn write(
     .in_format(show))
 }
 
-/// Writes the report of one run; returns the text for standard output.
+/// Writes the report of one run into its folder; returns the text for standard output.
 ///
 /// # Errors
 /// If a file cannot be written.
-pub(super) fn in_its_folder(
+pub(super) fn write_report(
     target: &ReportFolder<'_, ChoiceDetail>,
     manifest: &RunManifest,
     combined: &Combined,
     show: StdoutFormat,
 ) -> Result<String> {
     if combined.truths() == Truths::Unknown {
-        return own_answers::in_its_folder(target, manifest, combined, show);
+        return own_answers::write_report(target, manifest, combined, show);
     }
     let (folder, findings) = (target.path(), combined.findings());
     let report = ChoiceReport::new(&findings, alerts(combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));
     let files = files(&report, combined, SummaryRuns::One(manifest, None))?;
-    write_rows(&findings, folder)?;
+    write_flip_rows(&findings, folder)?;
     target.write(&files, manifest)?;
     let list = SummaryRuns::One(manifest, Some(folder));
     let text = text(&report, &[(manifest, folder)], list, show)?;
@@ -77,26 +77,26 @@ pub(super) fn in_its_folder(
     Ok(text + &cost + &format!("report: {page}\n"))
 }
 
-/// The files of a report by name.
+/// The files of a report, by name.
 pub(super) fn files(
     report: &ChoiceReport<'_>,
     combined: &Combined,
     runs: SummaryRuns<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let products = products(report, &combined.shown())?;
+    let products = products(report, &combined.page_inputs())?;
     let summary = summary(report, runs, ReportLength::Summary)?;
     Ok(with_summary(products, summary))
 }
 
-/// Writes the file that has a row for each item into a folder.
-pub(super) fn write_rows(findings: &Findings<'_>, folder: &Path) -> Result<()> {
+/// Writes the file with one row for each item into a folder; nothing if there are no such rows.
+pub(super) fn write_flip_rows(findings: &Findings<'_>, folder: &Path) -> Result<()> {
     if findings.first_failures.is_empty() {
         return Ok(());
     }
     write_with(&folder.join(FLIPS), |out| write_flips(findings, out))
 }
 
-/// The text of a report for standard output; `list` are the same runs for JSON.
+/// The text of a report for standard output. `list` has the same runs as `runs`, for JSON.
 pub(super) fn text(
     report: &ChoiceReport<'_>,
     runs: &[(&RunManifest, &Path)],
@@ -116,6 +116,6 @@ pub(super) fn markdown(
     runs: &[(&RunManifest, &Path)],
     length: ReportLength,
 ) -> String {
-    let names = runs.iter().map(|(_, folder)| name(folder)).collect();
+    let names = runs.iter().map(|(_, folder)| run_name(folder)).collect();
     MarkdownReport::for_choices(report, names, length).text()
 }

@@ -1,4 +1,4 @@
-//! Joining several runs of questions with choices: [`combine`].
+//! Joins several runs of questions with choices: [`combine`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
@@ -21,32 +21,34 @@ use darkqa_score::grid::Grid;
 use darkqa_score::photographs::PhotographedSet;
 use darkqa_score::subject::without_run;
 
-/// Several runs of questions with choices, joined.
+/// Joined runs of questions with choices.
 pub(super) type Combined = Joined<ChoiceDetail>;
 
 impl Combined {
-    /// The results that follow from the records.
+    /// All results of the runs, computed from their records.
     pub(super) fn findings(&self) -> Findings<'_> {
-        let offers = offers(&self.trials, &self.questions);
         let findings = Findings::with_listing(
             &self.trials,
-            &ties(&self.questions),
-            offers,
+            &frame_ties(&self.questions),
+            offered_choices(&self.trials, &self.questions),
             &self.fidelity,
             &self.listing,
         );
-        let findings = findings.with_set(self.set()).with_groups(&self.questions);
-        // Replies differ from time to time: that is no other model.
-        let apart = self.models.apart.iter();
-        apart
-            .filter(|apart| apart.differs_by_replies_alone())
-            .fold(findings, |findings, apart| {
-                findings.with_lights_between(&apart.names)
+        let findings = findings
+            .with_set(self.photographed_set())
+            .with_groups(&self.questions);
+        // A model whose replies vary is still the same model.
+        self.model_names
+            .split
+            .iter()
+            .filter(|split| split.differs_by_replies_alone())
+            .fold(findings, |findings, split| {
+                findings.with_lights_between(&split.names)
             })
     }
 
-    /// The light of the set of these runs: dark if all state it, with the brightness that the first of them measured.
-    pub(super) fn set(&self) -> PhotographedSet {
+    /// The light in which the data set was photographed: dark if all runs state so, with the brightness of the first run that measured it.
+    pub(super) fn photographed_set(&self) -> PhotographedSet {
         let is_dark =
             |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
         if self.runs.is_empty() || !self.runs.iter().all(is_dark) {
@@ -65,7 +67,7 @@ impl Combined {
         }
     }
 
-    /// Whether the true answers are known; [`combine`] has checked that they are known of all questions or of none.
+    /// Whether true answers are known. [`combine`] checks that they are known for all questions or for none.
     pub(super) fn truths(&self) -> Truths {
         match self.trials.first() {
             Some(trial) if trial.truth().is_none() => Truths::Unknown,
@@ -73,7 +75,7 @@ impl Combined {
         }
     }
 
-    /// The unit that is treated as independent.
+    /// The unit treated as independent, for example the scene.
     pub(super) fn unit(&self) -> ClusterUnit {
         clusters(&self.trials, &self.questions).unit()
     }
@@ -83,19 +85,22 @@ impl Combined {
         Grid::new(&self.trials, &clusters(&self.trials, &self.questions))
     }
 
-    /// Further inputs of the HTML page.
-    pub(super) fn shown(&self) -> PageInputs<'_> {
-        let runs = self.runs.iter().map(|run| page::PageRun {
-            folder: typed(&run.folder),
-            name: run.name.clone(),
-            manifest: &run.manifest,
-            usage: page::RunUsage::new(self.trials_of(run), |model| {
-                run.manifest.is_built_in(without_run(model))
-            }),
-            cost: run.cost.clone(),
-        });
+    /// Inputs of the HTML page that a report does not have: runs, questions, thumbnails and texts.
+    pub(super) fn page_inputs(&self) -> PageInputs<'_> {
         PageInputs {
-            runs: runs.collect(),
+            runs: self
+                .runs
+                .iter()
+                .map(|run| page::PageRun {
+                    folder: command_path(&run.folder),
+                    name: run.name.clone(),
+                    manifest: &run.manifest,
+                    usage: page::RunUsage::new(self.trials_of(run), |model| {
+                        run.manifest.is_built_in(without_run(model))
+                    }),
+                    cost: run.cost.clone(),
+                })
+                .collect(),
             questions: Box::new(|wanted| {
                 let mut found = HashMap::new();
                 for texts in &self.texts {
@@ -117,15 +122,18 @@ impl Combined {
     }
 }
 
-/// A folder as a command on it names it. An absolute path states where somebody's files lie: of it the page has the name alone.
-pub(super) fn typed(folder: &Path) -> String {
-    let name = folder.file_name().filter(|_| folder.is_absolute());
-    let shown = name.map_or_else(|| folder.to_owned(), |name| Path::new("DIR").join(name));
+/// A folder as it is shown in a command, quoted for a shell. Of an absolute path only the name is shown, after `DIR/`, so that a page does
+/// not reveal where the user's files are.
+pub(super) fn command_path(folder: &Path) -> String {
+    let shown = match folder.file_name() {
+        Some(name) if folder.is_absolute() => Path::new("DIR").join(name),
+        _ => folder.to_owned(),
+    };
     shell_word(&shown.display().to_string()).into_owned()
 }
 
-/// The scenes and further images that these questions name for their frames.
-pub(super) fn ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> FrameTies {
+/// The scenes and further images that questions state for their frames.
+pub(super) fn frame_ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> FrameTies {
     let mut ties = FrameTies::default();
     for question in questions {
         let frame = &question.frame;
@@ -139,19 +147,19 @@ pub(super) fn ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> 
     ties
 }
 
-/// The clusters of trials, with what these questions say of their frames.
+/// The clusters of trials, based on the scenes and images that the questions state.
 pub(super) fn clusters<'a>(
     trials: &Trials<ChoiceDetail>,
     questions: impl IntoIterator<Item = &'a RunQuestion>,
 ) -> Clusters {
-    Clusters::new(trials.questions(), &ties(questions))
+    Clusters::new(trials.questions(), &frame_ties(questions))
 }
 
-/// Joins runs that can be compared.
+/// Joins runs after checking that they can be compared.
 ///
 /// # Errors
 /// If a run shares no question with the others, a question has other choices or another truth in two runs, or the true answers are known
-/// of some questions and not of others.
+/// for some questions and not for others.
 pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
     check_one_measure(&runs)?;
     if runs.len() > 1 {
@@ -162,9 +170,12 @@ pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
     Ok(combined)
 }
 
-/// The choices of all questions, for the chance line, with the number of orders that are asked: the answer to each order counts
-/// separately. Questions that are not asked yet are included once. Without stored questions, those in the trials count.
-fn offers(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> Vec<OfferedChoices> {
+/// The number of choices of each question, for chance accuracy, with the number of orders in which they were asked, because each order is
+/// answered separately. A question that is not asked yet has one order. Questions come from both the trials and the stored questions.
+fn offered_choices(
+    trials: &Trials<ChoiceDetail>,
+    questions: &[RunQuestion],
+) -> Vec<OfferedChoices> {
     let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
     let mut all = BTreeMap::<&QuestionId, OfferedChoices>::new();
     for item in trials.items().into_iter().flatten() {
@@ -193,7 +204,7 @@ fn offers(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> Vec<Offer
         .collect()
 }
 
-/// Checks that the true answers are known of all questions, or of none: an accuracy and an agreement are not the same measure.
+/// Checks that true answers are known for all questions or for none, because accuracy and self-agreement are different measures.
 fn check_one_measure(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     let mut first: Option<(&Path, bool)> = None;
     for run in runs {
@@ -224,6 +235,9 @@ fn check_one_measure(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
 }
 
 /// Checks that runs can be compared.
+///
+/// # Errors
+/// As for [`combine`].
 pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     check_one_measure(runs)?;
     let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, Option<&String>)>::new();

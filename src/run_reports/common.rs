@@ -1,4 +1,4 @@
-//! `--common`: a report on the items that all models answered ([`restrict`]).
+//! `report --common`: a report on only the items that all models answered ([`keep_common_items`]).
 
 use std::collections::HashSet;
 
@@ -8,19 +8,18 @@ use crate::error::{Error, Result};
 use crate::types::{AskedItem, QuestionId};
 use darkqa_score::accuracies::shared_items;
 
-/// Keeps the trials of the items to which every model with images has a reply in any condition; a model without any reply does not
-/// count.
+/// Keeps only the trials of items to which every model with images has a reply in some condition. Models without any reply are ignored.
 ///
 /// # Errors
 /// If there is no such item.
-pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
+pub(super) fn keep_common_items(mut combined: Combined) -> Result<Combined> {
     let shared: HashSet<(QuestionId, Vec<String>, u32)> = {
         let grid = combined.grid();
         grid.items
             .iter()
             .zip(shared_items(&grid))
             .filter(|(_, is_shared)| *is_shared)
-            .map(|(item, _)| owned(item.asked))
+            .map(|(item, _)| item_key(item.asked))
             .collect()
     };
     if shared.is_empty() {
@@ -33,18 +32,15 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
         .trials
         .items()
         .into_iter()
-        .map(|item| item.is_some_and(|item| shared.contains(&owned(item))))
+        .map(|item| item.is_some_and(|item| shared.contains(&item_key(item))))
         .collect();
-    let kept: Vec<bool> = combined
-        .trials
-        .iter()
-        .map(|trial| is_shared[trial.item_number()])
-        .collect();
-    let mut places = Vec::with_capacity(kept.len());
+    // The new place of each trial; `None` if it is removed.
+    let mut places = Vec::with_capacity(combined.trials.len());
     let mut next = 0;
-    for kept in &kept {
-        places.push(kept.then_some(next));
-        next += u32::from(*kept);
+    for trial in combined.trials.iter() {
+        let is_kept = is_shared[trial.item_number()];
+        places.push(is_kept.then_some(next));
+        next += u32::from(is_kept);
     }
     for run in &mut combined.runs {
         let kept = run.trials.iter().filter_map(|place| places[place]);
@@ -61,7 +57,7 @@ pub(super) fn restrict(mut combined: Combined) -> Result<Combined> {
 }
 
 /// The identity of an item: question, order of choices and repeat.
-fn owned(item: &AskedItem) -> (QuestionId, Vec<String>, u32) {
+fn item_key(item: &AskedItem) -> (QuestionId, Vec<String>, u32) {
     let (question, choices, repeat) = item.key();
     (question.clone(), choices.to_vec(), repeat)
 }

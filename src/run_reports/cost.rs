@@ -1,4 +1,4 @@
-//! The cost of the replies of a run: [`cost`], [`PricedRun`].
+//! Cost of the trials of a run: [`cost_text`], [`PricedRun`].
 
 use std::collections::HashMap;
 
@@ -12,19 +12,19 @@ use crate::types::manifests::RunManifest;
 use crate::types::{TrialRef, Via};
 use darkqa_score::answers::record::Detail;
 
-/// A run with the prices that it had.
+/// A run with the prices stored in its manifest.
 pub(super) struct PricedRun<'m> {
     manifest: &'m RunManifest,
     prices: Prices,
-    /// The prices of the models so far; `None` for a model without a known price.
+    /// Prices found so far, by model; `None` for a model without a known price.
     by_model: HashMap<String, Option<Price>>,
 }
 
 impl<'m> PricedRun<'m> {
-    /// The run of a manifest.
+    /// Reads the prices of a run from its manifest.
     ///
     /// # Errors
-    /// If the prices in the manifest are broken.
+    /// If the prices in the manifest are invalid.
     pub(super) fn new(manifest: &'m RunManifest) -> Result<Self> {
         Ok(Self {
             manifest,
@@ -33,12 +33,12 @@ impl<'m> PricedRun<'m> {
         })
     }
 
-    /// The cost of a trial of the model that the run asked under this name; `None` if its price is not known.
-    pub(super) fn charged<D: Detail>(
+    /// The cost of a trial; `None` if the price of its model is unknown. `model` is the name under which the run asked the model.
+    pub(super) fn trial_cost<D: Detail>(
         &mut self,
         model: &str,
         trial: TrialRef<'_, D>,
-    ) -> Option<Charged> {
+    ) -> Option<TrialCost> {
         let price = if let Some(known) = self.by_model.get(model) {
             *known
         } else {
@@ -46,21 +46,21 @@ impl<'m> PricedRun<'m> {
             self.by_model.insert(model.to_owned(), price);
             price
         };
-        price.map(|price| Charged::new(price, self.prices.batch, trial))
+        price.map(|price| TrialCost::new(price, self.prices.batch, trial))
     }
 }
 
 /// The cost of a trial, in US dollars.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Charged {
-    /// `None` without a reply, or if the server did not state its tokens.
+pub(super) struct TrialCost {
+    /// Cost of the reply; `None` without a reply, or if the server did not report its tokens.
     pub(super) reply: Option<f64>,
-    /// The cost of attempts without a usable reply; `None` if there are none.
+    /// Cost of attempts without a usable reply; `None` if there were none.
     pub(super) lost: Option<f64>,
 }
 
-impl Charged {
-    /// The cost at a price; `batch` is the share of it that a batch costs.
+impl TrialCost {
+    /// The cost of a trial at a price. `batch` is the price of a batch request as a fraction of the direct price.
     fn new<D: Detail>(price: Price, batch: f64, trial: TrialRef<'_, D>) -> Self {
         let share = match trial.via() {
             Via::Direct | Via::File => 1.0,
@@ -75,7 +75,7 @@ impl Charged {
     }
 }
 
-/// The price of a model of a run: the one that its file of models states, else that of the table by the name that the endpoint knows.
+/// The price of a model of a run: from the run's models file, else from the price table by the name that the endpoint knows.
 pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
     let stated = manifest
         .settings
@@ -93,9 +93,12 @@ pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Opt
     stated.or_else(|| prices.find(id.unwrap_or(model)))
 }
 
-/// The cost of a run's replies at the prices that the run had, as text, attempts without a usable reply included; `None` if no model of the run has a known
-/// price.
-pub(super) fn cost<'t, D: Detail + 't>(
+/// The cost of a run's trials at the prices in its manifest, as text. Attempts without a usable reply are included. `None` if no model of
+/// the run has a known price.
+///
+/// # Errors
+/// If the prices in the manifest are invalid.
+pub(super) fn cost_text<'t, D: Detail + 't>(
     trials: impl Iterator<Item = TrialRef<'t, D>>,
     manifest: &RunManifest,
 ) -> Result<Option<String>> {
@@ -103,15 +106,15 @@ pub(super) fn cost<'t, D: Detail + 't>(
     let (mut dollars, mut counted, mut unknown) = (0.0, 0_usize, 0_usize);
     let (mut lost_dollars, mut attempts) = (0.0, 0_u32);
     for trial in trials.filter(|trial| trial.has_reply() || !trial.lost().is_none()) {
-        let charged = run.charged(trial.model(), trial);
-        match charged.and_then(|charged| charged.reply) {
-            Some(cost) => {
-                dollars += cost;
+        let cost = run.trial_cost(trial.model(), trial);
+        match cost.and_then(|cost| cost.reply) {
+            Some(reply) => {
+                dollars += reply;
                 counted += 1;
             }
             None => unknown += usize::from(trial.has_reply()),
         }
-        if let Some(lost) = charged.and_then(|charged| charged.lost) {
+        if let Some(lost) = cost.and_then(|cost| cost.lost) {
             lost_dollars += lost;
             attempts = u32::saturating_add(attempts, trial.lost().attempts);
         }

@@ -1,4 +1,4 @@
-//! How the enhancers of runs were used, in words: [`rows`] and [`enhancer_alerts`].
+//! Use of the enhancers of runs, in words: [`rows`] and [`enhancer_alerts`].
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::counted;
 use crate::types::manifests::{ELSEWHERE, EnhancerNote, JudgedImages, ProbeOutcome, TRAINED_ON};
 
-/// A row for each enhancer; several runs that used it in the same way have one.
+/// One row for each enhancer and way of using it. Runs that used it in the same way share a row.
 pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
     let mut rows: Vec<(EnhancerRow, BTreeSet<&str>)> = Vec::new();
     for (run, name, note) in notes(runs) {
@@ -22,7 +22,7 @@ pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
             None => rows.push((row, BTreeSet::from([&*run.name]))),
         }
     }
-    // The order of the runs does not matter.
+    // The result must not depend on the order of the runs.
     rows.sort_by(|(one, in_one), (other, in_other)| {
         (&one.name, in_one).cmp(&(&other.name, in_other))
     });
@@ -63,7 +63,7 @@ pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
         for remark in &note.remarks {
             add(format!("{name}: {remark}."));
         }
-        if let Some(ranges) = assumed(note) {
+        if let Some(ranges) = assumed_ranges(note) {
             add(format!(
                 "{name}: {ranges} assumed. Neither sidecar nor preset states its value ranges, and its images of dark frames are plausible with {ranges}."
             ));
@@ -94,32 +94,34 @@ fn notes(runs: &[JoinedRun]) -> impl Iterator<Item = (&JoinedRun, &str, &Enhance
     })
 }
 
-/// How a model was fed and read, each with its source.
+/// The conventions for a network's input and output, each with its source.
 fn how(note: &EnhancerNote) -> String {
-    let said = |key: &str, before: &str| {
+    let convention = |key: &str, before: &str| {
         let line = note.convention.iter().find(|line| line.key == key)?;
         Some(format!("{before}{} ({})", line.value, line.source))
     };
-    let parts = [
-        said(ELSEWHERE, "enhanced "),
-        said("preset", "preset "),
-        said(TRAINED_ON, "trained on "),
-        said("range_in", "fed "),
-        said("color", "colours "),
-        said("input = ", "input = "),
-        said("channels", "channels "),
-        said("range_out", "read as "),
-        said("image = ", "image = "),
-        said("rounding", "to bytes: "),
-        unread(note),
+    [
+        convention(ELSEWHERE, "enhanced "),
+        convention("preset", "preset "),
+        convention(TRAINED_ON, "trained on "),
+        convention("range_in", "fed "),
+        convention("color", "colours "),
+        convention("input = ", "input = "),
+        convention("channels", "channels "),
+        convention("range_out", "read as "),
+        convention("image = ", "image = "),
+        convention("rounding", "to bytes: "),
+        unread_outputs(note),
         Some(note.sizes.clone()).filter(|sizes| !sizes.is_empty()),
-    ];
-    let parts: Vec<String> = parts.into_iter().flatten().collect();
-    parts.join("; ")
+    ]
+    .into_iter()
+    .flatten()
+    .collect::<Vec<_>>()
+    .join("; ")
 }
 
-/// The value ranges that are assumed; `None` if they are stated.
-fn assumed(note: &EnhancerNote) -> Option<String> {
+/// The assumed value ranges, joined by "and"; `None` if none is assumed.
+fn assumed_ranges(note: &EnhancerNote) -> Option<String> {
     let ranges: BTreeSet<&str> = note
         .convention
         .iter()
@@ -130,8 +132,8 @@ fn assumed(note: &EnhancerNote) -> Option<String> {
     (!ranges.is_empty()).then(|| ranges.join(" and "))
 }
 
-/// The outputs of the graph that are not read; `None` if all are.
-fn unread(note: &EnhancerNote) -> Option<String> {
+/// The outputs of the graph that are not read; `None` if all are read.
+fn unread_outputs(note: &EnhancerNote) -> Option<String> {
     let outputs: Vec<&str> = note
         .convention
         .iter()
@@ -141,7 +143,7 @@ fn unread(note: &EnhancerNote) -> Option<String> {
     (!outputs.is_empty()).then(|| format!("not read: {}", outputs.join(", ")))
 }
 
-/// The look of the probe's and the run's images of dark frames.
+/// The results of checking the enhanced images of the probe and of the run.
 fn looks(note: &EnhancerNote) -> String {
     let probe = match &note.probe {
         None => "no probe was run".to_owned(),
@@ -173,7 +175,7 @@ fn looks(note: &EnhancerNote) -> String {
     }
 }
 
-/// The flaws with their numbers, and a few of the images.
+/// The number of images with each flaw, and a few examples.
 fn flaws(judged: &JudgedImages) -> String {
     let flaws: Vec<String> = judged
         .flawed

@@ -1,11 +1,11 @@
-//! Joining several runs of either kind: [`join`].
+//! Joins several runs of either kind: [`join`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::PathBuf;
 
-use super::cost::cost;
-use super::lights::Lights;
-use super::models::Names;
+use super::cost::cost_text;
+use super::image_groups::ImageGroups;
+use super::model_names::ModelNames;
 use crate::error::Result;
 use crate::runs::stored::{RunLayout, RunTexts, StoredRun};
 use crate::types::manifests::RunManifest;
@@ -15,21 +15,21 @@ use crate::types::{
 };
 use darkqa_score::answers::record::Detail;
 
-/// The runs, with all trials, questions and thumbnails.
+/// Joined runs, with all their trials, questions and thumbnails.
 pub(super) struct Joined<D: Detail> {
-    /// The runs in the order in which they were named.
+    /// The runs in the order in which they were given.
     pub(super) runs: Vec<JoinedRun>,
     pub(super) trials: Trials<D>,
-    /// The texts of the replies, by the number of the file in the place of a text.
+    /// The texts of the replies, by the file number in [`TextPlace::log`](crate::types::TextPlace).
     pub(super) texts: Vec<RunTexts<D>>,
     pub(super) questions: Vec<RunQuestion>,
     pub(super) thumbnails: Vec<Thumbnail>,
     pub(super) fidelity: Vec<ImageFidelity>,
-    /// The images that differ between runs.
-    pub(super) lights: Lights,
-    /// The models that stand apart.
-    pub(super) models: Names,
-    /// The order, groups and marks of the models; by default none.
+    /// The groups of runs whose images are equal.
+    pub(super) image_groups: ImageGroups,
+    /// The names of the models in the report.
+    pub(super) model_names: ModelNames,
+    /// The order, groups and marks of the models; empty by default.
     pub(super) listing: ModelListing,
 }
 
@@ -40,30 +40,28 @@ pub(super) struct JoinedRun {
     pub(super) name: String,
     pub(super) manifest: RunManifest,
     pub(super) cost: Option<String>,
-    /// The questions of the run, of which [`Joined::questions`] holds each once; none of a single run.
+    /// The questions of the run; empty if only one run is reported, whose questions are in [`Joined::questions`].
     pub(super) questions: Vec<RunQuestion>,
-    /// Places of its trials among those of all runs. A trial that several runs have is stored once, and listed by each.
+    /// Indices of the run's trials in [`Joined::trials`]. A trial that several runs share has the same index in each.
     pub(super) trials: TrialPlaces,
-    /// Number of its replies.
+    /// Number of replies.
     pub(super) replies: usize,
-    /// Number of its replies that no run before it by name has.
+    /// Number of replies that no earlier run has, in the order of run names.
     pub(super) added: usize,
-    /// The names that servers gave for each model, by the name under which it was asked.
+    /// The names that servers reported for each model, by the name under which it was asked.
     pub(super) served: BTreeMap<String, BTreeSet<String>>,
-    /// The models whose trials are not shown.
+    /// The models whose trials are left out.
     pub(super) left_out: BTreeSet<String>,
 }
 
-/// The places of the trials of a run among those of all runs.
+/// Indices of the trials of a run among those of all runs.
 pub(super) enum TrialPlaces {
-    /// All of so many.
+    /// All trials, with their number.
     All(usize),
-    /// Some of them.
     Some(Vec<u32>),
 }
 
 impl TrialPlaces {
-    /// The places.
     pub(super) fn iter(&self) -> impl Iterator<Item = usize> {
         let (all, some) = match self {
             Self::All(count) => (0..*count, &[][..]),
@@ -72,7 +70,6 @@ impl TrialPlaces {
         all.chain(some.iter().map(|place| *place as usize))
     }
 
-    /// Number of places.
     pub(super) fn len(&self) -> usize {
         match self {
             Self::All(count) => *count,
@@ -81,29 +78,31 @@ impl TrialPlaces {
     }
 }
 
-/// Joins runs. Conditions whose images differ between runs are kept apart ([`Lights`]), and so are models that were asked in
-/// different ways or gave other replies to the same trials ([`Names`]). A trial to which two runs have the same reply counts once.
-/// Only trials that are `compared` decide about models.
+/// Joins runs. Conditions whose images differ between runs are split ([`ImageGroups`]), and so are models that were asked in different ways
+/// or gave different replies to the same trials ([`ModelNames`]). A trial to which two runs have the same reply counts once. Models are
+/// compared only by the trials for which `is_compared` returns true.
 ///
-/// The result does not depend on the order of the runs, but for the order of [`Joined::runs`].
+/// Only the order of [`Joined::runs`] depends on the order of `runs`.
 pub(super) fn join<D: Detail>(
     mut runs: Vec<StoredRun<D>>,
-    compared: impl Fn(TrialRef<'_, D>) -> bool,
+    is_compared: impl Fn(TrialRef<'_, D>) -> bool,
 ) -> Result<Joined<D>> {
-    let names = names(&runs);
+    let names = distinct_names(&runs);
     let mut order: Vec<usize> = (0..runs.len()).collect();
     order.sort_by(|one, other| {
         (&names[*one], &runs[*one].folder).cmp(&(&names[*other], &runs[*other].folder))
     });
-    let lights = Lights::new(&runs, &names, &order);
-    for (index, run) in runs.iter_mut().enumerate().filter(|_| !lights.is_one()) {
-        run.trials
-            .change_conditions(|condition| lights.mark(condition, index));
-        for thumbnail in &mut run.thumbnails {
-            lights.mark(&mut thumbnail.condition, index);
+    let image_groups = ImageGroups::new(&runs, &names, &order);
+    if image_groups.is_split() {
+        for (index, run) in runs.iter_mut().enumerate() {
+            run.trials
+                .change_conditions(|condition| image_groups.mark(condition, index));
+            for thumbnail in &mut run.thumbnails {
+                image_groups.mark(&mut thumbnail.condition, index);
+            }
         }
     }
-    let models = Names::new(&runs, &names, &order, &compared);
+    let model_names = ModelNames::new(&runs, &names, &order, &is_compared);
     let mut joined = Joined {
         runs: Vec::new(),
         trials: Trials::default(),
@@ -111,13 +110,13 @@ pub(super) fn join<D: Detail>(
         questions: Vec::new(),
         thumbnails: Vec::new(),
         fidelity: Vec::new(),
-        lights,
-        models,
+        image_groups,
+        model_names,
         listing: ModelListing::default(),
     };
-    let mut known = Known {
+    let mut known = AlreadyJoined {
         trials: (runs.len() > 1).then(HashMap::new),
-        ..Known::default()
+        ..AlreadyJoined::default()
     };
     let mut runs: Vec<Option<StoredRun<D>>> = runs.into_iter().map(Some).collect();
     let mut by_name = Vec::new();
@@ -132,18 +131,18 @@ pub(super) fn join<D: Detail>(
     Ok(joined)
 }
 
-/// Trials of the runs that are already joined, so that nothing is added twice.
+/// Trials, questions and thumbnails of the runs joined so far, so that none is added twice.
 #[derive(Default)]
-struct Known {
-    /// Places of the trials with a reply, by key and by the group of the model's name; `None` of a single run, which has each trial once.
+struct AlreadyJoined {
+    /// Indices of the trials with a reply, by key and number of the model's group; `None` if there is only one run.
     trials: Option<HashMap<(TrialKey, usize), u32>>,
     questions: HashMap<QuestionId, usize>,
     thumbnails: BTreeSet<(FrameId, Condition)>,
 }
 
 impl<D: Detail> Joined<D> {
-    /// Adds the questions of a run that no run before it has.
-    fn add_questions(&mut self, own: &[RunQuestion], known: &mut Known) {
+    /// Adds the questions of a run that no earlier run has, and fills in missing groups and scenes of the others.
+    fn add_questions(&mut self, own: &[RunQuestion], known: &mut AlreadyJoined) {
         for question in own {
             let next = self.questions.len();
             let place = *known.questions.entry(question.id.clone()).or_insert(next);
@@ -166,13 +165,13 @@ impl<D: Detail> Joined<D> {
         run.trials.iter().map(|place| self.trials.at(place))
     }
 
-    /// Adds the trials of a run that no run before it has. Returns the places of all of its trials, and the numbers of its replies and
-    /// of those that are new.
+    /// Adds the trials of a run that no earlier run has. Returns the indices of all its trials, the number of its replies, and the number
+    /// of new replies.
     fn add_trials(
         &mut self,
         mut own: Trials<D>,
         index: usize,
-        known: &mut Known,
+        known: &mut AlreadyJoined,
     ) -> (TrialPlaces, usize, usize) {
         let replies = own.iter().filter(|trial| !trial.failed()).count();
         if known.trials.is_none() {
@@ -182,9 +181,9 @@ impl<D: Detail> Joined<D> {
             return (places, replies, replies);
         }
         let key = |trial: TrialRef<'_, D>| {
-            let group = self.models.group(trial.model(), index);
+            let group = self.model_names.group(trial.model(), index);
             let group = group.map_or(0, |(group, _)| group + 1);
-            (self.models.key(trial.key()), group)
+            (self.model_names.first_key(trial.key()), group)
         };
         let mut places = Vec::with_capacity(own.len());
         let mut is_new = Vec::with_capacity(own.len());
@@ -208,12 +207,12 @@ impl<D: Detail> Joined<D> {
             places.push(place);
         }
         own.rename(|model| {
-            self.models
+            self.model_names
                 .group(model, index)
                 .map(|(_, name)| name.clone())
         });
         if self.trials.is_empty() && self.texts.is_empty() {
-            // The trials of the first run stay where they are.
+            // The trials of the first run are moved, not copied.
             let mut is_new = is_new.into_iter();
             own.retain(|_| is_new.next() == Some(true));
             self.trials = own;
@@ -226,16 +225,15 @@ impl<D: Detail> Joined<D> {
         (TrialPlaces::Some(places), replies, added)
     }
 
-    /// Adds what a run has and no run before it.
+    /// Adds the trials, questions and thumbnails of a run that no earlier run has.
     fn add(
         &mut self,
         run: StoredRun<D>,
         index: usize,
         name: String,
-        known: &mut Known,
+        known: &mut AlreadyJoined,
     ) -> Result<JoinedRun> {
-        let charged = run.trials.iter().chain(run.left_out.iter());
-        let cost = cost(charged, &run.manifest)?;
+        let cost = cost_text(run.trials.iter().chain(run.left_out.iter()), &run.manifest)?;
         let left_out = run
             .left_out
             .asked()
@@ -243,7 +241,7 @@ impl<D: Detail> Joined<D> {
             .flatten()
             .map(|(model, _)| model.to_owned())
             .collect();
-        let served = served(&run.trials);
+        let served = served_names(&run.trials);
         let (trials, replies, added) = self.add_trials(run.trials, index, known);
         self.texts.extend(run.texts.by_file());
         let questions = if known.trials.is_some() {
@@ -259,6 +257,7 @@ impl<D: Detail> Joined<D> {
             known.thumbnails.insert(place)
         }));
         if self.fidelity.is_empty() {
+            // Moved, not copied: the list of a large run takes much memory.
             self.fidelity = run.fidelity;
         } else {
             self.fidelity.extend(run.fidelity);
@@ -279,8 +278,8 @@ impl<D: Detail> Joined<D> {
     }
 }
 
-/// The names that servers gave for each model.
-fn served<D: Detail>(trials: &Trials<D>) -> BTreeMap<String, BTreeSet<String>> {
+/// The names that servers reported for each model.
+fn served_names<D: Detail>(trials: &Trials<D>) -> BTreeMap<String, BTreeSet<String>> {
     let pairs: HashSet<(&str, &str)> = trials
         .iter()
         .filter_map(|trial| Some((trial.model(), trial.served_model()?)))
@@ -295,8 +294,8 @@ fn served<D: Detail>(trials: &Trials<D>) -> BTreeMap<String, BTreeSet<String>> {
     served
 }
 
-/// Names of runs: those of their folders, or their paths if two folders have the same name.
-fn names<D: Detail>(runs: &[StoredRun<D>]) -> Vec<String> {
+/// The folder names of runs, or their paths if two folders have the same name.
+fn distinct_names<D: Detail>(runs: &[StoredRun<D>]) -> Vec<String> {
     let short: Vec<String> = runs.iter().map(StoredRun::name).collect();
     let distinct: BTreeSet<&String> = short.iter().collect();
     if distinct.len() == runs.len() {

@@ -1,21 +1,21 @@
-//! The judges of runs of open questions that are joined: marks of two judges are not compared ([`check`]).
+//! Checks that joined runs of open questions were marked by the same judge: [`check_same_judge`].
 
 use std::path::PathBuf;
 
 use serde_json::Value;
 
-use super::settings::{Settings, decisive, differing};
+use super::settings::{Settings, differing_settings, reply_settings};
 use crate::error::{Error, Result};
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::StoredRun;
 use crate::types::OpenDetail;
 use crate::types::manifests::{JUDGES, RunManifest, judge_flag};
 
-/// Checks that all runs were marked by one judge and protocol.
+/// Checks that all runs were marked by the same judge and protocol.
 ///
 /// # Errors
-/// If they were not.
-pub(super) fn check(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
+/// If two judges or protocols differ.
+pub(super) fn check_same_judge(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
     let mut marked: Option<(&PathBuf, [Option<Value>; 2])> = None;
     for run in runs {
         let by = [JUDGE, PROTOCOL].map(|name| run.manifest.settings.get(name).cloned());
@@ -25,9 +25,9 @@ pub(super) fn check(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
                 let problem = format!(
                     "its answers were marked by {} and those of {} by {}: marks of two judges or protocols cannot be compared; report \
                      each run alone, or run openeqa on its folder again with the other's --judge and --protocol: only marks are asked",
-                    judged(&by),
+                    judge_words(&by),
                     other.display(),
-                    judged(other_by)
+                    judge_words(other_by)
                 );
                 return Err(Error::Run { path, problem });
             }
@@ -35,17 +35,17 @@ pub(super) fn check(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
             None => marked = Some((&run.folder, by)),
         }
     }
-    check_one_name(runs)
+    check_same_settings(runs)
 }
 
-/// Checks that judges of one name are the same: their marks are not told apart.
-fn check_one_name(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
+/// Checks that judges of the same name have the same settings, because marks are identified by the judge's name.
+fn check_same_settings(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
     let judges: Vec<Option<Settings>> = runs
         .iter()
         .map(|run| judge_settings(&run.manifest))
         .collect();
     let names: Vec<String> = runs.iter().map(StoredRun::name).collect();
-    let differences = differing(&judges);
+    let differences = differing_settings(&judges);
     let Some(first) = differences.first() else {
         return Ok(());
     };
@@ -58,23 +58,27 @@ fn check_one_name(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
     Err(Error::Run { path, problem })
 }
 
-/// Settings that determine the marks of a run's judge; `None` if no judge was asked, or the run does not state them.
+/// Settings that determine the marks of a run's judge; `None` if no judge was asked, or the manifest does not state them.
 fn judge_settings(manifest: &RunManifest) -> Option<Settings> {
     let judge = manifest.settings.get(JUDGE)?.as_str()?;
-    // Runs of earlier versions have the judge among the models alone.
+    // Runs of earlier versions list the judge only among the models.
     let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
-    let settings = columns.into_iter().flatten().next().map(decisive)?;
-    let of_judge = settings
-        .into_iter()
-        .map(|(flag, value)| (judge_flag(&flag), value));
-    Some(of_judge.collect())
+    let settings = columns.into_iter().flatten().next().map(reply_settings)?;
+    Some(
+        settings
+            .into_iter()
+            .map(|(flag, value)| (judge_flag(&flag), value))
+            .collect(),
+    )
 }
 
 /// A judge and a protocol in words.
-fn judged([judge, protocol]: &[Option<Value>; 2]) -> String {
-    let word = |value: &Option<Value>, other: &str| {
-        let word = value.as_ref().and_then(Value::as_str);
-        word.unwrap_or(other).to_owned()
-    };
-    format!("{} ({})", word(judge, "nobody"), word(protocol, "upstream"))
+fn judge_words([judge, protocol]: &[Option<Value>; 2]) -> String {
+    let judge = judge.as_ref().and_then(Value::as_str);
+    let protocol = protocol.as_ref().and_then(Value::as_str);
+    format!(
+        "{} ({})",
+        judge.unwrap_or("nobody"),
+        protocol.unwrap_or("upstream")
+    )
 }

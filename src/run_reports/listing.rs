@@ -1,18 +1,17 @@
-//! The models of a report as tables list them: [`listing`].
+//! The list of models for the tables of a report: [`listing`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::Value;
 
 use super::join::{Joined, JoinedRun};
-use super::settings::is_of_people;
+use super::settings::has_human_answers;
 use crate::runs::renamed::ADAPTED_FOR;
 use crate::runs::training::training_data;
 use crate::types::{ModelColumn, ModelListing};
 use darkqa_score::answers::record::Detail;
 
-/// The order and the groups of the files of models of all runs, one after the other by the runs' names; and facts about each
-/// model.
+/// The models with their order and groups from the models files of all runs, in the order of the runs' names, and facts about each model.
 pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
     let mut runs: Vec<(usize, &JoinedRun)> = joined.runs.iter().enumerate().collect();
     runs.sort_by_key(|(_, run)| (&run.name, &run.folder));
@@ -20,15 +19,13 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
     let mut listing = ModelListing::new(listed);
     let mut facts = BTreeMap::<(ModelColumn, String), BTreeSet<String>>::new();
     for (index, run) in runs {
-        // The name under which a model stands in the report.
+        // The name of a model in the report.
         let shown = |model: &str| {
-            let group = joined.models.group(model, index);
+            let group = joined.model_names.group(model, index);
             group.map_or_else(|| model.to_owned(), |(_, name)| name.clone())
         };
-        if is_of_people(&run.manifest) {
-            let names = run.manifest.identity.get("--model");
-            let names = names.and_then(Value::as_array).into_iter().flatten();
-            for name in names.filter_map(Value::as_str) {
+        if has_human_answers(&run.manifest) {
+            for name in strings(run.manifest.identity.get("--model")) {
                 listing.add_people(shown(name));
             }
         }
@@ -37,12 +34,7 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
         }
         for (field, changes) in &run.manifest.settings {
             if let Some(model) = field.strip_prefix(ADAPTED_FOR) {
-                let changes = changes
-                    .as_array()
-                    .into_iter()
-                    .flatten()
-                    .filter_map(Value::as_str)
-                    .map(str::to_owned);
+                let changes = strings(Some(changes)).map(str::to_owned);
                 listing.adapted(&shown(model), changes);
             }
         }
@@ -70,4 +62,13 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
         listing.note(column, model, values.join(", "));
     }
     listing
+}
+
+/// The strings in an array; none if the value is missing or not an array.
+fn strings(value: Option<&Value>) -> impl Iterator<Item = &str> {
+    value
+        .and_then(Value::as_array)
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str)
 }

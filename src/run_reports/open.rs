@@ -1,4 +1,4 @@
-//! Report of a run of open questions: scores its records, and writes the report into its folder.
+//! The report on runs of open questions: [`Scores`] scores their records, and [`write()`] writes the report into the folder of a run.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::alerts::{joining_alerts, run_alerts};
-use super::combine::typed;
+use super::combine::command_path;
 use super::enhancers;
 use super::join::join;
 use super::judges;
@@ -24,7 +24,7 @@ use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::outcome::Outcome;
 use crate::runs::outcome::{StdoutFormat, Syntax};
 use crate::runs::predictions::{AnswerState, Prediction, predictions};
-use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort};
+use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials};
 use crate::store::Store;
 use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
@@ -41,7 +41,7 @@ use darkqa_score::open::{
 };
 use darkqa_score::subject::ModelInCondition;
 
-/// Scored answers of a run.
+/// Scored answers of a run, or of several joined into one.
 pub(crate) struct Scores {
     pub(crate) run: OpenRun,
     judge: Option<String>,
@@ -53,7 +53,7 @@ pub(crate) struct Scores {
 }
 
 impl Scores {
-    /// Scores a run by the marks of the judge that its manifest names.
+    /// Scores a run by the marks of the judge in its manifest.
     pub(super) fn new(joined: JoinedRuns) -> Result<Self> {
         let JoinedRuns {
             run,
@@ -126,7 +126,7 @@ impl Scores {
             judge: self.judge.as_deref(),
             protocol: self.protocol,
             runs: self.run.runs(),
-            folder: typed(&self.run.folder),
+            folder: command_path(&self.run.folder),
             questions: &self.run.questions,
             answers: &self.answers,
             thumbnails: &self.run.thumbnails,
@@ -140,7 +140,7 @@ impl Scores {
     }
 
     /// Files of the report, including the JSON summary, and the report as Markdown.
-    pub(super) fn whole(&self) -> Result<WholeReport> {
+    pub(super) fn whole_report(&self) -> Result<WholeReport> {
         let report = self.report();
         let tables = tables(&report);
         Ok(WholeReport {
@@ -150,12 +150,12 @@ impl Scores {
     }
 
     /// Text of the report for standard output.
-    pub(crate) fn shown(&self, show: StdoutFormat) -> Result<String> {
+    pub(crate) fn stdout_text(&self, show: StdoutFormat) -> Result<String> {
         let report = self.report();
-        self.stdout_text(&report, &tables(&report), show)
+        self.formatted(&report, &tables(&report), show)
     }
 
-    fn stdout_text(
+    fn formatted(
         &self,
         report: &OpenReport<'_>,
         tables: &[Table],
@@ -178,7 +178,7 @@ impl Scores {
         let report = self.report();
         let tables = tables(&report);
         target.write(&files(&report, &tables)?, &self.run.manifest)?;
-        let mut text = self.stdout_text(&report, &tables, show)?;
+        let mut text = self.formatted(&report, &tables, show)?;
         if !show.is_document() {
             let page = target.path().join(PAGE);
             let _ = writeln!(text, "report: {}", page.display());
@@ -247,13 +247,13 @@ pub(super) struct JoinedRuns {
 /// # Errors
 /// If the runs have different judges or protocols, or different questions under the same name.
 pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
-    judges::check(&runs)?;
+    judges::check_same_judge(&runs)?;
     check_questions(&runs)?;
     let joined = join(runs, is_answer)?;
     let mut alerts = run_alerts(&joined);
     alerts.extend(joining_alerts(&joined));
     if joined.runs.len() == 1 {
-        // The text and the page of a single run describe the missing part in more detail.
+        // The text and the page of a single run describe what is missing in more detail.
         alerts.retain(|alert| alert.kind != AlertKind::NotComplete);
     }
     let enhancers = enhancers::rows(&joined.runs);
@@ -264,14 +264,14 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         .ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let mut trials = joined.trials;
     let ids = joined.questions.iter().map(|question| &question.id);
-    sort(&mut trials, ids, &first.manifest.models);
+    sort_trials(&mut trials, ids, &first.manifest.models);
     let mut records: Vec<Record<OpenDetail>> = trials.iter().map(TrialRef::record).collect();
-    // Marks keep the name under which the judge was asked: a model that has two names in the report may also be the judge.
+    // Marks keep the name under which the judge was asked, because a model listed under two names may also be the judge.
     for record in records
         .iter_mut()
         .filter(|record| record.detail.step == Step::Mark)
     {
-        record.model = joined.models.asked(&record.model).to_owned();
+        record.model = joined.model_names.original_name(&record.model).to_owned();
     }
     let run = OpenRun {
         records,
@@ -338,12 +338,12 @@ pub(crate) fn write(
     .in_format(show))
 }
 
-/// True if the trial asked for an answer, false if it asked for a mark.
+/// True if the trial asked for an answer, false if it asked for a mark. `TrialRef::is_answer` does not coerce to the `Fn` that [`join`] takes.
 fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
     trial.is_answer()
 }
 
-/// Marks that the judge of a run gave, without failed ones.
+/// Successful marks by the judge of a run.
 fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<OpenDetail>> {
     let mut marks = MarkIndex::new(&run.questions);
     for record in &run.records {

@@ -1,4 +1,4 @@
-//! Where the report of one run goes: [`ReportFolder`], [`write_in_place`].
+//! The folder that the report on one run is written into: [`ReportFolder`], [`write_in_place`].
 
 use std::path::Path;
 
@@ -9,24 +9,23 @@ use crate::store::{AddressChange, Store};
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::record::Detail;
 
-/// The folder that the report of one run is written into.
+/// The folder that the report on one run is written into.
 pub(super) enum ReportFolder<'a, D: Detail> {
     /// The folder of the run.
     Run(&'a Store<D>),
-    /// The folder of its parts. Each part has its own manifest, so that the folder is no run.
-    Parts(&'a Path),
+    /// The folder with the shards of the run. Each shard has its own manifest; the folder has none.
+    Shards(&'a Path),
 }
 
 impl<D: Detail> ReportFolder<'_, D> {
-    /// Its path.
     pub(super) fn path(&self) -> &Path {
         match self {
             Self::Run(store) => store.folder(),
-            Self::Parts(folder) => folder,
+            Self::Shards(folder) => folder,
         }
     }
 
-    /// Writes the files of a report, and the manifest that the run has now.
+    /// Writes the files of a report and, into the folder of a run, the manifest.
     ///
     /// # Errors
     /// If a file cannot be written.
@@ -38,7 +37,7 @@ impl<D: Detail> ReportFolder<'_, D> {
         for (name, content) in contents {
             match self {
                 Self::Run(store) => store.write(name, content)?,
-                Self::Parts(folder) => {
+                Self::Shards(folder) => {
                     let path = folder.join(name);
                     refuse_link(folder, &path)?;
                     files::write(&path, content)?;
@@ -47,12 +46,12 @@ impl<D: Detail> ReportFolder<'_, D> {
         }
         match self {
             Self::Run(store) => store.write_manifest(manifest),
-            Self::Parts(_) => Ok(()),
+            Self::Shards(_) => Ok(()),
         }
     }
 }
 
-/// Refuses to write into a subfolder that is a link: a folder of parts may come from a stranger, and the link may lead anywhere.
+/// Refuses to write into a subfolder that is a symbolic link, because an untrusted folder of shards could redirect the report elsewhere.
 fn refuse_link(folder: &Path, path: &Path) -> Result<()> {
     match path.parent() {
         Some(inner) if inner != folder && inner.is_symlink() => Err(Error::data(
@@ -63,23 +62,24 @@ fn refuse_link(folder: &Path, path: &Path) -> Result<()> {
     }
 }
 
-/// Has the report of one run written where its files are; returns the text for standard output, or `None` if that folder cannot be
-/// written to, which is said.
+/// Calls `write` with the folder of a run; returns the text for standard output, or `None` with a warning if the folder cannot be written
+/// to.
 ///
 /// # Errors
-/// If the report cannot be made.
+/// If `write` fails for a run that could be opened for writing.
 pub(super) fn write_in_place<D: Detail>(
-    (folder, layout): (&Path, RunLayout),
+    folder: &Path,
+    layout: RunLayout,
     manifest: &RunManifest,
     write: impl FnOnce(&ReportFolder<'_, D>) -> Result<String>,
 ) -> Result<Option<String>> {
     let written = match layout {
         RunLayout::Whole => match Store::open_read(folder, manifest, AddressChange::Allowed) {
             Ok(store) => return write(&ReportFolder::Run(&store)).map(Some),
-            // A run that another process writes, or in a read-only folder, is shown anyway.
+            // A run that another process is writing, or in a read-only folder, is still reported on standard output.
             Err(error) => Err(error),
         },
-        RunLayout::Parts => write(&ReportFolder::Parts(folder)),
+        RunLayout::Shards => write(&ReportFolder::Shards(folder)),
     };
     Ok(match written {
         Ok(text) => Some(text),

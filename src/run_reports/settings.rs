@@ -1,4 +1,4 @@
-//! Comparison of the settings in the manifests of several runs: [`differing`] returns each [`Setting`] that differs.
+//! Comparison of the settings in the manifests of several runs: [`differing_settings`] returns each [`Setting`] that differs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use crate::types::manifests::{JUDGES, RunManifest};
 /// Values of settings as text, by flag.
 pub(super) type Settings = BTreeMap<String, String>;
 
-/// Manifest field of human answers: the identity of the run whose images people saw.
+/// Manifest field of human answers, with the identity of the run whose images people saw.
 const ASKED_ABOUT: &str = "people asked about";
 
 /// Fields of a run's identity that determine the size and encoding of every image.
@@ -66,14 +66,18 @@ impl Setting {
         }
         let values: Vec<String> = by_value
             .into_iter()
-            .map(|(value, runs)| format!("{} in {}", short(value), listed(&runs)))
+            .map(|(value, runs)| format!("{} in {}", shorten(value), joined_with_and(&runs)))
             .collect();
-        format!("{} is {}", spelled_setting(&self.flag), listed(&values))
+        format!(
+            "{} is {}",
+            spelled_setting(&self.flag),
+            joined_with_and(&values)
+        )
     }
 }
 
 /// Joins texts for a sentence: `a`, `a and b`, `a, b and c`.
-pub(super) fn listed<T: AsRef<str>>(texts: &[T]) -> String {
+pub(super) fn joined_with_and<T: AsRef<str>>(texts: &[T]) -> String {
     let texts: Vec<&str> = texts.iter().map(AsRef::as_ref).collect();
     match &*texts {
         [] => String::new(),
@@ -84,7 +88,7 @@ pub(super) fn listed<T: AsRef<str>>(texts: &[T]) -> String {
 
 /// Settings whose values differ between runs. Runs that are `None` are skipped. A setting of a column value is compared only between
 /// runs that have the value.
-pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
+pub(super) fn differing_settings(runs: &[Option<Settings>]) -> Vec<Setting> {
     let flags: BTreeSet<&String> = runs.iter().flatten().flat_map(BTreeMap::keys).collect();
     flags
         .into_iter()
@@ -94,10 +98,7 @@ pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
                 .iter()
                 .enumerate()
                 .filter_map(|(run, settings)| {
-                    let settings = settings.as_ref()?;
-                    let value = settings.get(flag).map(String::as_str);
-                    let unset = applies(settings, flag).then_some(UNSET);
-                    Some((run, value.or(unset)?.to_owned()))
+                    Some((run, value_or_unset(settings.as_ref()?, flag)?))
                 })
                 .collect(),
         })
@@ -110,16 +111,22 @@ pub(super) fn differing(runs: &[Option<Settings>]) -> Vec<Setting> {
         .collect()
 }
 
-/// True if a setting applies to a run: it belongs to no column value, or to one that the run has.
-fn applies(settings: &Settings, flag: &str) -> bool {
-    flag.split_once(OF).is_none_or(|(_, value)| {
-        let mut own = settings.keys().filter_map(|flag| flag.split_once(OF));
-        own.any(|(_, own)| own == value)
-    })
+/// Value of a setting; [`UNSET`] if the run does not have it. `None` if the setting belongs to a column value that the run does not have.
+fn value_or_unset(settings: &Settings, flag: &str) -> Option<String> {
+    if let Some(value) = settings.get(flag) {
+        return Some(value.clone());
+    }
+    let applies = flag.split_once(OF).is_none_or(|(_, value)| {
+        settings
+            .keys()
+            .filter_map(|flag| flag.split_once(OF))
+            .any(|(_, own)| own == value)
+    });
+    applies.then(|| UNSET.to_owned())
 }
 
 /// Identity of a run; for human answers, the identity of the run whose images people saw.
-pub(super) fn identity(run: &RunManifest) -> Settings {
+pub(super) fn identity_settings(run: &RunManifest) -> Settings {
     match run.identity.get(ASKED_ABOUT) {
         Some(Value::Object(asked)) => asked.iter().map(field).collect(),
         _ => run.identity.iter().map(field).collect(),
@@ -127,38 +134,46 @@ pub(super) fn identity(run: &RunManifest) -> Settings {
 }
 
 /// True if the records of a run are human answers about the images of another run.
-pub(crate) fn is_of_people(run: &RunManifest) -> bool {
+pub(crate) fn has_human_answers(run: &RunManifest) -> bool {
     run.identity.contains_key(ASKED_ABOUT)
 }
 
 /// Selected fields of a run's identity.
-pub(super) fn some(run: &RunManifest, fields: &[&str]) -> Settings {
-    let mut settings = identity(run);
+pub(super) fn identity_fields(run: &RunManifest, fields: &[&str]) -> Settings {
+    let mut settings = identity_settings(run);
     settings.retain(|flag, _| fields.contains(&flag.as_str()));
     settings
 }
 
 /// Settings of a run that determine its images, except size and encoding. Noise settings are included only if the noise profiles of
 /// `runs` differ.
-pub(super) fn light(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
+pub(super) fn light_settings(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     let variants = column_settings(run, VARIANT);
-    let parts = [pixels(run), noise(run, runs), variants, enhancers(run)];
+    let parts = [
+        pixel_settings(run),
+        noise_settings(run, runs),
+        variants,
+        enhancer_settings(run),
+    ];
     parts.into_iter().flatten().collect()
 }
 
 /// Settings that determine the pixels of all degraded images.
-pub(super) fn pixels(run: &RunManifest) -> Settings {
-    some(run, &PIXEL_FIELDS)
+pub(super) fn pixel_settings(run: &RunManifest) -> Settings {
+    identity_fields(run, &PIXEL_FIELDS)
 }
 
 /// Noise settings of a run: the flags as the user wrote them, and the content of its noise profiles. Empty if the noise profiles of
 /// `runs` are equal, or if this run has none.
-pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
+pub(super) fn noise_settings(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     let profiles = |run: &RunManifest| run.columns.get("reading").cloned();
     let own = profiles(run);
-    let mut others = runs.iter().filter_map(|other| profiles(other));
     // Equal profiles are the same noise, even if only one run writes out a default.
-    if own.is_none() || others.all(|other| Some(&other) == own.as_ref()) {
+    let are_equal = runs
+        .iter()
+        .filter_map(|other| profiles(other))
+        .all(|other| Some(&other) == own.as_ref());
+    if own.is_none() || are_equal {
         return Settings::new();
     }
     let mut settings: Settings = NOISE_FLAGS
@@ -173,19 +188,19 @@ pub(super) fn noise(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
 }
 
 /// Settings of the noise profiles and of the degradation kinds that are not in the paper.
-pub(super) fn readings_and_variants(run: &RunManifest) -> Settings {
+pub(super) fn profile_and_variant_settings(run: &RunManifest) -> Settings {
     let mut settings = column_settings(run, "reading");
     settings.extend(column_settings(run, VARIANT));
     settings
 }
 
 /// Settings of the enhancers.
-pub(super) fn enhancers(run: &RunManifest) -> Settings {
+pub(super) fn enhancer_settings(run: &RunManifest) -> Settings {
     column_settings(run, "enhancer")
 }
 
 /// Settings of a degradation kind that is not in the paper; empty for other kinds.
-pub(super) fn variant(run: &RunManifest, kind: Kind) -> Settings {
+pub(super) fn variant_settings(run: &RunManifest, kind: Kind) -> Settings {
     let mut settings = column_settings(run, VARIANT);
     settings.retain(|flag, _| flag.ends_with(&format!("{OF}{kind}")));
     settings
@@ -201,26 +216,22 @@ fn column_settings(run: &RunManifest, column: &str) -> Settings {
 }
 
 /// Removes the noise settings of column values if a noise flag differs, because the flag already explains them.
-pub(super) fn without_repeated(mut settings: Vec<Setting>) -> Vec<Setting> {
-    let is_written = |setting: &Setting| {
-        NOISE_FLAGS
-            .iter()
-            .any(|flag| setting.flag == format!("--{flag}"))
-    };
-    if settings.iter().any(is_written) {
-        let is_noise = |setting: &Setting| {
-            let flag = setting.flag.split(OF).next().unwrap_or_default();
-            NOISE_FLAGS
-                .iter()
-                .any(|written| flag.contains(&format!("--{written}")))
-        };
-        settings.retain(|setting| !setting.flag.contains(OF) || !is_noise(setting));
+pub(super) fn without_explained(mut settings: Vec<Setting>) -> Vec<Setting> {
+    let noise_flags = NOISE_FLAGS.map(|flag| format!("--{flag}"));
+    if settings
+        .iter()
+        .any(|setting| noise_flags.contains(&setting.flag))
+    {
+        settings.retain(|setting| match setting.flag.split_once(OF) {
+            Some((flag, _)) => !noise_flags.iter().any(|noise| flag.contains(noise)),
+            None => true,
+        });
     }
     settings
 }
 
 /// Settings that determine a model's replies, except question and images. `None` if the manifest does not have the model.
-pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
+pub(super) fn model_settings(run: &RunManifest, model: &str) -> Option<Settings> {
     let content = run.columns.get("model")?.get(model)?;
     // A built-in model answers by rules and reads no prompt.
     let asked_by = if run.is_built_in(model) {
@@ -228,12 +239,12 @@ pub(super) fn parameters(run: &RunManifest, model: &str) -> Option<Settings> {
     } else {
         "--prompts"
     };
-    let shared = some(run, &[asked_by]);
-    Some(decisive(content).into_iter().chain(shared).collect())
+    let shared = identity_fields(run, &[asked_by]);
+    Some(reply_settings(content).into_iter().chain(shared).collect())
 }
 
 /// Settings of a model, without its base URL and name.
-pub(super) fn decisive(content: &Value) -> Settings {
+pub(super) fn reply_settings(content: &Value) -> Settings {
     leaves(content)
         .filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()))
         .collect()
@@ -241,7 +252,7 @@ pub(super) fn decisive(content: &Value) -> Settings {
 
 /// Settings of all models of a run that have a base URL, without judges; different values of a flag are joined with "or". `None` if
 /// the run has no such model.
-pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
+pub(super) fn remote_model_settings(run: &RunManifest) -> Option<Settings> {
     let models = run.columns.get("model")?;
     let mut values = BTreeMap::<String, BTreeSet<String>>::new();
     let mut has_remote = false;
@@ -253,7 +264,7 @@ pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
             continue;
         }
         has_remote = true;
-        for (flag, value) in decisive(content) {
+        for (flag, value) in reply_settings(content) {
             values.entry(flag).or_default().insert(value);
         }
     }
@@ -269,7 +280,7 @@ pub(super) fn parameter_flags(run: &RunManifest) -> Option<Settings> {
 }
 
 /// Base URL at which a run asks a model, without user, password and query.
-pub(super) fn address(run: &RunManifest, model: &str) -> Option<String> {
+pub(super) fn base_url(run: &RunManifest, model: &str) -> Option<String> {
     let content = run.columns.get("model")?.get(model)?;
     content.get("--base-url").map(text)
 }
@@ -314,7 +325,7 @@ fn text(value: &Value) -> String {
 }
 
 /// Shortens a value for a message: a digest to its first eight digits, a long text to its start.
-pub(super) fn short(value: &str) -> String {
+pub(super) fn shorten(value: &str) -> String {
     if is_digest(value) {
         return format!("{}…", &value[..8]);
     }
@@ -347,21 +358,21 @@ mod tests {
             settings(None),
         ];
         let names = ["a", "b", "c", "d", "e"].map(str::to_owned);
-        let [setting] = &*differing(&runs) else {
+        let [setting] = &*differing_settings(&runs) else {
             panic!("one setting differs");
         };
         assert_eq!(
             setting.words(&names),
             "--seed is 0 in a and c, 1 in b and unset in e"
         );
-        assert!(differing(&[runs[0].clone(), runs[2].clone(), None]).is_empty());
+        assert!(differing_settings(&[runs[0].clone(), runs[2].clone(), None]).is_empty());
     }
 
     #[test]
     fn digests_are_shortened_and_objects_flattened() {
         let content = serde_json::json!({"--llie": "ab".repeat(32), "--camera": {"name": "a7", "gain": null}});
         let found: Vec<_> = leaves(&content)
-            .map(|(flag, value)| (flag, short(&value)))
+            .map(|(flag, value)| (flag, shorten(&value)))
             .collect();
         let expected = [("--camera (name)", "a7"), ("--llie", "abababab…")];
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The curves of the picture that tells a run's story: [`story_curves`].
+//! The curves of a run's story figure: [`story_curves`].
 
 use super::combine::combine;
 use crate::drawing::figures::{self, StoryCurves};

@@ -1,8 +1,8 @@
-//! The whole report of one run, of either experiment: [`whole`].
+//! The report on one run of either experiment, with all its files: [`whole_report`].
 
 use super::alerts::alerts;
 use super::combine::combine;
-use super::whole_report::{WholeReport, shown};
+use super::whole_report::{WholeReport, without_hidden_models};
 use super::{choice, enhancers, open, own_answers};
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
@@ -12,11 +12,11 @@ use crate::runs::stored::{AnyRun, StoredRun};
 use crate::tables::{FLIPS, write_flips};
 use crate::types::{ChoiceDetail, OpenDetail, Truths};
 
-/// The report of a run with the models that it shows now.
+/// The report on a run, without the models that are no longer in the models file.
 ///
 /// # Errors
 /// If the run has no record, or a record is broken.
-pub(crate) fn whole(run: AnyRun) -> Result<WholeReport> {
+pub(crate) fn whole_report(run: AnyRun) -> Result<WholeReport> {
     match run {
         AnyRun::Choice(run) => choice_report(run),
         AnyRun::Open(run) => open_report(run),
@@ -24,9 +24,9 @@ pub(crate) fn whole(run: AnyRun) -> Result<WholeReport> {
 }
 
 fn choice_report(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
-    let combined = combine(vec![shown(run)?])?;
+    let combined = combine(vec![without_hidden_models(run)?])?;
     if combined.truths() == Truths::Unknown {
-        return own_answers::whole(&combined);
+        return own_answers::whole_report(&combined);
     }
     let findings = combined.findings();
     let report = ChoiceReport::new(&findings, alerts(&combined, &findings))
@@ -45,5 +45,5 @@ fn choice_report(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
 }
 
 fn open_report(run: StoredRun<OpenDetail>) -> Result<WholeReport> {
-    open::Scores::new(open::combine(vec![shown(run)?])?)?.whole()
+    open::Scores::new(open::combine(vec![without_hidden_models(run)?])?)?.whole_report()
 }

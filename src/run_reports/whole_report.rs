@@ -1,4 +1,4 @@
-//! The report of one run: [`WholeReport`].
+//! The report on one run, with all its files: [`WholeReport`].
 
 use std::path::PathBuf;
 
@@ -6,18 +6,18 @@ use crate::error::{Error, Result};
 use crate::runs::stored::{ShownModels, StoredRun};
 use darkqa_score::answers::record::Detail;
 
-/// Name of the file with the rows of the summary.
+/// Name of the file with the summary.
 const SUMMARY_JSON: &str = "summary.json";
 
-/// The report of one run.
+/// The report on one run.
 pub(crate) struct WholeReport {
-    /// The files by name, as `report` writes them into the folder of the run.
+    /// Names and contents of the files that `report` writes into the folder of the run.
     pub(crate) files: Vec<(String, Vec<u8>)>,
     /// The findings and the table by level, as Markdown.
     pub(crate) markdown: String,
 }
 
-/// The products of a report, and its summary as JSON, by name.
+/// Adds the summary as JSON to the files of a report.
 pub(super) fn with_summary(
     mut products: Vec<(String, Vec<u8>)>,
     summary: String,
@@ -26,11 +26,11 @@ pub(super) fn with_summary(
     products
 }
 
-/// A run without the models that a report leaves out.
+/// Removes the models that a report leaves out by default.
 ///
 /// # Errors
-/// If the run has no record.
-pub(super) fn shown<D: Detail>(mut run: StoredRun<D>) -> Result<StoredRun<D>> {
+/// If the run has no records.
+pub(super) fn without_hidden_models<D: Detail>(mut run: StoredRun<D>) -> Result<StoredRun<D>> {
     if run.trials.is_empty() {
         return Err(no_records(run.folder));
     }
@@ -38,7 +38,7 @@ pub(super) fn shown<D: Detail>(mut run: StoredRun<D>) -> Result<StoredRun<D>> {
     Ok(run)
 }
 
-/// The error about a run without a record.
+/// The error for a run without records.
 pub(super) fn no_records(path: PathBuf) -> Error {
     let problem = "the run has no records yet: nothing to report".to_owned();
     Error::Run { path, problem }

@@ -5,16 +5,20 @@ use std::num::NonZeroU32;
 
 use crate::error::{Error, Result};
 
-/// The batch system that started this process, with its variables.
+/// The batch system that started this process, with the place of the process in it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BatchSystem {
-    /// A task of a job array: its index from 0, and the number of tasks.
+    /// A task of a job array: its index, from 0, and the number of tasks.
     Slurm { index: u32, count: NonZeroU32 },
-    /// A pod of an indexed job: its index from 0. The number of pods is in no variable.
+    /// A pod of an indexed job: its index, from 0. No variable has the number of pods.
     Kubernetes { index: u32 },
 }
 
 impl BatchSystem {
+    /// Reads the environment variables of the batch systems; `None` outside a batch system.
+    ///
+    /// # Errors
+    /// If a variable is not a number.
     pub(crate) fn from_environment(
         variable: &impl Fn(&str) -> Option<String>,
     ) -> Result<Option<Self>> {
@@ -39,17 +43,19 @@ impl BatchSystem {
         Ok(index.map(|index| Self::Kubernetes { index }))
     }
 
-    /// The index of this process among all of the batch system, and their number. `parts` is the number of shards, if `--shard auto/N`
-    /// sets it.
+    /// The index of this process, from 0, and the number of processes. `shard_count` is the number in `--shard auto/N`.
     ///
     /// # Errors
-    /// If the numbers do not fit together, or one is missing.
-    pub(crate) fn place(self, parts: Option<NonZeroU32>) -> Result<(u32, NonZeroU32)> {
+    /// If the numbers contradict each other, or the number of processes is unknown.
+    pub(crate) fn index_and_count(
+        self,
+        shard_count: Option<NonZeroU32>,
+    ) -> Result<(u32, NonZeroU32)> {
         let wrong = |problem: String| Err(Error::usage("--shard", problem));
-        let (index, count) = match (self, parts) {
-            (Self::Slurm { count, .. }, Some(parts)) if count != parts => {
+        let (index, count) = match (self, shard_count) {
+            (Self::Slurm { count, .. }, Some(shard_count)) if count != shard_count => {
                 return wrong(format!(
-                    "the Slurm array has {count} tasks, not {parts}: name the shard itself, as --shard 2/{parts}"
+                    "the Slurm array has {count} tasks, not {shard_count}: name the shard itself, as --shard 2/{shard_count}"
                 ));
             }
             (Self::Slurm { index, count }, _) | (Self::Kubernetes { index }, Some(count)) => {

@@ -1,10 +1,10 @@
-//! The source of a plan that a process begins with: [`first_source`].
+//! The source at which a process starts in its plan: [`first_source`].
 
 use crate::runs::shard::Shard;
 use crate::types::Digest;
 
-/// The place in a plan of `count` sources at which a process begins that asks these models about a part of the data. Processes that share
-/// an image store and are started together begin at different places, so that most images are made by one of them only.
+/// The index of the first source that a process works on, in a plan of `count` sources. It depends on the models and the shard, so that
+/// processes that share an image store start at different sources, and most images are made by only one of them.
 pub(crate) fn first_source<'n>(
     models: impl Iterator<Item = &'n str>,
     shard: Shard,
@@ -13,9 +13,8 @@ pub(crate) fn first_source<'n>(
     let shard = shard.to_string();
     let mut parts: Vec<&[u8]> = models.map(str::as_bytes).collect();
     parts.push(shard.as_bytes());
-    let digest = Digest::from_parts(parts);
-    let bytes = digest.as_bytes();
-    let number = bytes
+    let number = Digest::from_parts(parts)
+        .as_bytes()
         .iter()
         .take(8)
         .fold(0_u64, |number, byte| number << 8 | u64::from(*byte));
@@ -30,14 +29,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn models_and_parts_begin_at_different_places_and_each_at_the_same_again() {
+    fn first_source_depends_on_models_and_shard_only() {
         let whole: Shard = "1/1".parse().unwrap();
-        let of = |model: &str, shard| first_source([model].into_iter(), shard, 1000);
-        assert_eq!(of("a", whole), of("a", whole));
-        assert_ne!(of("a", whole), of("b", whole));
+        let first = |model: &str, shard| first_source([model].into_iter(), shard, 1000);
+        assert_eq!(first("a", whole), first("a", whole));
+        assert_ne!(first("a", whole), first("b", whole));
         assert_ne!(
-            of("a", "1/2".parse().unwrap()),
-            of("a", "2/2".parse().unwrap())
+            first("a", "1/2".parse().unwrap()),
+            first("a", "2/2".parse().unwrap())
         );
         assert_eq!(first_source(["a"].into_iter(), whole, 0), 0);
         for model in ["a", "b", "c", "d"] {

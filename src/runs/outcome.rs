@@ -8,19 +8,19 @@ use crate::report::report_length::ReportLength;
 use crate::types::Decides;
 use crate::types::manifests::Status;
 
-/// The status and output of a command that has ended.
+/// The result of a command.
 #[derive(Debug)]
 pub(crate) struct Outcome {
-    /// Status that decides the exit code.
+    /// Determines the exit code.
     pub status: Status,
     /// Text for standard output.
     pub output: String,
-    /// Paths written, which `--quiet` prints alone; empty if the text itself is the result.
+    /// Paths written. With `--quiet`, only these are printed, unless the list is empty because the text itself is the result.
     pub written: Vec<PathBuf>,
 }
 
 impl Outcome {
-    /// The status of a command whose work may have failed in part.
+    /// `Complete` if all work of the command succeeded, else `Incomplete`.
     pub(crate) fn complete_if(is_whole: bool) -> Status {
         if is_whole {
             Status::Complete
@@ -29,27 +29,25 @@ impl Outcome {
         }
     }
 
-    /// A command whose text is its result.
+    /// The result of a command that only prints text.
     pub(crate) fn text(status: Status, output: String) -> Self {
-        let written = Vec::new();
         Self {
             status,
             output,
-            written,
+            written: Vec::new(),
         }
     }
 
-    /// A command that wrote something, and prints that.
+    /// The result of a command that wrote a file or folder, and prints text about it.
     pub(crate) fn wrote(path: impl Into<PathBuf>, status: Status, output: String) -> Self {
-        let written = vec![path.into()];
         Self {
             status,
             output,
-            written,
+            written: vec![path.into()],
         }
     }
 
-    /// The same result, its text wanted as it is unless it is the short one.
+    /// Makes the text the result, so that `--quiet` prints it, if a format other than the default summary was requested.
     pub(crate) fn in_format(mut self, format: StdoutFormat) -> Self {
         if format != StdoutFormat::SUMMARY {
             self.written.clear();
@@ -86,16 +84,16 @@ pub(crate) struct WrittenArgs {
 }
 
 impl ShowArgs {
-    /// Whether the table of records is written.
-    pub(crate) fn table(&self) -> RecordTable {
+    /// Whether to write the table of records.
+    pub(crate) fn record_table(&self) -> RecordTable {
         if self.written.no_parquet {
-            RecordTable::LeftOut
+            RecordTable::Skip
         } else {
-            RecordTable::Written
+            RecordTable::Write
         }
     }
 
-    /// The format that the flags ask for.
+    /// The format requested by the flags.
     #[must_use]
     pub(crate) fn format(&self) -> StdoutFormat {
         StdoutFormat {
@@ -129,28 +127,27 @@ pub(crate) enum Syntax {
 }
 
 impl StdoutFormat {
-    /// The text without a flag.
+    /// The default format.
     const SUMMARY: Self = Self {
         syntax: Syntax::Text,
         length: ReportLength::Summary,
     };
 
-    /// Whether the text is a document of its own, to which no line may be added.
+    /// True for JSON and Markdown, to which no further lines may be added.
     #[must_use]
     pub(crate) fn is_document(self) -> bool {
         self.syntax != Syntax::Text
     }
 
-    /// Whether the text is JSON.
     pub(crate) fn is_json(self) -> bool {
         self.syntax == Syntax::Json
     }
 }
 
-/// Whether `records.parquet` is written beside the records.
+/// Whether to write `records.parquet` next to the records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RecordTable {
-    Written,
-    /// By `--no-parquet`.
-    LeftOut,
+    Write,
+    /// Set by `--no-parquet`.
+    Skip,
 }

@@ -1,4 +1,4 @@
-//! The note in a manifest that a run cost more than `--max-cost`: [`OverBudget`].
+//! Note in a manifest that a run cost more than `--max-cost`: [`OverBudget`].
 
 use std::collections::BTreeMap;
 
@@ -8,23 +8,23 @@ use serde_json::json;
 use crate::report::forecast::money;
 use crate::types::manifests::RunManifest;
 
-/// The entry of a manifest's settings with the cost beyond `--max-cost`.
+/// Manifest setting with the note.
 const ENTRY: &str = "--max-cost exceeded";
 
-/// Cost of a run beyond its limit.
+/// Cost of a run that exceeded its limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OverBudget {
     /// The limit, in US dollars.
     pub(crate) limit: f64,
     /// The cost, in US dollars.
     pub(crate) spent: f64,
-    /// Numbers of replies that were charged more tokens than their limit, by model.
+    /// Number of replies that were charged more tokens than their limit, by model.
     #[serde(default)]
     pub(crate) longer_replies: BTreeMap<String, usize>,
 }
 
 impl OverBudget {
-    /// Replaces the note in a manifest; a run within its limit has none.
+    /// Replaces the note in a manifest; removes it if the run is within its limit.
     pub(crate) fn note(over: Option<&Self>, manifest: &mut RunManifest) {
         manifest.settings.remove(ENTRY);
         if let Some(over) = over {
@@ -32,12 +32,12 @@ impl OverBudget {
         }
     }
 
-    /// The note in a manifest; `None` if there is none.
+    /// Reads the note in a manifest; `None` if there is none.
     pub(crate) fn read(manifest: &RunManifest) -> Option<Self> {
         serde_json::from_value(manifest.settings.get(ENTRY)?.clone()).ok()
     }
 
-    /// The cost in a sentence, with the cause if it is known.
+    /// A sentence about the cost, with the cause if it is known.
     pub(crate) fn sentence(&self) -> String {
         let replies: Vec<String> = self
             .longer_replies

@@ -1,4 +1,4 @@
-//! The answers to open questions, as a judge gets them: [`predictions`].
+//! Answers to open questions in the form that a judge gets: [`predictions`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -13,12 +13,12 @@ use darkqa_score::subject::ModelInCondition;
 pub(crate) enum AnswerState {
     /// No reply yet, or the trial failed.
     Missing,
-    /// A reply without an answer: scores 0, and is not judged.
+    /// A reply without an answer. It scores 0 without being judged.
     Null,
-    /// The text that is judged.
+    /// The text to judge.
     Text {
         answer: Arc<str>,
-        /// Whether the protocol has shortened it.
+        /// True if the protocol shortened the answer.
         cut: bool,
     },
 }
@@ -34,8 +34,8 @@ pub(crate) struct Prediction {
     pub(crate) state: AnswerState,
 }
 
-/// Every answer of a run, question by question: those that were asked for, also if they are missing, and those from files. A subject
-/// that was asked one question was asked all.
+/// All answers of a run in the order of its questions: requested ones, including missing ones, and those from files. A subject that was
+/// asked any question is expected to have answers to all.
 pub(crate) fn predictions(
     records: &[Record<OpenDetail>],
     questions: &[&QuestionId],
@@ -101,11 +101,13 @@ fn state(record: Option<&Record<OpenDetail>>, protocol: Protocol) -> (Option<Str
     (Some(full), state)
 }
 
-/// The answer in a model's reply; `None` if there is none, which is an error upstream. A reply that is null, empty or refused has no
+/// The answer in a model's reply; `None` if there is none, which upstream treats as an error. A missing, empty or refused reply has no
 /// answer.
 fn full_answer(record: &Record<OpenDetail>, protocol: Protocol) -> Option<String> {
-    let reply = record.reply.as_deref();
-    let reply = reply.filter(|reply| record.refusal.is_none() && !reply.trim().is_empty())?;
+    let reply = record
+        .reply
+        .as_deref()
+        .filter(|reply| record.refusal.is_none() && !reply.trim().is_empty())?;
     match (record.view, blind_answer(reply), protocol) {
         (View::Image, _, _) => Some(reply.to_owned()),
         (View::Blind, Some(answer), _) => Some(answer),

@@ -1,4 +1,5 @@
-//! Models of a run that were renamed, have other settings under their name, or are no longer asked: [`note`], [`rename`].
+//! Models of a run that were renamed, have other settings under their name, or are no longer asked: [`note_renamed_models`],
+//! [`rename_record`].
 //!
 //! The key of a trial does not contain the model's name, so a renamed model keeps its replies. Records keep the name that they were
 //! written with, and are shown under the current one ([`RecordedNames`]).
@@ -21,36 +22,36 @@ const LEFT_OUT: &str = "models left out";
 
 /// Whether the settings of a model may change within a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum OtherSettings {
-    /// With other settings it is another model of the run, as a models file gives each model a name of its own.
+pub(crate) enum SettingsChange {
+    /// A model with other settings is another model of the same run; used with a models file, which names each model.
     Allowed,
-    /// With other settings it is another run.
+    /// A model with other settings belongs to another run.
     Refused,
 }
 
 /// Models of the current command.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Now<'a> {
+pub(crate) struct CurrentModels<'a> {
     /// Settings that determine the replies of each model, by name.
     pub(crate) models: &'a BTreeMap<String, Value>,
-    /// Inputs that each model is shown, by name.
+    /// Inputs of each model, by name.
     pub(crate) views: &'a Views,
     /// Whether the settings of the stored models may change.
-    pub(crate) settings: OtherSettings,
+    pub(crate) settings: SettingsChange,
 }
 
-/// Records in a manifest which models of the stored one have another name now. Two names belong to one model if all settings that
-/// determine its replies are the same, and both are shown images, or neither is. A model whose name another one has taken becomes
+/// Notes in a manifest which models of the stored manifest have another name now. Two names belong to the same model if all settings that
+/// determine its replies are equal, and both get images or neither does. A model whose name another model has taken becomes
 /// `NAME (before)`.
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
-pub(crate) fn note(
+pub(crate) fn note_renamed_models(
     manifest: &mut RunManifest,
     stored: &RunManifest,
-    command: Now<'_>,
+    command: CurrentModels<'_>,
 ) -> Result<()> {
-    let Now {
+    let CurrentModels {
         models: now,
         settings,
         ..
@@ -94,7 +95,7 @@ pub(crate) fn note(
             manifest.settings.insert(adapted_key(new), changes.clone());
         }
     }
-    if settings == OtherSettings::Allowed || stored_views.is_noted() {
+    if settings == SettingsChange::Allowed || stored_views.is_noted() {
         let stored_names = before.keys().map(|name| (name, new_name(name)));
         stored_views.note(manifest, stored_names, command.views);
     }
@@ -113,9 +114,9 @@ pub(crate) fn note(
 fn new_names(
     before: &BTreeMap<String, Value>,
     views: &StoredViews,
-    command: Now<'_>,
+    command: CurrentModels<'_>,
 ) -> BTreeMap<String, String> {
-    let Now {
+    let CurrentModels {
         models: now,
         settings,
         ..
@@ -127,7 +128,7 @@ fn new_names(
         (is_same && fit > Fit::Apart).then_some(fit)
     };
     let keeps_name = |name: &String| match (before.get(name), now.get(name)) {
-        // A model that is shown other inputs now keeps its name, unless the name fits another stored model.
+        // A model that gets other inputs now keeps its name, unless the name fits another stored model.
         (Some(old), Some(new)) => {
             reply_settings(old) == reply_settings(new)
                 && (fit(name, name).is_some() || !before.keys().any(|old| fit(old, name).is_some()))
@@ -152,10 +153,10 @@ fn new_names(
             }
         }
     }
-    if settings == OtherSettings::Refused {
+    if settings == SettingsChange::Refused {
         return new_names;
     }
-    // Stored models whose name another model has now.
+    // Rename stored models whose name another model has now.
     for name in now
         .keys()
         .filter(|name| before.contains_key(*name) && !keeps_name(name))
@@ -185,7 +186,7 @@ fn left_out(
     stored: &RunManifest,
     now: &BTreeMap<String, Value>,
     new_names: &BTreeMap<String, String>,
-    settings: OtherSettings,
+    settings: SettingsChange,
 ) -> BTreeSet<String> {
     let left_out_before: BTreeSet<String> = left_out_models(stored)
         .iter()
@@ -206,13 +207,13 @@ fn left_out(
         .into_iter()
         .flatten()
         .map(|(name, _)| name)
-        .filter(|name| settings == OtherSettings::Allowed || left_out_before.contains(*name))
+        .filter(|name| settings == SettingsChange::Allowed || left_out_before.contains(*name))
         .filter(|name| !is_listed(name))
         .cloned()
         .collect()
 }
 
-/// Settings that determine the replies of a model: all but the address.
+/// Settings that determine the replies of a model: all except the base URL.
 fn reply_settings(content: &Value) -> Value {
     let mut content = content.clone();
     if let Some(fields) = content.as_object_mut() {
@@ -231,14 +232,11 @@ pub(crate) fn left_out_models(manifest: &RunManifest) -> Vec<String> {
         .unwrap_or_default()
 }
 
-/// Changes the model names in records to the current ones.
-pub(crate) fn rename<D>(records: &mut [Record<D>], manifest: &RunManifest) {
-    let names = RecordedNames::from_manifest(manifest);
-    for record in records {
-        let current = names.shown(&record.model);
-        if current != record.model {
-            record.model = current.to_owned();
-        }
+/// Changes the model name in a record to the current one.
+pub(crate) fn rename_record<D>(record: &mut Record<D>, names: &RecordedNames) {
+    let current = names.shown(&record.model);
+    if current != record.model {
+        record.model = current.to_owned();
     }
 }
 

@@ -1,4 +1,4 @@
-//! The files of a run folder beside its records: [`RunFiles`].
+//! Files of a run folder other than its records: [`RunFiles`].
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::store;
 use crate::types::{ImageFidelity, RunQuestion, Thumbnail};
 
-/// The lines of the files in a run folder beside its records, as they are stored.
+/// Contents of the files of a run folder other than its records.
 pub(crate) struct RunFiles {
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
@@ -18,7 +18,7 @@ impl RunFiles {
     ///
     /// # Errors
     /// If a line of a file is broken.
-    pub(crate) fn read_light(folder: &Path) -> Result<Self> {
+    pub(crate) fn read_without_evidence(folder: &Path) -> Result<Self> {
         let mut questions = Vec::new();
         store::each_question(folder, |question| {
             questions.push(question.without_evidence());

@@ -1,4 +1,4 @@
-//! Texts that reports read from a run where they show them: [`RunTexts`].
+//! Replies and question evidence of a run, read on demand by reports: [`RunTexts`].
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -9,15 +9,15 @@ use crate::store::{RecordLog, each_question};
 use crate::types::{QuestionId, Record, RunQuestion, TextPlace};
 use darkqa_score::answers::record::Detail;
 
-/// Where the texts of a run's replies, and the evidence of its questions, are read.
+/// Source of the replies of a run and of the evidence of its questions.
 #[derive(Debug, Clone)]
 pub(crate) enum RunTexts<D> {
-    /// In the files of the run.
+    /// The files of the run.
     Stored(Arc<StoredTexts>),
-    /// In the files of its parts, by the number of the file in the place of a text.
-    Parts(Vec<Self>),
-    /// In records that are held, by their numbers.
-    Held(Arc<HeldTexts<D>>),
+    /// The files of the shards, by [`TextPlace::log`].
+    Shards(Vec<Self>),
+    /// Records in memory, by [`TextPlace::start`].
+    InMemory(Arc<InMemoryTexts<D>>),
 }
 
 /// The files of a run.
@@ -27,27 +27,27 @@ pub(crate) struct StoredTexts {
     log: RecordLog,
 }
 
-/// Records and questions that are held in memory.
+/// Records and questions in memory.
 #[derive(Debug)]
-pub(crate) struct HeldTexts<D> {
+pub(crate) struct InMemoryTexts<D> {
     records: Vec<Record<D>>,
     questions: Vec<RunQuestion>,
 }
 
-impl<D> HeldTexts<D> {
+impl<D> InMemoryTexts<D> {
     pub(crate) fn new(records: Vec<Record<D>>, questions: Vec<RunQuestion>) -> Self {
         Self { records, questions }
     }
 }
 
 impl<D: Detail> RunTexts<D> {
-    /// The texts in the folder of a run.
+    /// Opens the texts in the folder of a run; without a file of records there are none.
     ///
     /// # Errors
-    /// If its file cannot be opened.
+    /// If the file of records cannot be opened.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         Ok(match RecordLog::open_if_there(folder)? {
-            None => Self::Held(HeldTexts::new(Vec::new(), Vec::new()).into()),
+            None => Self::InMemory(InMemoryTexts::new(Vec::new(), Vec::new()).into()),
             Some(log) => {
                 let folder = folder.to_owned();
                 Self::Stored(StoredTexts { folder, log }.into())
@@ -55,10 +55,10 @@ impl<D: Detail> RunTexts<D> {
         })
     }
 
-    /// The texts in each file of a run, by the number of the file.
+    /// The texts of each file, by [`TextPlace::log`].
     pub(crate) fn by_file(self) -> Vec<Self> {
         match self {
-            Self::Parts(parts) => parts,
+            Self::Shards(parts) => parts,
             one => vec![one],
         }
     }
@@ -66,21 +66,21 @@ impl<D: Detail> RunTexts<D> {
     /// The record of a trial.
     ///
     /// # Errors
-    /// If the file of the run cannot be read any more, or was changed.
+    /// If the file of records cannot be read any more, or was changed.
     pub(crate) fn record(&self, place: TextPlace) -> Result<Record<D>> {
         match self {
             Self::Stored(texts) => {
                 let line = texts.log.line_from(place.start())?;
                 texts.log.record(&line)
             }
-            Self::Parts(parts) => match parts.get(place.log()) {
+            Self::Shards(parts) => match parts.get(place.log()) {
                 Some(part) => part.record(place),
                 None => Err(Error::data(
                     "records",
                     format_args!("there is no part {}", place.log()),
                 )),
             },
-            Self::Held(texts) => {
+            Self::InMemory(texts) => {
                 let record = texts.records.get(place.start() as usize);
                 record.cloned().ok_or_else(|| {
                     let problem = format_args!("there is none at {}", place.start());
@@ -90,7 +90,7 @@ impl<D: Detail> RunTexts<D> {
         }
     }
 
-    /// The text shown for a reply: its own; else that of a refusal, else the message of the error.
+    /// The text of a reply, or of the refusal, or else the message of the error.
     ///
     /// # Errors
     /// As for [`record`](Self::record).
@@ -99,7 +99,7 @@ impl<D: Detail> RunTexts<D> {
         Ok(record.text_or_error().unwrap_or_default().to_owned())
     }
 
-    /// Adds those of the wanted questions that are not found yet, with their evidence.
+    /// Adds the `wanted` questions that are not in `found` yet, with their evidence.
     ///
     /// # Errors
     /// If the questions of the run cannot be read.
@@ -115,10 +115,10 @@ impl<D: Detail> RunTexts<D> {
         };
         match self {
             Self::Stored(texts) => each_question(&texts.folder, add),
-            Self::Parts(parts) => parts
+            Self::Shards(parts) => parts
                 .iter()
                 .try_for_each(|part| part.questions(wanted, found)),
-            Self::Held(texts) => {
+            Self::InMemory(texts) => {
                 texts.questions.iter().cloned().for_each(&mut add);
                 Ok(())
             }

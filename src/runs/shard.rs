@@ -1,4 +1,4 @@
-//! Parts of a job for several processes: [`Shard`].
+//! One of several parts of a run, each for one process: [`Shard`].
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -8,8 +8,8 @@ use crate::ask::Quota;
 use crate::error::{Error, Result};
 use crate::runs::batch_system::BatchSystem;
 
-/// One of several parts of a run: neighbouring sources, about as many in each shard. A source is in one shard, with all its conditions
-/// and questions. Which sources a shard has says [`part`](crate::runs::part::part).
+/// One of several parts of a run, with consecutive sources. Each source is in one shard, with all its conditions and questions. See
+/// [`shard_questions`](crate::runs::shard_sources::shard_questions) for the division.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Shard {
     /// Index of the shard, from 0.
@@ -24,7 +24,7 @@ impl Shard {
         count: NonZeroU32::MIN,
     };
 
-    /// Whether there are other shards.
+    /// True if there are other shards.
     #[must_use]
     pub(crate) fn is_part(self) -> bool {
         self.count.get() > 1
@@ -45,15 +45,15 @@ impl Shard {
         self.index
     }
 
-    /// The shard's share of a whole number, of which this many shards have a part at once. The shares of as many neighbouring shards sum
-    /// to it, except that each is at least 1.
+    /// This shard's share of `whole` if `at_once` shards run in parallel. The shares of `at_once` consecutive shards sum to `whole`, except
+    /// that each is at least 1.
     fn share(self, whole: NonZeroU32, at_once: NonZeroU32) -> NonZeroU32 {
         let (at_once, whole) = (at_once.get(), whole.get());
         let share = whole / at_once + u32::from(self.index % at_once < whole % at_once);
         NonZeroU32::new(share).unwrap_or(NonZeroU32::MIN)
     }
 
-    /// The shard's share of a cost.
+    /// This shard's equal share of a cost.
     #[must_use]
     pub(crate) fn share_of_cost(self, whole: f64) -> f64 {
         whole / f64::from(self.count.get())
@@ -66,7 +66,7 @@ impl Shard {
         format!("shard-{:0digits$}-of-{}", self.index + 1, self.count)
     }
 
-    /// The shard's share of the requests and tokens per minute, if `workers` shards run at once; without, all of them.
+    /// This shard's share of the requests and tokens per minute if `workers` shards run in parallel, by default all of them.
     pub(crate) fn quota(self, whole: Quota, workers: Option<NonZeroU32>) -> Quota {
         let at_once = workers.map_or(self.count, |workers| workers.min(self.count));
         Quota {
@@ -75,10 +75,10 @@ impl Shard {
         }
     }
 
-    /// The shard that `--shard` names (`2/4`, `auto/4`, `auto`, `none`). Without the flag, that of the batch system.
+    /// The shard given by `--shard` (`2/4`, `auto/4`, `auto`, `none`), or, without the flag, by the batch system.
     ///
     /// # Errors
-    /// If there is no such shard, or the batch system does not set all variables that are needed.
+    /// If there is no such shard, or the batch system does not set all required variables.
     pub(crate) fn resolve(
         flag: Option<&str>,
         variable: impl Fn(&str) -> Option<String>,
@@ -110,8 +110,8 @@ impl Shard {
     }
 
     /// The shard of this process in a batch system.
-    fn from_batch_system(system: BatchSystem, parts: Option<NonZeroU32>) -> Result<Self> {
-        let (index, count) = system.place(parts)?;
+    fn from_batch_system(system: BatchSystem, count: Option<NonZeroU32>) -> Result<Self> {
+        let (index, count) = system.index_and_count(count)?;
         Ok(Self { index, count })
     }
 
@@ -221,7 +221,7 @@ mod tests {
         };
         assert_eq!(shares(None), [167, 167, 166]);
         assert_eq!(shares(Some(2)), [250, 250, 250]);
-        // More workers than shards are as many as there are shards.
+        // At most as many workers as shards.
         assert_eq!(shares(Some(16)), [167, 167, 166]);
         assert_eq!(parts[2].quota(whole, None).tokens.unwrap().get(), 1);
         assert_eq!(parts[1].folder(), "shard-2-of-3");

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::runs::renamed;
 use crate::runs::run_files::RunFiles;
-use crate::runs::run_texts::HeldTexts;
+use crate::runs::run_texts::InMemoryTexts;
 pub(crate) use crate::runs::run_texts::RunTexts;
 use crate::store;
 use crate::types::manifests::{Counts, RunManifest, Status};
@@ -20,22 +20,22 @@ use darkqa_score::answers::record::Detail;
 /// The models of a run that a report shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ShownModels {
-    /// Models in the file of models, and those that the last command asked.
+    /// Models in the models file, and models asked by the last command.
     Current,
-    /// Also those that the file of models no longer has, or had with other settings.
+    /// Also models that the models file no longer has, or had with other settings.
     All,
 }
 
-/// Where the files of a run are.
+/// Location of the files of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RunLayout {
-    /// In its folder.
+    /// The folder of the run.
     Whole,
-    /// In the folders of its parts, which are in its folder.
-    Parts,
+    /// The folders of the shards, inside the folder of the run.
+    Shards,
 }
 
-/// A run as reports need it.
+/// A run with the data that reports need.
 #[derive(Clone)]
 pub(crate) struct StoredRun<D: Detail> {
     pub(crate) folder: PathBuf,
@@ -45,17 +45,17 @@ pub(crate) struct StoredRun<D: Detail> {
     /// The trials of models that a report leaves out.
     pub(crate) left_out: Trials<D>,
     pub(crate) texts: RunTexts<D>,
-    /// The questions; those of a folder without their evidence, which [`RunTexts::questions`] reads.
+    /// The questions; without their evidence if read from a folder. [`RunTexts::questions`] reads the evidence.
     pub(crate) questions: Vec<RunQuestion>,
     pub(crate) thumbnails: Vec<Thumbnail>,
     pub(crate) fidelity: Vec<ImageFidelity>,
 }
 
 impl<D: Detail> StoredRun<D> {
-    /// Reads a run folder. The manifest of a run that has not ended has the counts of its start: they are those of the records instead.
+    /// Reads a run folder. For a run that has not ended, the counts in the manifest are replaced by those of the records.
     ///
     /// # Errors
-    /// If the folder holds no run with records of this kind.
+    /// If the folder has no run with records of this kind.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let manifest = store::read_manifest(folder, D::SCHEMA)?;
         let manifest = manifest.ok_or_else(|| no_run(folder))?;
@@ -71,7 +71,7 @@ impl<D: Detail> StoredRun<D> {
         Ok(run)
     }
 
-    /// Reads everything in a run folder except `manifest`, and its replies again by the rules of this version.
+    /// Reads a run folder except its manifest, and parses its replies again by the rules of this version.
     ///
     /// # Errors
     /// If a line of a file is broken.
@@ -83,34 +83,36 @@ impl<D: Detail> StoredRun<D> {
         Self::from_trials(folder, manifest, trials)
     }
 
-    /// The run of a folder from its manifest and trials. Of its records no more than reports need is held.
+    /// The run in a folder, given its manifest and trials. The records themselves stay on disk.
     fn from_trials(folder: &Path, manifest: RunManifest, trials: Trials<D>) -> Result<Self> {
         let texts = RunTexts::open(folder)?;
-        let files = RunFiles::read_light(folder)?;
-        Self::from_parts(folder, manifest, (trials, texts), files)
+        let files = RunFiles::read_without_evidence(folder)?;
+        Self::new(folder, manifest, trials, texts, files)
     }
 
-    /// The run of a folder from its manifest, records that are held in memory, and the lines of its other files.
+    /// The run of a folder, given its manifest, its records, which stay in memory, and its other files.
     pub(crate) fn from_records(
         folder: &Path,
         manifest: RunManifest,
-        (records, files): (Vec<Record<D>>, RunFiles),
+        records: Vec<Record<D>>,
+        files: RunFiles,
     ) -> Result<Self> {
         let trials = records.iter().cloned().collect();
-        let texts = RunTexts::Held(HeldTexts::new(records, files.questions.clone()).into());
-        Self::from_parts(folder, manifest, (trials, texts), files)
+        let texts = RunTexts::InMemory(InMemoryTexts::new(records, files.questions.clone()).into());
+        Self::new(folder, manifest, trials, texts, files)
     }
 
-    fn from_parts(
+    fn new(
         folder: &Path,
         manifest: RunManifest,
-        (mut trials, texts): (Trials<D>, RunTexts<D>),
+        mut trials: Trials<D>,
+        texts: RunTexts<D>,
         files: RunFiles,
     ) -> Result<Self> {
         renamed::rename_trials(&mut trials, &manifest);
         trials.each_key_once(|first, later| Ok(first.or_later(later)))?;
         let ids = files.questions.iter().map(|question| &question.id);
-        sort(&mut trials, ids, &manifest.models);
+        sort_trials(&mut trials, ids, &manifest.models);
         Ok(Self {
             folder: folder.to_owned(),
             layout: RunLayout::Whole,
@@ -124,7 +126,7 @@ impl<D: Detail> StoredRun<D> {
         })
     }
 
-    /// Takes the trials apart that a report does not show.
+    /// Moves the trials that a report does not show to [`left_out`](Self::left_out).
     pub(crate) fn leave_out(&mut self, shown: ShownModels) {
         if shown == ShownModels::Current {
             let names = renamed::left_out_models(&self.manifest);
@@ -136,10 +138,10 @@ impl<D: Detail> StoredRun<D> {
         }
     }
 
-    /// The whole record of a trial, with the names that its model and condition have here.
+    /// The record of a trial, with the current names of its model and condition.
     ///
     /// # Errors
-    /// If the file of the run cannot be read any more, or was changed.
+    /// If the file of records cannot be read any more, or was changed.
     pub(crate) fn record(&self, trial: TrialRef<'_, D>) -> Result<Record<D>> {
         Ok(Record {
             model: trial.model().to_owned(),
@@ -148,7 +150,7 @@ impl<D: Detail> StoredRun<D> {
         })
     }
 
-    /// The whole records of the trials of a question.
+    /// The records of all trials of a question.
     ///
     /// # Errors
     /// As for [`record`](Self::record).
@@ -160,14 +162,14 @@ impl<D: Detail> StoredRun<D> {
             .collect()
     }
 
-    /// Name of the run: that of its folder.
+    /// Name of the run, which is the name of its folder.
     pub(crate) fn name(&self) -> String {
-        name(&self.folder)
+        run_name(&self.folder)
     }
 }
 
-/// Puts trials in the order of the questions, conditions and models (those that are listed first), whatever order the replies came in.
-pub(crate) fn sort<'q, D: Detail>(
+/// Sorts trials by question, condition and model. Listed models come first, in their order.
+pub(crate) fn sort_trials<'q, D: Detail>(
     trials: &mut Trials<D>,
     questions: impl Iterator<Item = &'q QuestionId>,
     listed: &[ListedModel],
@@ -180,14 +182,14 @@ pub(crate) fn sort<'q, D: Detail>(
     );
 }
 
-/// Name of the run in this folder: that of the folder.
-pub(crate) fn name(folder: &Path) -> String {
+/// Name of the run in a folder, which is the name of the folder.
+pub(crate) fn run_name(folder: &Path) -> String {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     let name = whole.file_name().unwrap_or(whole.as_os_str());
     name.to_string_lossy().into_owned()
 }
 
-/// A run of either experiment. Only this module tells experiments apart by the schema of their folders.
+/// A run of either experiment. Only this module distinguishes the experiments, by the schema of their folders.
 #[expect(
     clippy::large_enum_variant,
     reason = "of the few that are held, none is moved often"
@@ -205,10 +207,10 @@ pub(crate) enum ExperimentKind {
 }
 
 impl ExperimentKind {
-    /// The kind of questions in the run of a folder.
+    /// Reads the kind of questions of the run in a folder.
     ///
     /// # Errors
-    /// If the folder holds no run, or one of another version.
+    /// If the folder has no run, or one of another version.
     pub(crate) fn read(folder: &Path) -> Result<Self> {
         let schema = store::schema(folder)?.ok_or_else(|| no_run(folder))?;
         if schema == OpenDetail::SCHEMA {
@@ -224,7 +226,7 @@ impl AnyRun {
     /// Reads a run folder.
     ///
     /// # Errors
-    /// If the folder holds no run.
+    /// If the folder has no run.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         Ok(match ExperimentKind::read(folder)? {
             ExperimentKind::Choice => Self::Choice(StoredRun::open(folder)?),
@@ -237,21 +239,26 @@ impl StoredRun<ChoiceDetail> {
     /// Reads a run of questions with choices.
     ///
     /// # Errors
-    /// If the folder holds no run, or one of open questions. That error tells the user what to do `instead`.
+    /// If the folder has no run, or one of open questions. The message ends with `instead`.
     pub(crate) fn open_choices(folder: &Path, instead: &str) -> Result<Self> {
         match ExperimentKind::read(folder)? {
             ExperimentKind::Choice => Self::open(folder),
-            ExperimentKind::Open => Err(open_questions(folder, instead)),
+            ExperimentKind::Open => Err(open_questions_error(folder, instead)),
         }
     }
 
-    /// The run, if the true answers to its questions are known.
+    /// Checks that the true answers to the questions are known.
     ///
     /// # Errors
-    /// If they are not. That error tells the user `why` they are needed.
+    /// If they are not. The message ends with `why`, the reason why they are needed.
     pub(crate) fn with_truths(self, why: &str) -> Result<Self> {
-        let mut items = self.trials.items().into_iter().flatten();
-        if items.all(|item| item.truth.is_some()) {
+        if self
+            .trials
+            .items()
+            .into_iter()
+            .flatten()
+            .all(|item| item.truth.is_some())
+        {
             return Ok(self);
         }
         Err(Error::Run {
@@ -263,11 +270,11 @@ impl StoredRun<ChoiceDetail> {
     }
 }
 
-/// The manifest of the run in a folder, of either experiment.
+/// Reads the manifest of the run in a folder, of either experiment.
 ///
 /// # Errors
-/// If the folder holds no run.
-pub(crate) fn manifest(folder: &Path) -> Result<RunManifest> {
+/// If the folder has no run.
+pub(crate) fn read_run_manifest(folder: &Path) -> Result<RunManifest> {
     let schema = match ExperimentKind::read(folder)? {
         ExperimentKind::Choice => ChoiceDetail::SCHEMA,
         ExperimentKind::Open => OpenDetail::SCHEMA,
@@ -275,19 +282,19 @@ pub(crate) fn manifest(folder: &Path) -> Result<RunManifest> {
     store::read_manifest(folder, schema)?.ok_or_else(|| no_run(folder))
 }
 
-/// The error about a run of open questions, which tells the user what to do `instead`.
-pub(crate) fn open_questions(folder: &Path, instead: &str) -> Error {
+/// The error for a run of open questions where one with choices is needed. The message ends with `instead`.
+pub(crate) fn open_questions_error(folder: &Path, instead: &str) -> Error {
     Error::Run {
         path: folder.to_owned(),
         problem: format!("the run asked open questions: {instead}"),
     }
 }
 
-/// Most runs that a message lists.
-const MOST_LISTED: usize = 8;
+/// Maximum number of runs in a message.
+const MAX_LISTED: usize = 8;
 
-/// The folders with a manifest in a folder, for a message; the last text states how many more there are.
-fn runs_below(folder: &Path) -> Vec<String> {
+/// The paths of the first run folders in a folder, for a message. If there are more, the last text is their number.
+fn list_runs(folder: &Path) -> Vec<String> {
     let mut runs: Vec<String> = fs::read_dir(folder)
         .into_iter()
         .flatten()
@@ -297,8 +304,8 @@ fn runs_below(folder: &Path) -> Vec<String> {
         .map(|path| path.display().to_string())
         .collect();
     runs.sort();
-    let more = runs.len().saturating_sub(MOST_LISTED);
-    runs.truncate(MOST_LISTED);
+    let more = runs.len().saturating_sub(MAX_LISTED);
+    runs.truncate(MAX_LISTED);
     if more > 0 {
         runs.push(format!("and {more} more"));
     }
@@ -306,10 +313,9 @@ fn runs_below(folder: &Path) -> Vec<String> {
 }
 
 fn no_run(folder: &Path) -> Error {
-    let below = runs_below(folder);
-    let hint = match &*below {
+    let hint = match &*list_runs(folder) {
         [] => String::new(),
-        below => format!("; there are runs in it: {}", below.join(" ")),
+        runs => format!("; there are runs in it: {}", runs.join(" ")),
     };
     Error::Run {
         path: folder.to_owned(),

@@ -1,4 +1,4 @@
-//! The training data of enhancers: [`training_data`].
+//! Training data of the enhancers of a run: [`training_data`].
 
 use std::collections::BTreeMap;
 
@@ -7,11 +7,11 @@ use serde_json::Value;
 use crate::types::manifests::RunManifest;
 use darkqa_enhance::ModelFile;
 
-/// Data that each enhancer of a run was trained on, by its name: as the run noted them; of a run without a note, those of the
-/// program's enhancer with the same digest.
+/// The data that each enhancer of a run was trained on, by the enhancer's name. Taken from the run's manifest, or else from the built-in
+/// enhancer with the same digest.
 pub(crate) fn training_data(run: &RunManifest) -> BTreeMap<&str, String> {
-    let columns = run.columns.get("enhancer");
-    columns
+    run.columns
+        .get("enhancer")
         .into_iter()
         .flatten()
         .filter_map(|(name, content)| {

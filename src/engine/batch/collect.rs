@@ -1,4 +1,4 @@
-//! The steps of a part after its batch is made: looking at it, fetching its replies, deleting its files.
+//! Steps of a part after its batch is created: checking it, downloading its output, deleting its files.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,42 +9,42 @@ use tokio::time::sleep;
 
 use super::driver::{Driver, Goal, Step};
 use super::event::Event;
-use super::take_over::for_each_line;
+use super::import::for_each_line;
+use super::part::Part;
 use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
 use crate::error::{Error, Result};
 use darkqa_score::answers::record::Detail;
 
-/// Bytes that a reply may have; chosen: far more than the longest reply of a reasoning model.
-const MOST_REPLY_BYTES: u64 = 4 << 20;
+/// Maximum size of a reply in bytes; chosen: far more than the longest reply of a reasoning model.
+const MAX_REPLY_BYTES: u64 = 4 << 20;
 
-/// How many looks at a batch that has ended wait until its files have as many lines as the server counts; chosen: 19 minutes with the
-/// default of `--poll`.
-const MOST_INCOMPLETE: u32 = 10;
+/// Maximum number of checks of an ended batch that wait until its files have as many lines as the server counts; chosen: 19 minutes with
+/// the default of `--poll`.
+const MAX_INCOMPLETE: u32 = 10;
 
-/// The same for batches that the user cancels, who waits; chosen.
-const MOST_INCOMPLETE_CANCELLED: u32 = 6;
+/// The same for batches that the user cancels; chosen to be lower, because the user waits.
+const MAX_INCOMPLETE_CANCELLED: u32 = 6;
 
-/// How often a file is tried to be deleted; chosen.
-const DELETIONS: usize = 3;
+/// Maximum number of attempts to delete a file; chosen.
+const MAX_DELETIONS: usize = 3;
 
 impl<D: Detail> Driver<'_, D> {
-    /// Looks at the batch of a part, once between two waits.
+    /// Checks the batch of a part, at most once between two waits.
     pub(super) async fn check_batch(&mut self, part: usize) -> Result<Step> {
         let Some(id) = self.part(part).batch.clone() else {
             return Ok(Step::Waiting);
         };
-        if !self.notes.looked_at.insert(part) {
+        if !self.notes.checked.insert(part) {
             return Ok(Step::Waiting);
         }
         if self.until == Goal::Cancelled && !self.part(part).cancelled {
             self.cancel(part, &id).await?;
         }
-        let looked = self.server(part)?.batch(&id).await;
-        let batch = match looked {
+        let batch = match self.server(part)?.batch(&id).await {
             Ok(batch) => batch,
-            Err(failure) => return self.look_failed(part, &failure),
+            Err(failure) => return self.check_failed(part, &failure),
         };
-        self.notes.refused_looks.remove(&part);
+        self.notes.refused_checks.remove(&part);
         let state = batch.state.word().to_owned();
         if state != self.part(part).state {
             self.journal.record(part, Event::Seen { state })?;
@@ -64,10 +64,10 @@ impl<D: Detail> Driver<'_, D> {
                 ));
                 Ok(Step::Waiting)
             }
-            // A batch that failed on its way may have asked a part of its requests.
             BatchState::Failed if batch.output_file.is_none() && batch.counts.answered == 0 => {
-                self.failed(part, &batch)
+                self.batch_failed(part, &batch)
             }
+            // A batch that failed midway may have answered some of its requests.
             BatchState::Failed
             | BatchState::Completed
             | BatchState::Expired
@@ -78,7 +78,7 @@ impl<D: Detail> Driver<'_, D> {
     async fn cancel(&mut self, part: usize, id: &str) -> Result<()> {
         match self.server(part)?.cancel(id).await {
             Ok(()) => self.journal.record(part, Event::Cancelled),
-            // It may have ended meanwhile; the look that follows tells.
+            // The batch may have ended before; the next check finds out.
             Err(failure) => {
                 let name = self.part(part).name.clone();
                 self.warn_once(format!("{name}: not cancelled yet: {failure}"));
@@ -87,7 +87,7 @@ impl<D: Detail> Driver<'_, D> {
         }
     }
 
-    /// Cancels a batch on which the server works for longer than `--give-up`.
+    /// Cancels a batch that has not ended after `--give-up`.
     async fn cancel_if_late(&mut self, part: usize, id: &str) -> Result<()> {
         let created = self.part(part).created.parse::<Timestamp>().ok();
         let (Some(hours), Some(created)) = (self.args.give_up, created) else {
@@ -104,8 +104,11 @@ impl<D: Detail> Driver<'_, D> {
         self.cancel(part, id).await
     }
 
-    /// Handles a batch that the server could not begin.
-    fn failed(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
+    /// Gives up a batch that failed without any reply.
+    ///
+    /// # Errors
+    /// Always, unless the batch failed because too many tokens are waiting.
+    fn batch_failed(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
         if let Some(quota) = &batch.quota {
             return self.quota_reached(part, quota);
         }
@@ -115,29 +118,29 @@ impl<D: Detail> Driver<'_, D> {
         };
         let why = format!("the batch {} failed: {problem}", batch.id);
         self.give_up(part, why.clone())?;
-        let of = self.part(part);
+        let part = self.part(part);
         Err(Error::Endpoint {
-            endpoint: of.facts.base.clone(),
-            problem: format!("{}: {why}; none of its requests has a reply", of.name),
+            endpoint: part.facts.base.clone(),
+            problem: format!("{}: {why}; none of its requests has a reply", part.name),
         })
     }
 
-    /// Fetches the files of a batch that has ended. Each may be missing.
+    /// Downloads the files of an ended batch. Either file may not exist.
     async fn fetch(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
-        let most = MOST_REPLY_BYTES * (self.part(part).facts.requests as u64 + 1);
+        let max_bytes = MAX_REPLY_BYTES * (self.part(part).facts.requests as u64 + 1);
         let files = [&batch.output_file, &batch.error_file];
-        for (id, path) in files.into_iter().zip(self.fetched(part)) {
+        for (id, path) in files.into_iter().zip(self.output_paths(part)) {
             let Some(id) = id else {
                 continue;
             };
             let unfinished = path.with_extension("download");
-            let loaded = self.server(part)?.download(id, &unfinished, most).await;
-            match loaded {
+            let download = self.server(part)?.download(id, &unfinished, max_bytes);
+            match download.await {
                 Err(failure) if failure.is_permanent() => {
                     let problem = format!("its file {id} cannot be fetched: {failure}");
                     return self.incomplete(part, batch, &problem);
                 }
-                Err(failure) => return self.look_failed(part, &failure),
+                Err(failure) => return self.check_failed(part, &failure),
                 Ok(()) => {}
             }
             fs::rename(&unfinished, &path).map_err(|e| Error::file(&path, "write", e))?;
@@ -145,11 +148,11 @@ impl<D: Detail> Driver<'_, D> {
         if let Some(problem) = self.missing_lines(part, batch)? {
             return self.incomplete(part, batch, &problem);
         }
-        self.fetched_all(part, batch)
+        self.all_fetched(part, batch)
     }
 
-    /// The difference between the server's counts and the lines of an ended batch's files; `None` if they agree, or if none of its trials waits
-    /// any more.
+    /// The difference between the server's counts and the lines of an ended batch's files, in words. `None` if they agree, or if no trial of
+    /// the batch is waiting any more.
     fn missing_lines(&self, part: usize, batch: &RemoteBatch) -> Result<Option<String>> {
         let Some(keys) = self.keys(part)? else {
             return Ok(None);
@@ -160,7 +163,7 @@ impl<D: Detail> Driver<'_, D> {
         }
         let server = self.server(part)?;
         let (mut lines, mut replies) = (BTreeSet::new(), BTreeSet::new());
-        for path in self.fetched(part).iter().filter(|path| path.exists()) {
+        for path in self.output_paths(part).iter().filter(|path| path.exists()) {
             for_each_line(path, |line| {
                 let line = server.line(line);
                 let key = line.as_ref().and_then(|line| line.id.parse().ok());
@@ -182,7 +185,7 @@ impl<D: Detail> Driver<'_, D> {
             BatchState::Completed if !is_counted && lines < requests => {
                 format!("its files have {lines} lines for {requests} requests")
             }
-            // Counts and files of a batch that ended early may come later than its state.
+            // Counts and files of a batch that ended early may arrive later than its state.
             BatchState::Expired | BatchState::Cancelled if !is_counted && lines == 0 => {
                 "the server states neither counts nor files".to_owned()
             }
@@ -195,27 +198,27 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Some(problem))
     }
 
-    /// A look at a batch that has ended and whose files are not complete: nothing is asked again and nothing deleted.
+    /// Handles an ended batch with incomplete files: nothing is asked again or deleted.
     ///
     /// # Errors
-    /// If they have not been complete for many looks. The replies that exist are imported then.
+    /// If the files have been incomplete in too many checks. The existing replies are then imported.
     fn incomplete(&mut self, part: usize, batch: &RemoteBatch, problem: &str) -> Result<Step> {
-        let looks = self.notes.incomplete_looks.entry(part).or_default();
-        *looks += 1;
+        let checks = self.notes.incomplete_checks.entry(part).or_default();
+        *checks += 1;
         let is_cancelled = self.until == Goal::Cancelled;
-        let most = if is_cancelled {
-            MOST_INCOMPLETE_CANCELLED
+        let max_checks = if is_cancelled {
+            MAX_INCOMPLETE_CANCELLED
         } else {
-            MOST_INCOMPLETE
+            MAX_INCOMPLETE
         };
-        let has_ended = *looks >= most;
+        let is_last_check = *checks >= max_checks;
         let name = self.part(part).name.clone();
         let text = format!("{name}: batch {}: {problem}", batch.id);
         let states_nothing = !batch.counts.is_known();
-        // A file that is named and could not be fetched may hold paid replies.
-        let has_output = batch.output_file.is_none() || self.fetched(part)[0].exists();
-        let is_without_work = states_nothing && has_output && batch.state != BatchState::Completed;
-        if has_ended && (is_cancelled || is_without_work) {
+        // An output file that could not be downloaded may contain paid replies.
+        let has_output = batch.output_file.is_none() || self.output_paths(part)[0].exists();
+        let did_nothing = states_nothing && has_output && batch.state != BatchState::Completed;
+        if is_last_check && (is_cancelled || did_nothing) {
             let has_files = batch.output_file.is_some() || batch.error_file.is_some();
             if states_nothing && !has_files {
                 tracing::warn!("{text}; taken as a batch without replies");
@@ -225,15 +228,15 @@ impl<D: Detail> Driver<'_, D> {
                 );
                 self.notes.kept_files.insert(part);
             }
-            return self.fetched_all(part, batch);
+            return self.all_fetched(part, batch);
         }
-        if self.until == Goal::LookedAt {
+        if self.until == Goal::Checked {
             self.warn_once(format!(
                 "{text}; nothing is imported, asked again or deleted; look again later (the command of the run without --detach, or batch cancel, ends the wait)"
             ));
             return Ok(Step::Waiting);
         }
-        if !has_ended {
+        if !is_last_check {
             self.warn_once(format!("{text}; looked at again"));
             return Ok(Step::Waiting);
         }
@@ -249,8 +252,8 @@ impl<D: Detail> Driver<'_, D> {
         })
     }
 
-    /// Notes that all files of a batch are fetched.
-    fn fetched_all(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
+    /// Records that all files of a batch are downloaded.
+    fn all_fetched(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
         let files = [&batch.output_file, &batch.error_file];
         let event = Event::Fetched {
             state: batch.state.word().to_owned(),
@@ -261,13 +264,13 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Moved)
     }
 
-    /// The paths of a part's replies and of its failures.
-    pub(super) fn fetched(&self, part: usize) -> [PathBuf; 2] {
+    /// The local paths of a part's output file and error file.
+    pub(super) fn output_paths(&self, part: usize) -> [PathBuf; 2] {
         let stem = self.part(part).stem();
         ["output", "errors"].map(|kind| self.journal.folder().join(format!("{stem}.{kind}.jsonl")))
     }
 
-    /// Deletes the files of a part at the server, unless they are to be kept.
+    /// Deletes the files of a part at the server, unless they are kept.
     pub(super) async fn delete_files(&mut self, part: usize) -> Result<Step> {
         let mut event = Event::Deleted;
         if self.args.collect.keep_files || self.notes.kept_files.contains(&part) {
@@ -284,12 +287,17 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Moved)
     }
 
-    /// The server's names of a part's files. If the input file was uploaded more than once, that includes copies of it of which the
-    /// answer was lost.
+    /// The ids of a part's files at the server. If the input file was uploaded more than once, this includes copies whose upload seemed to
+    /// fail.
     pub(super) async fn files_at_server(&self, part: usize) -> Result<Vec<String>> {
-        let of = self.part(part);
-        let mut ids = of.files.clone();
-        if of.uploads > 1 {
+        let Part {
+            name: part_name,
+            files,
+            uploads,
+            ..
+        } = self.part(part);
+        let mut ids = files.clone();
+        if *uploads > 1 {
             let (name, purpose) = (self.remote_name(part), self.purpose(part));
             match self.server(part)?.files(&purpose).await {
                 Ok(files) => {
@@ -299,29 +307,28 @@ impl<D: Detail> Driver<'_, D> {
                     ids.dedup();
                 }
                 Err(failure) => tracing::warn!(
-                    "{}: copies of its file may be at the server, as {name}: {failure}",
-                    of.name
+                    "{part_name}: copies of its file may be at the server, as {name}: {failure}"
                 ),
             }
         }
         Ok(ids)
     }
 
-    /// Deletes a file at the server; one that is gone is no failure.
+    /// Deletes a file at the server. A missing file counts as deleted.
     pub(super) async fn delete_file(&self, part: usize, id: &str) -> Result<ApiResult<()>> {
         let server = self.server(part)?;
-        let mut tried = server.delete(id).await;
-        for _ in 1..DELETIONS {
-            match &tried {
+        let mut result = server.delete(id).await;
+        for _ in 1..MAX_DELETIONS {
+            match &result {
                 Err(failure) if !failure.is_permanent() => {}
                 _ => break,
             }
             sleep(self.args.collect.poll).await;
-            tried = server.delete(id).await;
+            result = server.delete(id).await;
         }
-        Ok(match tried {
+        Ok(match result {
             Err(failure) if failure.failure.status == Some(404) => Ok(()),
-            tried => tried,
+            result => result,
         })
     }
 }

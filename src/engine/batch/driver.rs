@@ -12,7 +12,7 @@ use super::journal::Journal;
 use super::part::{Part, Stage};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
-use super::stopped::Stopped;
+use super::stopped_models::StoppedModels;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::{AskError, BaseUrl};
 use crate::engine::costs::MoneySettings;
@@ -52,11 +52,11 @@ pub(super) enum Step {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Goal {
     /// All replies are in the records.
-    TakenOver,
+    Imported,
     /// The batches are created, as far as the server accepts them.
     Submitted,
     /// Each batch is checked once; nothing is submitted.
-    LookedAt,
+    Checked,
     /// All batches are cancelled or have ended, and their replies are in the records.
     Cancelled,
 }
@@ -86,7 +86,7 @@ pub(super) struct Driver<'a, D> {
     /// Trials that the server refused and would refuse again.
     pub(super) refused: &'a mut BTreeSet<TrialKey>,
     /// Models whose parts are left as they are.
-    pub(super) stopped: &'a mut Stopped,
+    pub(super) stopped: &'a mut StoppedModels,
     pub(super) notes: Notes,
 }
 
@@ -104,14 +104,14 @@ pub(super) struct Notes {
     /// Consecutive uploads and creations that failed at the server, by part.
     pub(super) failed_calls: BTreeMap<usize, u32>,
     /// Consecutive checks that the server refused, by part.
-    pub(super) refused_looks: BTreeMap<usize, u32>,
+    pub(super) refused_checks: BTreeMap<usize, u32>,
     /// Consecutive checks of an ended batch with incomplete files, by part.
-    pub(super) incomplete_looks: BTreeMap<usize, u32>,
-    /// Parts whose files stay at the server, because they were not complete.
+    pub(super) incomplete_checks: BTreeMap<usize, u32>,
+    /// Parts whose files stay at the server, because they were incomplete.
     pub(super) kept_files: BTreeSet<usize>,
     /// Parts checked since the last wait.
-    pub(super) looked_at: BTreeSet<usize>,
-    /// Total charge for the stored replies in US dollars; `None` if it must be summed again.
+    pub(super) checked: BTreeSet<usize>,
+    /// Total charge for the stored replies in US dollars; `None` if it must be recomputed.
     pub(super) charged: Cell<Option<f64>>,
     /// The last state printed, by part.
     pub(super) printed: BTreeMap<usize, String>,
@@ -131,7 +131,7 @@ impl<D: Detail> Driver<'_, D> {
         let mut wait = poll;
         loop {
             let mut moved = false;
-            self.notes.looked_at.clear();
+            self.notes.checked.clear();
             let mut part = 0;
             // The list may grow: the pieces of a divided part are appended.
             while part < self.journal.parts.len() {
@@ -192,8 +192,8 @@ impl<D: Detail> Driver<'_, D> {
             Stage::Uploaded => self.create(part).await,
             Stage::Creating => self.find_batch(part).await,
             Stage::Created => self.check_batch(part).await,
-            Stage::Fetched { .. } => self.take_over(part),
-            Stage::TakenOver => self.delete_files(part).await,
+            Stage::Fetched { .. } => self.import_replies(part),
+            Stage::Imported => self.delete_files(part).await,
             Stage::Ended => Ok(Step::Waiting),
         }
     }
@@ -209,8 +209,8 @@ impl<D: Detail> Driver<'_, D> {
             return Ok(true);
         }
         Ok(match self.until {
-            Goal::TakenOver | Goal::Cancelled => false,
-            Goal::LookedAt => true,
+            Goal::Imported | Goal::Cancelled => false,
+            Goal::Checked => true,
             Goal::Submitted => {
                 let mut nothing_to_submit = true;
                 for (index, part) in self.journal.parts.iter().enumerate() {
@@ -224,7 +224,7 @@ impl<D: Detail> Driver<'_, D> {
 
     /// True if the command only checks or cancels batches, and no flag names the server of this part.
     fn is_left_alone(&self, part: usize) -> bool {
-        let submits_nothing = matches!(self.until, Goal::LookedAt | Goal::Cancelled);
+        let submits_nothing = matches!(self.until, Goal::Checked | Goal::Cancelled);
         let part = self.part(part);
         submits_nothing && part.stage != Stage::Ended && !self.servers.has(&part.facts.base)
     }
@@ -275,14 +275,14 @@ impl<D: Detail> Driver<'_, D> {
     /// Handles a failed check of a part: it is repeated later, and counted if the failure is permanent.
     ///
     /// # Errors
-    /// If the last [`MAX_REFUSED_CHECKS`] checks of the part failed permanently, or one did under [`Goal::LookedAt`]: the key or the
+    /// If the last [`MAX_REFUSED_CHECKS`] checks of the part failed permanently, or one did under [`Goal::Checked`]: the key or the
     /// address is wrong.
-    pub(super) fn look_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
+    pub(super) fn check_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
         tracing::debug!("{}: {failure}", self.part(part).name);
         if failure.is_permanent() {
-            let refused = self.notes.refused_looks.entry(part).or_default();
+            let refused = self.notes.refused_checks.entry(part).or_default();
             *refused += 1;
-            if *refused >= MAX_REFUSED_CHECKS || self.until == Goal::LookedAt {
+            if *refused >= MAX_REFUSED_CHECKS || self.until == Goal::Checked {
                 return Err(self.fatal(part, failure));
             }
         }
@@ -292,7 +292,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// True if the file or batch of a part has been missing for long enough to conclude that it does not exist. Otherwise warns that the
-    /// search goes on. `what` is `file` or `batch`.
+    /// search continues. `what` is `file` or `batch`.
     pub(super) fn is_missing(&mut self, part: usize, what: &str) -> bool {
         let now = Instant::now();
         let since = *self.notes.missing_since.entry(part).or_insert(now);
@@ -310,8 +310,8 @@ impl<D: Detail> Driver<'_, D> {
         is_missing
     }
 
-    /// Ends the search for a part's file or batch: the next one has its whole time again.
-    pub(super) fn was_found(&mut self, part: usize) {
+    /// Ends the search for a part's file or batch. A later search has the full time again.
+    pub(super) fn end_search(&mut self, part: usize) {
         self.notes.missing_since.remove(&part);
     }
 

@@ -1,8 +1,8 @@
-//! An event of a part, as in the state file: [`Event`].
+//! Events of a part in the journal: [`Event`].
 
 use serde::{Deserialize, Serialize};
 
-/// Facts about a part from its file.
+/// Facts about a part and its file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PartFacts {
     /// SHA-256 of the file, as 64 hexadecimal digits.
@@ -11,47 +11,47 @@ pub(crate) struct PartFacts {
     pub bytes: u64,
     /// Number of requests.
     pub requests: usize,
-    /// The model that is asked, as the endpoint names it.
+    /// The model's id at the endpoint.
     pub model: String,
-    /// The model's name in tables; empty in the journals of earlier versions.
+    /// The model's name in tables; empty in journals of earlier versions.
     #[serde(default)]
     pub name: String,
-    /// The account that is charged: the name of the first model with the same address, key and headers; empty in the journals of earlier
-    /// versions.
+    /// The charged account: the name of the first model with the same base URL, key and headers; empty in journals of earlier versions.
     #[serde(default)]
     pub account: String,
-    /// Address of the model's endpoint, without secrets.
+    /// Base URL of the model's endpoint, without secrets.
     pub base: String,
-    /// The path of each request, as `/v1/chat/completions`.
+    /// Path of each request, for example `/v1/chat/completions`.
     pub url: String,
     /// Expected tokens of all prompts.
     pub tokens: f64,
     /// Expected cost in US dollars, at the price of batches; `None` if the model has no known price.
     pub dollars: Option<f64>,
-    /// The most that all requests can cost, in US dollars at the price of batches; `None` if the model has no known price, and in the
-    /// journals of earlier versions.
+    /// Maximum cost of all requests in US dollars, at the price of batches; `None` if the model has no known price, and in journals of
+    /// earlier versions.
     #[serde(default)]
     pub most_dollars: Option<f64>,
-    /// The most that one of the requests can cost.
+    /// Maximum cost of a single request, in US dollars.
     #[serde(default)]
     pub most_dollars_each: Option<f64>,
 }
 
 impl PartFacts {
-    /// The scope of a limit of waiting tokens: address and model.
-    pub(super) fn place(&self) -> (String, String) {
+    /// The scope of a limit of waiting tokens: base URL and model id.
+    pub(super) fn quota_scope(&self) -> (String, String) {
         (self.base.clone(), self.model.clone())
     }
 
-    /// The most that the requests can cost, in US dollars; 0 if the model has no known price.
-    pub(super) fn most_cost(&self) -> f64 {
+    /// Maximum cost of the requests, in US dollars; 0 if the model has no known price.
+    pub(super) fn max_cost(&self) -> f64 {
         self.most_dollars.or(self.dollars).unwrap_or(0.0)
     }
 
-    /// The number of requests that can cost this much in US dollars together; all if the model has no known price.
+    /// The number of requests whose maximum cost is within `dollars`; all if the model has no known price.
     pub(super) fn requests_within(&self, dollars: f64) -> usize {
-        let each = self.most_dollars_each;
-        let each = each.unwrap_or(self.most_cost() / self.requests.max(1) as f64);
+        let each = self
+            .most_dollars_each
+            .unwrap_or(self.max_cost() / self.requests.max(1) as f64);
         let within = if each > 0.0 {
             dollars / each
         } else {
@@ -60,57 +60,57 @@ impl PartFacts {
         (within.max(0.0) as usize).min(self.requests)
     }
 
-    /// Whether a model of this name and id is the one that is asked.
+    /// True if the part asks the model with this name and id.
     pub(super) fn asks(&self, name: &str, id: &str) -> bool {
         self.model == id && (self.name.is_empty() || self.name == name)
     }
 }
 
-/// Something that happened to a part, or is about to happen.
+/// An event that has happened to a part, or that is about to happen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub(crate) enum Event {
-    /// The file of the part is written; its requests are the part's from here on.
+    /// The file of the part is written.
     Written(PartFacts),
     /// The upload begins.
     Uploading,
     /// The file is at the server.
     Uploaded {
-        /// The server's name of the file.
+        /// The server's id of the file.
         id: String,
     },
-    /// The batch is about to be made.
+    /// The batch is about to be created.
     Creating {
-        /// How often a batch of this part was to be made, this time included.
+        /// Number of attempts to create a batch of this part, including this one.
         attempt: u32,
     },
-    /// The batch is made.
+    /// The batch is created.
     Created {
-        /// The server's name of the batch.
+        /// The server's id of the batch.
         id: String,
     },
-    /// Nothing was made by the last call.
+    /// The last call had no effect.
     Refused {
-        /// The server's words.
+        /// The server's message.
         why: String,
     },
-    /// The batch was refused, because too many tokens wait for batches.
+    /// The batch was refused, because too many tokens are waiting for batches.
     QuotaReached {
-        /// The number of tokens that may wait; `None` if the server does not state it.
+        /// Maximum number of waiting tokens; `None` if the server does not state it.
         limit: Option<u64>,
     },
-    /// The server named another state of the batch than before.
+    /// The server reports a new state of the batch.
     Seen {
         /// The state.
         state: String,
     },
     /// The user or `--give-up` asked the server to cancel the batch.
     Cancelled,
-    /// The replies are in the batch folder.
+    /// The output is downloaded into the batch folder.
     Fetched {
-        /// The state in which the batch ended.
+        /// Final state of the batch.
         state: String,
-        /// The server's names of the files of replies and of failures.
+        /// The server's ids of the output file and the error file.
         files: Vec<String>,
     },
     /// The replies are in the records of the run.
@@ -122,11 +122,11 @@ pub(crate) enum Event {
     },
     /// The files at the server are deleted.
     Deleted,
-    /// The files at the server were to be kept, or could not be deleted.
+    /// The files at the server are kept, or could not be deleted.
     Kept,
-    /// The part is divided, because it is larger than what the server lets wait.
+    /// The part is split, because it exceeds a limit.
     Split {
-        /// The parts that it became.
+        /// The new parts.
         into: Vec<Piece>,
     },
     /// The part ended without a batch; its requests may be asked again.
@@ -136,10 +136,10 @@ pub(crate) enum Event {
     },
 }
 
-/// A part that was a piece of a larger one.
+/// A new part that was split off a larger one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Piece {
-    /// Name of its file.
+    /// File name.
     pub(super) file: String,
     pub(super) facts: PartFacts,
 }

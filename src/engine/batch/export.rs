@@ -1,4 +1,4 @@
-//! Export of the remaining requests as input files of a Batch API: [`export`].
+//! Exports the remaining requests as input files of a Batch API: [`export`].
 
 use std::path::PathBuf;
 
@@ -8,7 +8,9 @@ use super::journal::Journal;
 use super::requests::{CostOf, Requests, require_remote, summary};
 use crate::engine::dark_already;
 use crate::engine::experiment::Experiment;
-use crate::engine::open_run::{OpenRun, Remaining, every_model, limit, missing_notes, pipeline};
+use crate::engine::open_run::{
+    OpenRun, Remaining, every_model, image_limit, missing_notes, pipeline,
+};
 use crate::error::{Error, Result};
 use crate::images::recipes::Maker;
 use crate::images::stored::StoredImages;
@@ -18,17 +20,17 @@ use crate::images::workers::pool;
 use crate::runs::outcome::Outcome;
 use crate::types::manifests::Status;
 
-/// How input files are written.
+/// Settings for writing input files.
 pub(super) struct Target<'a, I: Item> {
     pub(super) files: &'a BatchFileArgs,
-    /// The number of tokens that may wait for batches of a model; `None` if it is not known.
+    /// Maximum number of tokens waiting for batches of a model; `None` if unknown.
     pub(super) quota: Option<u64>,
-    /// The journal of files that the program submits; `None` for files that the user submits.
+    /// Journal for files submitted by the program; `None` for files submitted by the user.
     pub(super) journal: Option<&'a mut Journal>,
     pub(super) cost: CostOf<'a, I>,
 }
 
-/// Writes the input files of the first phase with remaining trials, and records in the run that these trials are sent.
+/// Writes the input files of the first phase with remaining trials, and records in the run that these trials are in a batch.
 pub(crate) fn export<E: Experiment>(
     mut run: OpenRun<'_, E>,
     files: &BatchFileArgs,
@@ -62,7 +64,7 @@ pub(crate) fn export<E: Experiment>(
     Ok(Outcome::text(Status::Complete, String::new()))
 }
 
-/// Writes the trials of a plan into input files; each with its number of requests.
+/// Writes the trials of a plan into input files; returns each file with its number of requests.
 pub(super) fn write<E: Experiment>(
     run: &mut OpenRun<'_, E>,
     phase: usize,
@@ -78,7 +80,7 @@ pub(super) fn write<E: Experiment>(
     } else {
         Vec::new()
     };
-    let limit = limit(settings);
+    let limit = image_limit(settings);
     let maker = Maker::new(run.enhancers.version(), &settings.loading.size);
     let images = run.images.as_ref();
     let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);

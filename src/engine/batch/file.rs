@@ -1,4 +1,4 @@
-//! The input files of one model: [`ModelInputFiles`].
+//! Input files for one model: [`ModelInputFiles`].
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -18,7 +18,7 @@ use darkqa_score::answers::record::Detail;
 /// Extension of a file until it is complete.
 pub(super) const PART: &str = "part";
 
-/// The largest that a file may be.
+/// Maximum contents of a file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FileLimits {
     pub(crate) bytes: u64,
@@ -32,15 +32,15 @@ pub(crate) struct FileLimits {
 pub(crate) struct RequestCost {
     /// Tokens of the prompt.
     pub(crate) tokens: f64,
-    /// US dollars; `None` if the model has no known price.
+    /// Expected cost in US dollars; `None` if the model has no known price.
     pub(crate) dollars: Option<f64>,
-    /// The most that it can cost, in US dollars; `None` if the model has no known price.
+    /// Maximum cost in US dollars; `None` if the model has no known price.
     pub(crate) most_dollars: Option<f64>,
-    /// The most tokens that it can have; `None` if the model has no known price.
+    /// Maximum number of tokens; `None` if the model has no known price.
     pub(crate) bound: Option<TokenBound>,
 }
 
-/// Where the model of the files is asked, as it enters the facts of a part.
+/// Model and endpoint of the files, for the facts of a part.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Destination {
     pub(crate) model: String,
@@ -50,10 +50,10 @@ pub(crate) struct Destination {
     pub(crate) url: String,
 }
 
-/// The places where the requests of a complete file are recorded: the run, and the journal if the program submits the file.
+/// Where the requests of a complete file are recorded: in the run, and in the journal if the program submits the file.
 pub(crate) struct Register<'a, D> {
     pub(crate) store: &'a mut Store<D>,
-    /// `None` for files that the user submits.
+    /// `None` for files submitted by the user.
     pub(crate) journal: Option<&'a mut Journal>,
 }
 
@@ -61,7 +61,7 @@ pub(crate) struct Register<'a, D> {
 pub(crate) struct ModelInputFiles<D> {
     folder: PathBuf,
     stem: String,
-    /// The first number that a file may have.
+    /// The lowest file number.
     first: u32,
     limits: FileLimits,
     destination: Destination,
@@ -75,19 +75,19 @@ struct OpenFile<D> {
     file: BufWriter<File>,
     bytes: u64,
     tokens: f64,
-    /// US dollars; `None` if the model has no known price.
+    /// Expected cost in US dollars; `None` if the model has no known price.
     dollars: Option<f64>,
-    /// The most that all requests can cost, in US dollars.
+    /// Maximum cost of all requests, in US dollars.
     most_dollars: Option<f64>,
-    /// The most that one of them can cost, in US dollars.
+    /// Maximum cost of a single request, in US dollars.
     most_dollars_each: Option<f64>,
     hash: Sha256,
-    /// The trials in the file, as records without an outcome.
+    /// Records of the trials in the file, without outcomes.
     blanks: Vec<Record<D>>,
 }
 
 impl<D: Detail> ModelInputFiles<D> {
-    /// Files whose names begin with `stem`, with numbers from `first` on.
+    /// Files in `folder`, named `stem` with numbers from `first` on.
     pub(crate) fn new(
         folder: &Path,
         stem: &str,
@@ -106,10 +106,10 @@ impl<D: Detail> ModelInputFiles<D> {
         }
     }
 
-    /// Adds one line, and the record of its trial without an outcome.
+    /// Adds a line, and the record of its trial without an outcome.
     ///
     /// # Errors
-    /// If the line alone is larger than a file may be, or cannot be written.
+    /// If the line exceeds the maximum size of a file, or cannot be written.
     pub(crate) fn add(
         &mut self,
         line: &[u8],
@@ -135,7 +135,7 @@ impl<D: Detail> ModelInputFiles<D> {
         }
         let open = match self.open.take() {
             Some(open) => open,
-            None => self.next()?,
+            None => self.create_next()?,
         };
         let open = self.open.insert(open);
         open.file
@@ -153,7 +153,7 @@ impl<D: Detail> ModelInputFiles<D> {
         Ok(())
     }
 
-    /// Closes the last file; all files, each with its number of requests.
+    /// Closes the last file; returns all files, each with its number of requests.
     pub(crate) fn finish(
         mut self,
         register: &mut Register<'_, D>,
@@ -162,8 +162,8 @@ impl<D: Detail> ModelInputFiles<D> {
         Ok(self.done)
     }
 
-    /// A new file, with the first number that no file in the folder has.
-    fn next(&self) -> Result<OpenFile<D>> {
+    /// Creates a file, with the first unused number.
+    fn create_next(&self) -> Result<OpenFile<D>> {
         let path = (self.first..=u32::MAX)
             .map(|n| self.folder.join(format!("{}-{n:03}.jsonl", self.stem)))
             .find(|path| !path.exists())
@@ -183,35 +183,35 @@ impl<D: Detail> ModelInputFiles<D> {
         })
     }
 
-    /// Completes the open file. The run records its trials before the file gets its final name. So nobody uploads a file whose replies
+    /// Completes the open file. The run records its trials before the file gets its final name, so that nobody uploads a file whose replies
     /// the run would not recognize.
     fn close(&mut self, register: &mut Register<'_, D>) -> Result<()> {
         let Some(open) = self.open.take() else {
             return Ok(());
         };
         let unwritten = |e| Error::file(&open.path, "write", e);
-        let flushed = open.file.into_inner();
-        flushed
+        open.file
+            .into_inner()
             .map_err(std::io::IntoInnerError::into_error)
             .and_then(|file| file.sync_all())
             .map_err(unwritten)?;
         if let Some(journal) = &mut register.journal {
             let Destination {
                 model,
-                name: of_model,
+                name,
                 account,
                 base,
                 url,
             } = self.destination.clone();
-            let name = open.path.file_name().unwrap_or_default();
+            let file_name = open.path.file_name().unwrap_or_default();
             journal.add(
-                &name.to_string_lossy(),
+                &file_name.to_string_lossy(),
                 PartFacts {
                     sha256: hexadecimal(&open.hash.finalize()),
                     bytes: open.bytes,
                     requests: open.blanks.len(),
                     model,
-                    name: of_model,
+                    name,
                     account,
                     base,
                     url,
@@ -229,7 +229,7 @@ impl<D: Detail> ModelInputFiles<D> {
     }
 }
 
-/// Bytes as hexadecimal digits.
+/// Formats bytes as hexadecimal digits.
 pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     let digit = |half: u8| char::from_digit(half.into(), 16).unwrap_or('0');
     bytes

@@ -1,4 +1,4 @@
-//! The batches of a run, without the run's settings: [`FolderBatches`].
+//! The batches of a run folder, without the settings of the run: [`FolderBatches`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -12,9 +12,9 @@ use super::part::Stage;
 use super::recover::recover;
 use super::servers::Servers;
 use super::settings::{BatchRunArgs, CollectArgs};
-use super::stopped::Stopped;
+use super::stopped_models::StoppedModels;
 use super::summary;
-use crate::ask::{AccessArgs, Endpoint, Sending};
+use crate::ask::{AccessArgs, BaseUrl, Endpoint, Sending};
 use crate::error::{Error, Result};
 use crate::images::progress::Progress;
 use crate::images::workers::unstarted;
@@ -25,9 +25,9 @@ use darkqa_score::answers::record::Detail;
 /// The task for the batches of a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum FolderTask {
-    /// Take over the replies of those that have ended.
+    /// Import the replies of ended batches.
     Fetch,
-    /// Cancel them, wait until they have ended, and take over the existing replies.
+    /// Cancel all batches, wait until they have ended, and import the existing replies.
     Cancel,
 }
 
@@ -39,10 +39,10 @@ pub(crate) struct FolderBatches<'a> {
 }
 
 impl<'a> FolderBatches<'a> {
-    /// The batches of a run. Without an address in the flags, they are looked for where they were made.
+    /// Opens the batches of a run. Without a base URL in the flags, uses the one at which the batches were created.
     ///
     /// # Errors
-    /// If the program submitted no batch of this run, or its server is not known.
+    /// If the program submitted no batch of this run, or its server is unknown.
     pub(crate) fn open(
         folder: &Path,
         manifest: &'a RunManifest,
@@ -56,7 +56,7 @@ impl<'a> FolderBatches<'a> {
             });
         }
         let mut servers = Servers::default();
-        if let Some(base) = address(&journal, access)? {
+        if let Some(base) = base_url(&journal, access)? {
             let access = AccessArgs {
                 base_url: vec![base],
                 ..access.clone()
@@ -72,22 +72,22 @@ impl<'a> FolderBatches<'a> {
         })
     }
 
-    /// One line a part, with what the server reports of its batch.
+    /// One line per part, with the state of its batch at the server.
     pub(crate) fn status(&self) -> Result<String> {
-        let runtime = start()?;
+        let runtime = start_runtime()?;
         let mut counts = BTreeMap::new();
         let mut problems = String::new();
         for part in &self.journal.parts {
             let (Stage::Created, Some(id)) = (&part.stage, &part.batch) else {
                 continue;
             };
-            let looked = match self.servers.server(&part.facts) {
+            let checked = match self.servers.server(&part.facts) {
                 Ok(server) => runtime
                     .block_on(server.batch(id))
                     .map_err(|e| e.to_string()),
                 Err(error) => Err(error.to_string()),
             };
-            match looked {
+            match checked {
                 Ok(batch) => {
                     let (done, total) = (batch.counts.done, batch.counts.total);
                     let state = format!("{}, {done} of {total}", batch.state.word());
@@ -101,17 +101,18 @@ impl<'a> FolderBatches<'a> {
         Ok(summary::lines(&self.journal, &counts) + &problems)
     }
 
-    /// Refuses batches of several accounts at the address: the flags name one key, with which the others are not found.
+    /// Refuses batches of several accounts at the same base URL, because the flags have only one key.
     fn refuse_several_accounts(&self) -> Result<()> {
-        let accounts = self
+        let accounts: BTreeSet<&str> = self
             .journal
             .parts
             .iter()
             .filter(|part| part.stage != Stage::Ended)
             .filter(|part| self.servers.has(&part.facts.base))
-            .map(|part| &*part.facts.account);
-        // Journals of earlier versions name none.
-        let accounts: BTreeSet<&str> = accounts.filter(|account| !account.is_empty()).collect();
+            .map(|part| &*part.facts.account)
+            // Journals of earlier versions have no accounts.
+            .filter(|account| !account.is_empty())
+            .collect();
         if accounts.len() < 2 {
             return Ok(());
         }
@@ -124,10 +125,10 @@ impl<'a> FolderBatches<'a> {
         Err(Error::usage("--api-key-env", problem))
     }
 
-    /// Carries out a task in the open folder; a text about the batches.
+    /// Carries out a task; returns a text about the batches.
     ///
     /// # Errors
-    /// If the server refuses what every further call would ask.
+    /// If the server refuses all further calls.
     pub(crate) fn carry_out<D: Detail>(
         mut self,
         task: FolderTask,
@@ -138,7 +139,7 @@ impl<'a> FolderBatches<'a> {
         self.refuse_several_accounts()?;
         recover(&mut self.journal, store)?;
         let args = BatchRunArgs::collecting(collect);
-        let mut stopped = Stopped::default();
+        let mut stopped = StoppedModels::default();
         let mut driver = Driver {
             store,
             manifest: self.manifest,
@@ -149,14 +150,14 @@ impl<'a> FolderBatches<'a> {
             money: None,
             progress,
             until: match task {
-                FolderTask::Fetch => Goal::LookedAt,
+                FolderTask::Fetch => Goal::Checked,
                 FolderTask::Cancel => Goal::Cancelled,
             },
             refused: &mut BTreeSet::new(),
             stopped: &mut stopped,
             notes: Notes::default(),
         };
-        start()?.block_on(driver.drive())?;
+        start_runtime()?.block_on(driver.drive())?;
         if let Some(first) = stopped.take_errors().into_iter().next() {
             return Err(first);
         }
@@ -164,16 +165,19 @@ impl<'a> FolderBatches<'a> {
     }
 }
 
-fn start() -> Result<runtime::Runtime> {
-    let mut builder = runtime::Builder::new_current_thread();
-    builder.enable_all().build().map_err(|e| unstarted(&e))
+/// Starts a single-threaded runtime.
+pub(super) fn start_runtime() -> Result<runtime::Runtime> {
+    runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+        .map_err(|e| unstarted(&e))
 }
 
-/// The address of the server: as the flags name it, else where the parts were made; `None` if nothing is left to do at a server.
+/// The base URL of the server: from the flags, or else the one at which the parts were created. `None` if nothing is left to do.
 ///
 /// # Errors
-/// If a key would go to an address that only the folder names.
-fn address(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
+/// If there are several base URLs, or a key would be sent to one that only the folder names.
+fn base_url(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
     match &access.base_url[..] {
         [] => {}
         [base] => return Ok(Some(base.clone())),
@@ -199,13 +203,12 @@ fn address(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
         return Ok(None);
     };
     // The journal has no query string, which the variable may have.
-    let variable = std::env::var("OPENAI_BASE_URL").ok();
-    let same = variable.filter(|text| {
-        let url = text.parse::<crate::ask::BaseUrl>();
-        url.is_ok_and(|url| url.to_string() == base)
-    });
-    if let Some(same) = same {
-        return Ok(Some(same));
+    if let Ok(variable) = std::env::var("OPENAI_BASE_URL")
+        && variable
+            .parse::<BaseUrl>()
+            .is_ok_and(|url| url.to_string() == base)
+    {
+        return Ok(Some(variable));
     }
     access.check_run_address(&base.parse()?)?;
     Ok(Some(base.to_owned()))

@@ -1,7 +1,7 @@
-//! The state file of a run's batches, `batch/state.jsonl`: [`Journal`].
+//! The journal of a run's batches, `batch/state.jsonl`: [`Journal`].
 //!
-//! One line an event, forced to the disk before and after each call that changes something at the server. So what a killed process
-//! did is known, but for its last call; that one is looked for at the server.
+//! It has one line per event, synced to disk before and after each call that changes something at the server. So everything that a killed
+//! process did is known, except for the effect of its last call, which is looked up at the server.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -19,23 +19,23 @@ use crate::store::{BATCH, BATCH_STATE, now};
 use crate::types::Digest;
 use crate::types::manifests::RunManifest;
 
-/// Number of digits of a run's hash.
+/// Number of hexadecimal digits of a run's hash.
 const HASH_DIGITS: usize = 16;
 
-/// One line of the state file.
+/// A line of the journal.
 #[derive(Debug, Serialize, Deserialize)]
 struct Line {
     /// Name of the part's file.
     file: String,
     #[serde(flatten)]
     event: Event,
-    /// Time in UTC.
+    /// Time of the event, in UTC.
     at: String,
 }
 
 impl Line {
-    /// Checks that the file of each part is a plain name, so that nothing outside the batch folder is read or written.
-    fn check(&self) -> std::result::Result<(), String> {
+    /// Checks that all file names are plain names, so that nothing outside the batch folder is read or written.
+    fn check_names(&self) -> std::result::Result<(), String> {
         let pieces = match &self.event {
             Event::Split { into } => &into[..],
             _ => &[],
@@ -52,30 +52,29 @@ impl Line {
     }
 }
 
-/// Whether a text is the name of a part's file: `part-`, then characters that no path is made of, then `.jsonl`.
+/// True if a text is the name of a part's file: `part-`, safe characters, and `.jsonl`.
 fn is_part_name(text: &str) -> bool {
-    let middle = text
-        .strip_prefix("part-")
-        .and_then(|rest| rest.strip_suffix(".jsonl"));
-    middle.is_some_and(|middle| file_name(middle) == middle)
+    text.strip_prefix("part-")
+        .and_then(|rest| rest.strip_suffix(".jsonl"))
+        .is_some_and(|middle| file_name(middle) == middle)
 }
 
-/// The parts of a run and what happened to them.
+/// The parts of a run and their states.
 #[derive(Debug)]
 pub(crate) struct Journal {
     folder: PathBuf,
-    /// Names this run in the names of files and in the marks of batches at the server.
+    /// Identifies the run in names of files and in marks of batches at the server.
     pub(super) run: String,
     pub(super) parts: Vec<Part>,
-    /// Numbers of tokens that may wait for batches, by address and model, as far as a server has stated them.
+    /// Maximum numbers of waiting tokens stated by servers, by [`PartFacts::quota_scope`].
     pub(super) limits: BTreeMap<(String, String), u64>,
 }
 
 impl Journal {
-    /// The state of the batches of a run; empty if there are none.
+    /// Reads the journal of a run; empty if there is none.
     ///
     /// # Errors
-    /// If the state file cannot be read.
+    /// If the file cannot be read, or a line is broken.
     pub(crate) fn open(run_folder: &Path, manifest: &RunManifest) -> Result<Self> {
         let facts = (&manifest.identity, &manifest.created);
         let hash = Digest::canonical("darkqa.batch/1", &facts)?.to_string();
@@ -98,7 +97,7 @@ impl Journal {
             }
             let line: Line =
                 serde_json::from_slice(line).map_err(|e| Error::json_line(&path, index + 1, &e))?;
-            line.check()
+            line.check_names()
                 .map_err(|problem| Error::line(&path, index + 1, problem))?;
             journal.apply(&line.file, &line.event, &line.at);
         }
@@ -119,7 +118,7 @@ impl Journal {
         self.folder.join(&self.parts[part].name)
     }
 
-    /// The first number that no file of this stem has or had.
+    /// The first number that is higher than those of all files with this stem.
     pub(super) fn free_number(&self, stem: &str) -> u32 {
         self.parts
             .iter()
@@ -132,37 +131,35 @@ impl Journal {
             + 1
     }
 
-    /// Whether something is left to do for a part.
+    /// True if any part has not ended.
     pub(super) fn has_open_parts(&self) -> bool {
         self.parts.iter().any(|part| part.stage != Stage::Ended)
     }
 
-    /// Whether a batch may be at work at a server.
+    /// True if a server may be working on a batch.
     pub(super) fn has_batches(&self) -> bool {
-        let at_work = |stage: &Stage| matches!(stage, Stage::Creating | Stage::Created);
-        self.parts.iter().any(|part| at_work(&part.stage))
+        self.parts.iter().any(Part::is_out)
     }
 
-    /// Number of requests of parts whose replies are not taken over.
+    /// Number of requests of parts whose replies are not imported.
     pub(super) fn open_requests(&self) -> usize {
-        let open = |part: &&Part| !matches!(part.stage, Stage::TakenOver | Stage::Ended);
         self.parts
             .iter()
-            .filter(open)
+            .filter(|part| !matches!(part.stage, Stage::Imported | Stage::Ended))
             .map(|part| part.facts.requests)
             .sum()
     }
 
-    /// The most that batches can cost whose replies are not imported yet, in US dollars.
-    pub(crate) fn most_dollars(&self) -> f64 {
+    /// Maximum cost of batches whose replies are not imported yet, in US dollars.
+    pub(crate) fn max_open_cost(&self) -> f64 {
         self.parts
             .iter()
             .filter(|part| part.may_cost())
-            .map(|part| part.facts.most_cost())
+            .map(|part| part.facts.max_cost())
             .sum()
     }
 
-    /// Records that a file was written as a part.
+    /// Records the written file of a part.
     pub(super) fn add(&mut self, name: &str, facts: PartFacts) -> Result<()> {
         self.write(name, Event::Written(facts))
     }
@@ -173,7 +170,7 @@ impl Journal {
         self.write(&name, event)
     }
 
-    /// Appends an event and forces it to the disk.
+    /// Appends an event, and syncs the file to disk.
     fn write(&mut self, file: &str, event: Event) -> Result<()> {
         let path = self.path();
         let line = Line {
@@ -201,7 +198,7 @@ impl Journal {
             (None, _) => return,
         };
         if let Event::QuotaReached { limit: Some(limit) } = event {
-            self.limits.insert(part.facts.place(), *limit);
+            self.limits.insert(part.facts.quota_scope(), *limit);
         }
         part.apply(event, at);
         if let Event::Split { into } = event {
@@ -213,7 +210,7 @@ impl Journal {
     }
 }
 
-/// Appends to a file that may end in an incomplete line, and forces it to the disk.
+/// Appends to a file after removing an incomplete last line, and syncs it to disk.
 fn append(path: &Path, text: &[u8]) -> std::io::Result<()> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)?;
@@ -224,15 +221,17 @@ fn append(path: &Path, text: &[u8]) -> std::io::Result<()> {
     file.sync_all()
 }
 
-/// Cuts off what follows the last line end.
+/// Removes an incomplete last line.
 fn cut_incomplete_line(path: &Path) -> std::io::Result<()> {
     let text = match reading::read(path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
         Err(e) => return Err(e),
     };
-    let complete = text.iter().rposition(|byte| *byte == b'\n');
-    let complete = complete.map_or(0, |last| last + 1);
+    let complete = text
+        .iter()
+        .rposition(|byte| *byte == b'\n')
+        .map_or(0, |last| last + 1);
     if complete == text.len() {
         return Ok(());
     }

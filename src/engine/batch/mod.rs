@@ -1,8 +1,8 @@
-//! Runs through the files of a Batch API, which takes a day and costs half.
+//! Runs through a Batch API, which may take a day and usually costs half.
 //!
-//! The remaining requests are written as input files into `RUN/batch/`, with the records of their trials, still without an outcome. Goal
-//! their replies are there, the run does not ask those trials. Either the user uploads the files to the API and imports its output; or
-//! the program does ([`run`]): each file is a [`part`] then, a [`driver`] moves the parts on, and a [`journal`] holds how far they are.
+//! The remaining requests are written as input files into `RUN/batch/`, together with records of their trials without outcomes. Until the
+//! replies are imported, the run does not ask those trials. Either the user uploads the files to the API and imports its output, or the
+//! program does both ([`run`]): each file is then a [`part`], a [`driver`] advances the parts, and a [`journal`] records their progress.
 
 mod collect;
 mod driver;
@@ -10,6 +10,7 @@ mod event;
 pub(crate) mod export;
 mod file;
 mod folder;
+mod import;
 pub(crate) mod journal;
 mod part;
 mod part_name;
@@ -21,10 +22,9 @@ pub(crate) mod run;
 mod servers;
 mod settings;
 mod split;
-mod stopped;
+mod stopped_models;
 mod submit;
 mod summary;
-mod take_over;
 
 pub(crate) use folder::{FolderBatches, FolderTask};
 pub(crate) use settings::{BatchRunArgs, CollectArgs};
@@ -49,8 +49,9 @@ pub(crate) struct BatchFileArgs {
     pub url: Option<String>,
 }
 
-/// Reads the path of a URL.
+/// Parses the path of a URL.
 fn path(text: &str) -> Result<String, String> {
-    let path = text.starts_with('/').then(|| text.to_owned());
-    path.ok_or_else(|| "a path expected, as /v1/chat/completions".to_owned())
+    text.starts_with('/')
+        .then(|| text.to_owned())
+        .ok_or_else(|| "a path expected, as /v1/chat/completions".to_owned())
 }

@@ -1,55 +1,55 @@
-//! One input file and its batch: [`Part`].
+//! An input file and its batch: [`Part`].
 
 use super::event::{Event, PartFacts};
 
-/// How far a part has come.
+/// Progress of a part.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Stage {
-    /// Its file is written.
+    /// The file is written.
     Written,
-    /// Its file may be at the server.
+    /// The file may be at the server.
     Uploading,
-    /// Its file is at the server.
+    /// The file is at the server.
     Uploaded,
-    /// Its batch may have been made.
+    /// The batch may exist at the server.
     Creating,
-    /// Its batch is made, and not known to have ended.
+    /// The batch exists, and is not known to have ended.
     Created,
-    /// Its replies are in the batch folder.
+    /// The output is in the batch folder.
     Fetched {
-        /// The state in which the batch ended.
+        /// Final state of the batch.
         state: String,
     },
-    /// Its replies are in the records.
-    TakenOver,
+    /// The replies are in the records.
+    Imported,
     /// Nothing is left to do.
     Ended,
 }
 
-/// One input file and its batch.
+/// An input file and its batch.
 #[derive(Debug, Clone)]
 pub(crate) struct Part {
     /// Name of the file in the batch folder.
     pub(super) name: String,
     pub(super) facts: PartFacts,
     pub(super) stage: Stage,
-    /// How often a batch of this part was to be made.
+    /// Number of attempts to create a batch.
     pub(super) attempt: u32,
-    /// Whether a batch that was to be made was refused or not found, so that it may exist all the same.
+    /// True if a creation was refused or its batch was not found, so that a batch may exist all the same.
     pub(super) in_doubt: bool,
-    /// How often its file was to be uploaded.
+    /// Number of attempts to upload the file.
     pub(super) uploads: u32,
-    /// The server's names of its files: the input file first.
+    /// Ids of the files at the server, the input file first.
     pub(super) files: Vec<String>,
-    /// The server's name of the batch; `None` before it is made.
+    /// Id of the batch at the server; `None` before it is created.
     pub(super) batch: Option<String>,
-    /// When the batch was made, in UTC; empty before.
+    /// Time at which the batch was created, in UTC; empty before.
     pub(super) created: String,
-    /// The last state that the server named, or why the part ended without a batch; empty before.
+    /// Last state reported by the server, or the reason why the part ended without a batch; empty before.
     pub(super) state: String,
-    /// Whether the server was asked to cancel the batch.
+    /// True if the server was asked to cancel the batch.
     pub(super) cancelled: bool,
-    /// Numbers of replies and of requests without a reply, after they were taken over.
+    /// Numbers of requests with and without a reply; `None` before the replies are imported.
     pub(super) outcome: Option<(usize, usize)>,
 }
 
@@ -76,17 +76,17 @@ impl Part {
         self.name.strip_suffix(".jsonl").unwrap_or(&self.name)
     }
 
-    /// Whether its requests are at the server, or may be.
+    /// True if the batch exists or may exist at the server.
     pub(super) fn is_out(&self) -> bool {
         matches!(self.stage, Stage::Creating | Stage::Created)
     }
 
-    /// Whether its batch costs something that the records do not have yet, or may cost it.
+    /// True if the batch may have costs that are not in the records yet.
     pub(super) fn may_cost(&self) -> bool {
         self.is_out() || matches!(self.stage, Stage::Fetched { .. })
     }
 
-    /// Whether its batch still has to be made.
+    /// True if the batch is still to be created.
     pub(super) fn is_unsubmitted(&self) -> bool {
         matches!(
             self.stage,
@@ -94,7 +94,7 @@ impl Part {
         )
     }
 
-    /// Changes the part by what happened to it at a time in UTC.
+    /// Updates the part by an event at a time in UTC.
     pub(super) fn apply(&mut self, event: &Event, at: &str) {
         self.stage = match event {
             Event::Written(facts) => {
@@ -145,7 +145,7 @@ impl Part {
             }
             Event::TakenOver { answered, failed } => {
                 self.outcome = Some((*answered, *failed));
-                Stage::TakenOver
+                Stage::Imported
             }
             Event::Split { .. } => {
                 "divided into smaller parts".clone_into(&mut self.state);

@@ -1,4 +1,4 @@
-//! Files that a killed process did not complete: [`recover`].
+//! Recovers files that a killed process left incomplete: [`recover`].
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,17 +9,18 @@ use sha2::{Digest as _, Sha256};
 
 use super::event::Event;
 use super::file::{PART, hexadecimal};
+use super::import::{for_each_line, key_of};
 use super::journal::Journal;
 use super::part::Stage;
 use super::split::PIECE;
-use super::take_over::{for_each_line, key_of};
 use crate::error::{Error, Result};
 use crate::files::create_new;
 use crate::store::Store;
 use crate::types::TrialKey;
 use darkqa_score::answers::record::Detail;
 
-/// Completes the files of parts whose requests the run has recorded, as far as it has; deletes the others.
+/// Completes the files of parts with the requests that the run has recorded; gives up parts without such requests, and deletes other
+/// unfinished files.
 pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Result<()> {
     let waiting = store.pending_in_batches()?;
     for part in 0..journal.parts.len() {
@@ -42,7 +43,7 @@ pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Res
     check_trials(journal, store)
 }
 
-/// Refuses to go on without the records of trials that a batch at the server asks: they would be asked, and paid, again.
+/// Checks that the records of all trials in batches at the server exist. Without them, the trials would be asked and paid for again.
 fn check_trials<D: Detail>(journal: &Journal, store: &Store<D>) -> Result<()> {
     let at_server: Vec<usize> = (0..journal.parts.len())
         .filter(|part| {
@@ -81,7 +82,7 @@ fn check_trials<D: Detail>(journal: &Journal, store: &Store<D>) -> Result<()> {
     Ok(())
 }
 
-/// Completes a file with those of its lines whose trials are recorded. Returns whether there are any.
+/// Completes a file, with only the lines whose trials are recorded. Returns true if there are any.
 fn complete(
     journal: &mut Journal,
     part: usize,
@@ -104,10 +105,10 @@ fn complete(
         }
         Ok(())
     })?;
-    let synced = file
-        .into_inner()
-        .map_err(std::io::IntoInnerError::into_error);
-    synced.and_then(|file| file.sync_all()).map_err(unwritten)?;
+    file.into_inner()
+        .map_err(std::io::IntoInnerError::into_error)
+        .and_then(|file| file.sync_all())
+        .map_err(unwritten)?;
     if facts.requests == 0 {
         return Ok(false);
     }

@@ -1,4 +1,4 @@
-//! Import of the output of a Batch API into a run: [`import`].
+//! Imports the output of a Batch API into a run: [`import`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
@@ -15,22 +15,22 @@ use crate::types::manifests::RunManifest;
 use crate::types::{Failure, FailureKind, LostAttempts, Record, Reply, TrialKey, Unstated, Usage};
 use darkqa_score::answers::record::{Detail, answered};
 
-/// Numbers of lines, by what they led to.
+/// Numbers of lines by outcome.
 #[derive(Debug, Default)]
 pub(super) struct ReplyCounts {
     pub(super) answered: usize,
     pub(super) failed: usize,
     /// Lines of trials that were imported before, or answered in another way.
     imported_before: usize,
-    /// Lines whose id is in no batch of this run.
+    /// Lines whose id belongs to no batch of this run.
     unknown: usize,
 }
 
-/// The trials of a run that wait for a batch, and the place for their replies.
+/// Import of replies to the trials of a run that are waiting for a batch.
 pub(super) struct ReplyImport<'a, D> {
     store: &'a mut Store<D>,
     manifest: &'a RunManifest,
-    /// Trials in batches, as records without an outcome.
+    /// Records of the trials in batches, without outcomes.
     blanks: HashMap<TrialKey, Record<D>>,
     waiting: BTreeSet<TrialKey>,
     /// The first failure of each waiting trial. It is stored at the end, because a later line may have the reply.
@@ -45,7 +45,7 @@ struct FailedTrial<D> {
 }
 
 impl<'a, D: Detail> ReplyImport<'a, D> {
-    /// The trials of a run that were sent in batches.
+    /// An import into a run.
     pub(super) fn new(store: &'a mut Store<D>, manifest: &'a RunManifest) -> Result<Self> {
         let blanks = store.batch_trials()?.into_iter();
         Ok(Self {
@@ -58,8 +58,8 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         })
     }
 
-    /// Stores the reply of a line, or keeps its failure, if its trial waits for a batch.
-    pub(super) fn take(&mut self, line: BatchLine) -> Result<()> {
+    /// Stores the reply of a line, or keeps its failure, if its trial is waiting for a batch.
+    pub(super) fn add_line(&mut self, line: BatchLine) -> Result<()> {
         let key = line.id.parse::<TrialKey>().ok();
         let Some(blank) = key.and_then(|key| self.blanks.get(&key)) else {
             self.counts.unknown += 1;
@@ -90,7 +90,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         }
         let unstated = match reply.usage {
             _ if bound.is_none() => bound,
-            Some(usage) => missing(bound, usage),
+            Some(usage) => unstated_rest(bound, usage),
             None => bound,
         };
         let lost = LostAttempts {
@@ -108,7 +108,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         self.store.append(&answered(blank, reply)?)
     }
 
-    /// Keeps the failure of a trial that has neither a reply nor a failure, if it waits for a batch.
+    /// Keeps the failure of a trial without a line, if it is waiting for a batch.
     pub(super) fn fail(&mut self, key: TrialKey, failure: Failure) {
         if self.waiting.contains(&key)
             && !self.failures.contains_key(&key)
@@ -120,19 +120,19 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         }
     }
 
-    /// Trials whose request failed, with the kind of the failure.
+    /// Trials whose request failed, with the kind of failure.
     pub(super) fn failures(&self) -> impl Iterator<Item = (TrialKey, FailureKind)> {
         self.failures
             .iter()
             .map(|(key, failed)| (*key, failed.failure.kind))
     }
 
-    /// Number of trials that wait for a batch, and have neither a reply nor a failure.
+    /// Number of waiting trials without a reply or failure.
     fn waiting(&self) -> usize {
         self.waiting.len() - self.failures.len()
     }
 
-    /// Stores the failures and forces the records to the disk; the numbers of lines.
+    /// Stores the failures, and syncs the records to disk; returns the numbers of lines.
     pub(super) fn finish(mut self) -> Result<ReplyCounts> {
         for FailedTrial { blank, failure } in std::mem::take(&mut self.failures).into_values() {
             self.counts.failed += 1;
@@ -143,8 +143,8 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
     }
 }
 
-/// The part of a bound that a server leaves open with these stated tokens.
-fn missing(bound: Unstated, usage: Usage) -> Unstated {
+/// The part of a token bound that the server's stated tokens leave open.
+fn unstated_rest(bound: Unstated, usage: Usage) -> Unstated {
     let tokens = TokenBound {
         prompt: bound.prompt_tokens,
         reply: bound.completion_tokens,
@@ -155,15 +155,15 @@ fn missing(bound: Unstated, usage: Usage) -> Unstated {
     }
 }
 
-/// Whether a request of a batch may have been charged although it failed and the server stated no tokens.
+/// True if a failed request without stated tokens may have been charged.
 fn may_be_charged(kind: FailureKind) -> bool {
     matches!(kind, FailureKind::Server | FailureKind::Response)
 }
 
-/// Imports the replies of output and error files; a summary for the user. Each reply is imported once, even if a file is named again.
+/// Imports the replies in output and error files; returns a summary. Each reply is imported once, even if a file is imported again.
 ///
 /// # Errors
-/// If the run has written no batch, or a line is not one of a Batch API. The replies before it are kept.
+/// If the run has written no batch, or a line is not in the format of a Batch API. Earlier replies stay imported.
 pub(crate) fn import<D: Detail>(
     store: &mut Store<D>,
     manifest: &RunManifest,
@@ -187,7 +187,7 @@ pub(crate) fn import<D: Detail>(
                 continue;
             }
             let line = BatchLine::read(&line).ok_or_else(|| not_a_line(path, i + 1))?;
-            replies.take(line)?;
+            replies.add_line(line)?;
         }
     }
     let waiting = replies.waiting();

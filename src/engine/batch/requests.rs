@@ -1,4 +1,4 @@
-//! The remaining requests as lines of input files: [`Requests`].
+//! Writes the remaining requests as lines of input files: [`Requests`].
 
 use std::fmt::Write;
 use std::fs;
@@ -15,28 +15,29 @@ use crate::images::trials::{Item, PreparedGroup, Stimulus, Trial};
 use crate::store::BATCH;
 use crate::text::words::counted;
 
-/// The share of the tokens that may wait for batches that one part takes, so that one part can wait while another is worked on; chosen.
+/// Maximum tokens of a part, as a share of the tokens that may wait for batches; chosen below a half, so that one part can wait while
+/// another one is processed.
 pub(super) const SHARE_OF_QUOTA: f64 = 0.45;
 
-/// The most tokens of a part if the limit is not known; chosen.
-const PART_TOKENS: f64 = 2e6;
+/// Maximum tokens of a part if the limit is unknown; chosen.
+const MAX_PART_TOKENS: f64 = 2e6;
 
-/// The expected cost of a trial's request about a stimulus.
+/// Function that returns the expected cost of a trial's request with a stimulus.
 pub(super) type CostOf<'a, I> = &'a (dyn Fn(&Trial<I>, &Stimulus) -> RequestCost + Sync);
 
 /// The input files of all models, while they are written.
 pub(crate) struct Requests<'a, I: Item> {
     models: &'a [ModelUnderTest],
-    /// The path in each line, by model.
+    /// URL path of the requests, by model.
     urls: Vec<String>,
-    /// Files of each model, in the order of `models`.
+    /// Files by model.
     files: Vec<ModelInputFiles<I::Detail>>,
     register: Register<'a, I::Detail>,
     cost: CostOf<'a, I>,
 }
 
 impl<'a, I: Item> Requests<'a, I> {
-    /// Input files in the batch folder of a run, which is created; `all` are the models of all phases.
+    /// Input files in the batch folder of a run, which is created if needed. `all` are the models of all phases.
     ///
     /// # Errors
     /// If the folder cannot be created.
@@ -53,7 +54,7 @@ impl<'a, I: Item> Requests<'a, I> {
         let journal = register.journal.as_deref();
         let (mut files, mut urls) = (Vec::new(), Vec::new());
         for (i, model) in models.iter().enumerate() {
-            // The number is needed: two names may give the same file name, and a model may be asked with and without images.
+            // The number makes the name unique: two models may have the same file name, or one may be asked with and without images.
             let stem = file_name(&format!("{}-{}", i + 1, model.name));
             let destination = destination(model, all, args)?;
             urls.push(destination.url.clone());
@@ -62,9 +63,10 @@ impl<'a, I: Item> Requests<'a, I> {
                 None => (stem, 1, f64::INFINITY),
                 Some(journal) => {
                     let stem = format!("part-{stem}");
-                    let place = (destination.base.clone(), destination.model.clone());
-                    let limit = journal.limits.get(&place).copied().or(quota);
-                    let tokens = limit.map_or(PART_TOKENS, |limit| SHARE_OF_QUOTA * limit as f64);
+                    let scope = (destination.base.clone(), destination.model.clone());
+                    let limit = journal.limits.get(&scope).copied().or(quota);
+                    let tokens =
+                        limit.map_or(MAX_PART_TOKENS, |limit| SHARE_OF_QUOTA * limit as f64);
                     (stem.clone(), journal.free_number(&stem), tokens)
                 }
             };
@@ -77,8 +79,13 @@ impl<'a, I: Item> Requests<'a, I> {
                 requests: args.file_requests.unwrap_or(known.requests()).get(),
                 tokens,
             };
-            let files_of_model = ModelInputFiles::new(&folder, &stem, first, limits, destination);
-            files.push(files_of_model);
+            files.push(ModelInputFiles::new(
+                &folder,
+                &stem,
+                first,
+                limits,
+                destination,
+            ));
         }
         Ok(Self {
             models,
@@ -105,7 +112,7 @@ impl<'a, I: Item> Requests<'a, I> {
             };
             let mut blank = under_test.blank(trial, stimulus);
             let cost = (self.cost)(trial, stimulus);
-            // What a reply without stated tokens may have cost.
+            // The maximum, in case the reply states no tokens.
             if let Some(bound) = cost.bound {
                 blank.lost.unstated = bound.unstated();
             }
@@ -114,7 +121,7 @@ impl<'a, I: Item> Requests<'a, I> {
         Ok(())
     }
 
-    /// Closes all files; each with its number of requests.
+    /// Closes all files; returns each with its number of requests.
     pub(crate) fn finish(mut self) -> Result<Vec<(PathBuf, usize)>> {
         let mut written = Vec::new();
         for files in self.files {
@@ -124,7 +131,7 @@ impl<'a, I: Item> Requests<'a, I> {
     }
 }
 
-/// Where the requests of a model go.
+/// Model and endpoint of the requests to a model.
 fn destination(
     model: &ModelUnderTest,
     all: &[&ModelUnderTest],
@@ -146,7 +153,7 @@ fn destination(
 /// Checks that all models can be asked in a batch.
 ///
 /// # Errors
-/// If one is built in.
+/// If a model is built in.
 pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
     match models.iter().find(|model| !model.model.is_remote()) {
         None => Ok(()),
@@ -160,16 +167,16 @@ pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
     }
 }
 
-/// Checks that the endpoints of all models have files and batches of the form that the program submits.
+/// Checks that the endpoints of all models support the file and batch API that the program uses.
 ///
 /// # Errors
-/// If the vendor of one has none, or others.
+/// If the vendor of an endpoint does not support it.
 pub(super) fn require_files(models: &[ModelUnderTest]) -> Result<()> {
     let mut bases = models.iter().filter_map(|model| model.model.batch_base());
     bases.try_for_each(|base| BatchInterface::at(&base).require_files())
 }
 
-/// The files written, with the next step for the user.
+/// The text about the written files and the next step for the user.
 pub(crate) fn summary(
     written: &[(PathBuf, usize)],
     answered: usize,

@@ -1,44 +1,42 @@
-//! A run through batches that the program submits itself: [`run`].
+//! Runs an experiment through batches that the program submits: [`run`].
 
 use std::collections::{BTreeMap, BTreeSet};
-
-use tokio::runtime;
 
 use super::BatchFileArgs;
 use super::driver::{Driven, Driver, Goal, Notes};
 use super::export;
 use super::file::RequestCost;
+use super::folder::start_runtime;
 use super::journal::Journal;
 use super::recover::recover;
 use super::requests::{require_files, require_remote};
 use super::servers::Servers;
 use super::settings::BatchRunArgs;
-use super::stopped::Stopped;
+use super::stopped_models::StoppedModels;
 use super::summary;
 use crate::engine::circuit_breaker::EndReason;
-use crate::engine::costs::{Answering, Budget, BudgetNotes};
+use crate::engine::costs::{Budget, BudgetNotes, RunModels};
 use crate::engine::experiment::Experiment;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::open_run::{OpenRun, Remaining, answered, every_model};
 use crate::error::{Error, Result};
 use crate::images::enhancement::enhancers::{self, OpenEnhancers};
-use crate::images::trials::Item as _;
-use crate::images::workers::unstarted;
+use crate::images::trials::{Item as _, Stimulus, Trial};
 use crate::report::forecast::money;
 use crate::runs::outcome::Outcome;
 use crate::store::StoredTrial;
 use crate::types::TrialKey;
 use crate::types::manifests::Status;
 
-/// How often what a batch did not answer is asked again in another one; chosen.
-const MOST_REPEATS: usize = 3;
+/// Maximum number of further batches for requests without a reply; chosen.
+const MAX_REPEATS: usize = 3;
 
-/// How a phase ended.
+/// The end of a phase.
 enum PhaseEnd {
-    /// All was asked, as far as batches go.
+    /// Every request that can be batched was submitted, and the replies are imported.
     Asked,
-    /// The batches are made, and the command returns.
+    /// The batches are created, and the command returns.
     Detached,
     /// The command ends early.
     Early(EndReason),
@@ -47,7 +45,7 @@ enum PhaseEnd {
 /// Asks the remaining trials in batches, phase by phase, and waits for their replies.
 ///
 /// # Errors
-/// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+/// If a model is built in, or a server refuses all further calls. The batches stay, and the same command continues.
 pub(crate) fn run<E: Experiment>(
     run: OpenRun<'_, E>,
     files: &BatchFileArgs,
@@ -60,8 +58,8 @@ pub(crate) fn run<E: Experiment>(
         files,
         args,
         refused: BTreeSet::new(),
-        stopped: Stopped::default(),
-        enhancers_taken: false,
+        stopped: StoppedModels::default(),
+        enhancers_used: false,
     };
     recover(&mut batches.journal, &batches.run.store)?;
     let mut end = EndReason::AllAsked;
@@ -81,7 +79,7 @@ pub(crate) fn run<E: Experiment>(
     batches.finish(end)
 }
 
-/// The mean tokens of each model's stored replies; `None` if none states them.
+/// The mean completion tokens of each model's stored replies; `None` if no reply states them.
 fn reply_lengths(models: &[ModelUnderTest], stored: &[StoredTrial]) -> Vec<Option<f64>> {
     models
         .iter()
@@ -98,22 +96,23 @@ fn reply_lengths(models: &[ModelUnderTest], stored: &[StoredTrial]) -> Vec<Optio
         .collect()
 }
 
-/// An open run with its batches.
+/// State of a run with its batches.
 struct BatchRun<'a, 'b, E: Experiment> {
     run: OpenRun<'a, E>,
     journal: Journal,
     files: &'b BatchFileArgs,
     args: &'b BatchRunArgs,
-    /// Trials that were refused in a way in which they would be again.
+    /// Trials that the server refused and would refuse again.
     refused: BTreeSet<TrialKey>,
-    /// The models that cannot be asked any further.
-    stopped: Stopped,
-    enhancers_taken: bool,
+    /// Models that cannot be asked any further.
+    stopped: StoppedModels,
+    /// True if the enhancers of `run` may have been used up.
+    enhancers_used: bool,
 }
 
 impl<E: Experiment> BatchRun<'_, '_, E> {
     fn phase(&mut self, phase: usize) -> Result<PhaseEnd> {
-        for repeat in 0..=MOST_REPEATS {
+        for repeat in 0..=MAX_REPEATS {
             let mut remaining = self.remaining(phase)?;
             if repeat == 0 {
                 self.warn_of_other_batches(&remaining);
@@ -156,24 +155,27 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         Ok(PhaseEnd::Asked)
     }
 
-    /// The trials of a phase that are to be asked in a batch.
+    /// The trials of a phase that are to be asked in a batch, without refused ones and those of stopped models.
     fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let mut remaining = self.run.remaining(phase)?;
         let models = self.run.experiment.models(phase);
-        let mut left_out = BTreeSet::new();
-        for (_, group) in remaining.plan.groups() {
-            let of_stopped = group.trials.iter().filter(|trial| {
+        let excluded: BTreeSet<TrialKey> = remaining
+            .plan
+            .groups()
+            .flat_map(|(_, group)| &group.trials)
+            .filter(|trial| {
                 self.stopped
-                    .has_model(phase, (trial.model, &models[trial.model]))
-            });
-            left_out.extend(of_stopped.map(|trial| trial.key));
-        }
-        let is_left_out = |key: &TrialKey| self.refused.contains(key) || left_out.contains(key);
-        remaining.plan.exclude(is_left_out);
+                    .has_model(phase, trial.model, &models[trial.model])
+            })
+            .map(|trial| trial.key)
+            .collect();
+        remaining
+            .plan
+            .exclude(|key| self.refused.contains(key) || excluded.contains(key));
         Ok(remaining)
     }
 
-    /// The first error, if all models of a phase are stopped; `None` if one may still be asked.
+    /// The first error, if all models of a phase are stopped; `None` if any may still be asked.
     fn stopped_phase(&mut self, phase: usize) -> Option<Error> {
         let is_stopped = self
             .run
@@ -181,12 +183,14 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             .models(phase)
             .iter()
             .enumerate()
-            .all(|model| self.stopped.has_model(phase, model));
-        let errors = is_stopped.then(|| self.stopped.take_errors())?;
-        errors.into_iter().next()
+            .all(|(index, model)| self.stopped.has_model(phase, index, model));
+        if !is_stopped {
+            return None;
+        }
+        self.stopped.take_errors().into_iter().next()
     }
 
-    /// Warns about trials in files that the user submits.
+    /// Warns about trials in files submitted by the user.
     fn warn_of_other_batches(&self, remaining: &Remaining<E>) {
         let own = self.journal.open_requests();
         if remaining.in_batch > own {
@@ -197,8 +201,8 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         }
     }
 
-    /// Asks one trial of each model directly, so that what the server refuses is found out before a batch is made. A model that cannot
-    /// be asked any further is stopped alone.
+    /// Asks one trial of each model directly, to find out what the server refuses before a batch is created. A model that cannot be asked
+    /// any further is stopped; the others continue.
     fn scout(&mut self, phase: usize, mut remaining: Remaining<E>) -> Result<EndReason> {
         let mut scouts = BTreeMap::new();
         for (_, group) in remaining.plan.groups() {
@@ -219,7 +223,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         Ok(end)
     }
 
-    /// Stops the models whose question had no reply, for one of these errors.
+    /// Stops the models whose scout trial has no reply because of one of these errors.
     fn stop_unanswered(
         &mut self,
         phase: usize,
@@ -229,10 +233,12 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let answered = answered(&self.run.store.trials()?);
         let models = self.run.experiment.models(phase);
         for (model, _) in scouts.iter().filter(|(_, key)| !answered.contains(key)) {
-            // Each error begins with the name of its model. Another failure is that of the question alone.
+            // Each error begins with the name of its model. Without an error, only this question has failed.
             let name = format!("{}: ", models[*model].name);
-            let is_of_model = |error: &Error| matches!(error, Error::Endpoint { problem, .. } if problem.starts_with(&name));
-            if errors.iter().any(is_of_model) {
+            let has_error = errors.iter().any(|error| {
+                matches!(error, Error::Endpoint { problem, .. } if problem.starts_with(&name))
+            });
+            if has_error {
                 self.stopped.add_model(phase, *model);
             }
         }
@@ -250,17 +256,16 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let experiment = self.run.experiment;
         let (models, money) = (experiment.models(phase), &experiment.settings().money);
         let all = every_model(experiment);
-        let answering = Answering {
+        let run_models = RunModels {
             models: &all,
             manifest: Some(&self.run.manifest),
         };
-        let budget = Budget::for_run(money, models, answering, &remaining.stored)?;
+        let budget = Budget::for_run(money, models, run_models, &remaining.stored)?;
         if self.args.no_scout {
-            BudgetNotes::new(models).say_unlimited(budget.spending());
+            BudgetNotes::new(models).warn_unlimited(budget.spending());
         }
         let replies = reply_lengths(models, &remaining.stored);
-        let cost = |trial: &_, stimulus: &crate::images::trials::Stimulus| {
-            let trial: &crate::images::trials::Trial<E::Item> = trial;
+        let cost = |trial: &Trial<E::Item>, stimulus: &Stimulus| {
             let model = &models[trial.model];
             let images = stimulus.images.iter().map(|image| image.facts());
             let tokens = budget.expected_tokens(model, trial, images.clone());
@@ -287,18 +292,18 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         Ok(())
     }
 
-    /// Reads the enhancers again if they have been used.
+    /// Reads the enhancers again, if they have been used.
     fn reload_enhancers(&mut self) -> Result<()> {
         let settings = self.run.experiment.settings();
-        if self.enhancers_taken {
+        if self.enhancers_used {
             let files = enhancers::read(&settings.enhancers.llie)?;
             self.run.enhancers = OpenEnhancers::deferred(files, &settings.loading);
         }
-        self.enhancers_taken = true;
+        self.enhancers_used = true;
         Ok(())
     }
 
-    /// Moves all parts on; `None` if the user interrupted it.
+    /// Advances all parts; `None` if the user interrupted.
     fn drive(&mut self) -> Result<Option<Driven>> {
         let experiment = self.run.experiment;
         let models = every_model(experiment);
@@ -315,17 +320,13 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             until: if self.args.detach {
                 Goal::Submitted
             } else {
-                Goal::TakenOver
+                Goal::Imported
             },
             refused: &mut self.refused,
             stopped: &mut self.stopped,
             notes: Notes::default(),
         };
-        let runtime = runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(|e| unstarted(&e))?;
-        runtime.block_on(async {
+        start_runtime()?.block_on(async {
             let mut interrupt = Interrupt::listen()?;
             tokio::select! {
                 biased;
@@ -345,7 +346,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         }
     }
 
-    /// The outcome of a command that does not wait: batches still at work.
+    /// The outcome of a command that does not wait for its batches.
     fn detached(self) -> Outcome {
         let folder = self.run.store.folder().display().to_string();
         let parts = summary::lines(&self.journal, &BTreeMap::new());
@@ -380,7 +381,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         self.run.finish(end)
     }
 
-    /// Writes into the manifest how requests were changed, so that it is known however the command ends.
+    /// Writes changes to requests into the manifest at once, so that they are known however the command ends.
     fn note_adapted(&mut self) -> Result<()> {
         let before = self.run.manifest.settings.clone();
         for phase in 0..E::PHASES.len() {

@@ -1,4 +1,4 @@
-//! The servers of a run's parts: [`Servers`].
+//! The batch servers of a run: [`Servers`].
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use crate::ask::batch_api::BatchServer;
 use crate::engine::models::ModelUnderTest;
 use crate::error::{Error, Result};
 
-/// Servers with files and batches, each with the key and headers of a model.
+/// Batch servers, each with the key and headers of a model.
 #[derive(Debug, Default)]
 pub(crate) struct Servers(Vec<ModelServer>);
 
@@ -15,11 +15,11 @@ pub(crate) struct Servers(Vec<ModelServer>);
 #[derive(Debug)]
 struct ModelServer {
     base: String,
-    /// The model's name in tables; empty if the server is that of any model.
+    /// The model's name in tables; empty if the server is for all models.
     name: String,
-    /// The model as the endpoint names it.
+    /// The model's id at the endpoint.
     id: String,
-    /// The name of the first model with the same address, key and headers.
+    /// The name of the first model with the same base URL, key and headers.
     account: String,
     server: BatchServer,
 }
@@ -46,7 +46,7 @@ impl Servers {
         Ok(Self(servers))
     }
 
-    /// The server at one address, for all models.
+    /// A single server, for all models.
     pub(super) fn at(base: String, server: BatchServer) -> Self {
         let [name, id, account] = [(); 3].map(|()| String::new());
         Self(vec![ModelServer {
@@ -58,23 +58,22 @@ impl Servers {
         }])
     }
 
-    /// Whether there is a server at an address.
+    /// True if there is a server at a base URL.
     pub(super) fn has(&self, base: &str) -> bool {
         self.0.iter().any(|one| one.base == base)
     }
 
-    /// The server of a part: with the key of its model. The server of a model that has another name now is known only if all models at
-    /// its address have one key.
+    /// The server of a part, with the key of its model. For a renamed model, all models at the base URL must have the same account.
     ///
     /// # Errors
-    /// If no flag names it.
+    /// If no flag names the base URL, or the account is ambiguous.
     pub(super) fn server(&self, facts: &PartFacts) -> Result<&BatchServer> {
         let PartFacts { base, name, .. } = facts;
         let at_base: Vec<&ModelServer> = self.0.iter().filter(|one| one.base == *base).collect();
         let own = at_base.iter().find(|one| facts.asks(&one.name, &one.id));
         let accounts: BTreeSet<&str> = at_base.iter().map(|one| &*one.account).collect();
         match (own, &at_base[..]) {
-            // A part of an earlier version has no name.
+            // Parts of earlier versions have no name.
             (Some(own), _) if !name.is_empty() || accounts.len() == 1 => Ok(&own.server),
             (_, [first, ..]) if accounts.len() == 1 => Ok(&first.server),
             (_, []) => {
@@ -98,7 +97,7 @@ impl Servers {
     }
 }
 
-/// The account that is charged for the batches of a model: the name of the first model with the same address, key and headers.
+/// The account charged for the batches of a model: the name of the first model with the same base URL, key and headers.
 ///
 /// # Errors
 /// If a header value has characters that HTTP does not allow.

@@ -1,4 +1,4 @@
-//! The flags for batches that the program submits itself: [`BatchRunArgs`], [`CollectArgs`].
+//! The flags for batches submitted by the program: [`BatchRunArgs`], [`CollectArgs`].
 
 use std::num::NonZeroU64;
 use std::time::Duration;
@@ -49,7 +49,7 @@ pub(crate) struct BatchRunArgs {
 }
 
 impl BatchRunArgs {
-    /// The default flags, with these for looking after batches.
+    /// The flags of a command that submits nothing.
     #[must_use]
     pub(super) fn collecting(collect: &CollectArgs) -> Self {
         Self {

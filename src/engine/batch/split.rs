@@ -1,4 +1,4 @@
-//! Dividing a part that is larger than what the server lets wait: [`Driver::split`].
+//! Splits a part that exceeds a limit: [`Driver::split`].
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
@@ -8,34 +8,37 @@ use sha2::{Digest as _, Sha256};
 use super::driver::{Driver, Step};
 use super::event::{Event, PartFacts, Piece};
 use super::file::hexadecimal;
-use super::take_over::for_each_line;
+use super::import::for_each_line;
 use crate::error::{Error, Result};
 use crate::files::create_new;
 use darkqa_score::answers::record::Detail;
 
-/// Extension of a piece until the journal has it.
+/// Extension of a piece's file until the journal has recorded it.
 pub(super) const PIECE: &str = "split";
 
 impl<D: Detail> Driver<'_, D> {
-    /// Divides a part into so many pieces, each a part of its own. A request alone cannot be divided.
+    /// Splits a part into `pieces` new parts.
     ///
-    /// The pieces are written first, then one event names them all, then they get their names. So a killed process leaves either the
-    /// part or its pieces.
+    /// The files of the pieces are written first, then one event records all of them, then they get their final names. So a killed process
+    /// leaves either the part or its pieces.
+    ///
+    /// # Errors
+    /// If the part has only one request, or a file cannot be written.
     pub(super) async fn split(&mut self, part: usize, pieces: usize) -> Result<Step> {
-        let of = self.part(part).clone();
-        let pieces = pieces.clamp(2, of.facts.requests.max(2));
-        if of.facts.requests < 2 {
+        let whole = self.part(part).clone();
+        let pieces = pieces.clamp(2, whole.facts.requests.max(2));
+        if whole.facts.requests < 2 {
             let problem = format!(
                 "{}: one request has about {:.0} tokens, more than may wait for batches of {}; send smaller images with --image max-side=N",
-                of.name, of.facts.tokens, of.facts.model
+                whole.name, whole.facts.tokens, whole.facts.model
             );
             return Err(Error::Endpoint {
-                endpoint: of.facts.base,
+                endpoint: whole.facts.base,
                 problem,
             });
         }
         for id in &self.files_at_server(part).await? {
-            // The pieces are uploaded; what stays of the whole costs nothing.
+            // A remaining file is harmless, because only the pieces are used.
             if let Err(failure) = self.delete_file(part, id).await? {
                 tracing::warn!("the file {id} could not be deleted at the server: {failure}");
             }
@@ -54,56 +57,38 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Moved)
     }
 
+    /// Writes the files of the pieces, with the extension [`PIECE`].
     fn write_pieces(&self, part: usize, pieces: usize) -> Result<Vec<Piece>> {
-        let of = self.part(part);
-        let stem = of
+        let whole = self.part(part);
+        let stem = whole
             .stem()
             .rsplit_once('-')
-            .map_or(of.stem(), |(stem, _)| stem);
-        let first = self.journal.free_number(stem);
-        let most = of.facts.requests.div_ceil(pieces);
+            .map_or(whole.stem(), |(stem, _)| stem);
+        let first = self.journal.free_number(stem) as usize;
+        let max_requests = whole.facts.requests.div_ceil(pieces);
+        let name = |index: usize| format!("{stem}-{:03}.jsonl", first + index);
+        let path = |index: usize| {
+            let path = self.journal.folder().join(name(index));
+            path.with_extension(PIECE)
+        };
         let mut writer = PieceWriter::default();
         let mut into = Vec::new();
-        let name = |number: usize| format!("{stem}-{:03}.jsonl", first as usize + number);
         let finish = |writer: PieceWriter, into: &mut Vec<Piece>| {
-            let share = writer.requests as f64 / of.facts.requests as f64;
-            let facts = PartFacts {
-                sha256: hexadecimal(&writer.hash.finalize()),
-                bytes: writer.bytes,
-                requests: writer.requests,
-                tokens: (of.facts.tokens * share).round(),
-                dollars: of.facts.dollars.map(|dollars| dollars * share),
-                // Its requests may be those that can cost more than others.
-                most_dollars: of
-                    .facts
-                    .most_dollars_each
-                    .map(|each| each * writer.requests as f64),
-                ..of.facts.clone()
-            };
-            let path = self
-                .journal
-                .folder()
-                .join(name(into.len()))
-                .with_extension(PIECE);
-            let file = writer.file.map(BufWriter::into_inner).transpose();
-            file.map_err(std::io::IntoInnerError::into_error)
-                .and_then(|file| file.map_or(Ok(()), |file| file.sync_all()))
-                .map_err(|e| Error::file(&path, "write", e))?;
+            let index = into.len();
+            let facts = writer
+                .finish(&whole.facts)
+                .map_err(|e| Error::file(path(index), "write", e))?;
             into.push(Piece {
-                file: name(into.len()),
+                file: name(index),
                 facts,
             });
             Ok(())
         };
         for_each_line(&self.journal.file(part), |line| {
-            if writer.requests == most {
+            if writer.requests == max_requests {
                 finish(std::mem::take(&mut writer), &mut into)?;
             }
-            let path = self
-                .journal
-                .folder()
-                .join(name(into.len()))
-                .with_extension(PIECE);
+            let path = path(into.len());
             writer
                 .add(line, || create_new(&path))
                 .map_err(|e| Error::file(&path, "write", e))
@@ -113,7 +98,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 }
 
-/// A piece that is being written.
+/// Writer of the file of a piece.
 #[derive(Default)]
 struct PieceWriter {
     file: Option<BufWriter<File>>,
@@ -137,5 +122,27 @@ impl PieceWriter {
         self.bytes += line.len() as u64;
         self.requests += 1;
         Ok(())
+    }
+
+    /// Syncs the file to disk; returns the facts about the piece of a part.
+    fn finish(self, whole: &PartFacts) -> std::io::Result<PartFacts> {
+        if let Some(file) = self.file {
+            file.into_inner()
+                .map_err(std::io::IntoInnerError::into_error)?
+                .sync_all()?;
+        }
+        let share = self.requests as f64 / whole.requests as f64;
+        Ok(PartFacts {
+            sha256: hexadecimal(&self.hash.finalize()),
+            bytes: self.bytes,
+            requests: self.requests,
+            tokens: (whole.tokens * share).round(),
+            dollars: whole.dollars.map(|dollars| dollars * share),
+            // The piece may contain the most expensive requests.
+            most_dollars: whole
+                .most_dollars_each
+                .map(|each| each * self.requests as f64),
+            ..whole.clone()
+        })
     }
 }

@@ -1,4 +1,4 @@
-//! The steps of a part until its batch is made: upload, creation, and the search for what a killed process may have made.
+//! Steps of a part until its batch is created: upload, creation, and the search for files and batches of a killed process.
 
 use super::driver::{Driver, Goal, Step};
 use super::event::Event;
@@ -8,14 +8,14 @@ use crate::error::{Error, Result};
 use crate::report::forecast::money;
 use darkqa_score::answers::record::Detail;
 
-/// How many uploads or creations in a row at which the server fails end the work for a model; chosen: 15 minutes by
-/// [`hold`](Driver::hold) with the default of `--poll`.
-const MOST_FAILED: u32 = 5;
+/// Number of consecutive failed uploads or creations after which a model is stopped; chosen: 15 minutes by [`hold`](Driver::hold) with the
+/// default of `--poll`.
+const MAX_FAILED_CALLS: u32 = 5;
 
 impl<D: Detail> Driver<'_, D> {
-    /// Uploads the file of a part, if its batch may be made.
+    /// Uploads the file of a part, if its batch may be created.
     pub(super) async fn upload(&mut self, part: usize) -> Result<Step> {
-        if let Some(pieces) = self.too_large(part)? {
+        if let Some(pieces) = self.required_pieces(part)? {
             return self.split(part, pieces).await;
         }
         if self.is_held(part)? {
@@ -26,9 +26,11 @@ impl<D: Detail> Driver<'_, D> {
             let why = "its file is gone".to_owned();
             return self.give_up(part, why).map(|()| Step::Moved);
         }
-        let (bytes, of) = (path.metadata().map(|file| file.len()), self.part(part));
-        if bytes.is_ok_and(|bytes| bytes != of.facts.bytes) {
-            let expected = of.facts.bytes;
+        let expected = self.part(part).facts.bytes;
+        if path
+            .metadata()
+            .is_ok_and(|metadata| metadata.len() != expected)
+        {
             let problem = format!(
                 "the file was changed after it was written: {expected} bytes expected; batch cancel {} frees its requests",
                 self.store.folder().display()
@@ -48,29 +50,29 @@ impl<D: Detail> Driver<'_, D> {
                 self.notes.failed_calls.remove(&part);
                 Ok(Step::Moved)
             }
-            Err(failure) => self.not_made(part, &failure),
+            Err(failure) => self.call_failed(part, &failure),
         }
     }
 
-    /// Looks for the file of a part that may have been uploaded.
+    /// Searches for the file of a part that may have been uploaded.
     pub(super) async fn find_file(&mut self, part: usize) -> Result<Step> {
         let name = self.remote_name(part);
         let listed = self.server(part)?.files(&self.purpose(part)).await;
         let files = match listed {
             Ok(files) => files,
-            // A second copy of a file costs nothing.
+            // Upload again: a second copy of a file costs nothing.
             Err(failure) if failure.is_unsupported() => {
                 return self.refuse(part, "the server does not list its files");
             }
-            Err(failure) => return self.look_failed(part, &failure),
+            Err(failure) => return self.check_failed(part, &failure),
         };
         let bytes = self.part(part).facts.bytes;
-        let mut files = files.into_iter();
-        let found =
-            files.find(|file| file.name == name && file.bytes.is_none_or(|other| other == bytes));
+        let found = files
+            .into_iter()
+            .find(|file| file.name == name && file.bytes.is_none_or(|other| other == bytes));
         let event = match found {
             Some(file) => {
-                self.was_found(part);
+                self.end_search(part);
                 Event::Uploaded { id: file.id }
             }
             None if !self.is_missing(part, "file") => return Ok(Step::Waiting),
@@ -82,9 +84,9 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Moved)
     }
 
-    /// Makes the batch of a part, if it may be made now and the server has read the file.
+    /// Creates the batch of a part, if it may be created now and the server has processed the file.
     pub(super) async fn create(&mut self, part: usize) -> Result<Step> {
-        if let Some(pieces) = self.too_large(part)? {
+        if let Some(pieces) = self.required_pieces(part)? {
             return self.split(part, pieces).await;
         }
         if self.is_held(part)? {
@@ -98,14 +100,14 @@ impl<D: Detail> Driver<'_, D> {
                 Ok(at_server) => match at_server.readiness {
                     Readiness::Ready => self.notes.ready.insert(file.clone()),
                     Readiness::Pending => return Ok(Step::Waiting),
-                    Readiness::Refused => return Err(self.unread(part)),
+                    Readiness::Refused => return Err(self.unreadable_file_error(part)),
                 },
-                // It was deleted, so it is uploaded again.
+                // The file was deleted, so upload it again.
                 Err(failure) if failure.failure.status == Some(404) => {
                     self.journal.record(part, Event::Uploading)?;
                     return self.refuse(part, "the file is not at the server any more");
                 }
-                Err(failure) => return self.look_failed(part, &failure),
+                Err(failure) => return self.check_failed(part, &failure),
             };
         }
         if self.part(part).in_doubt
@@ -123,12 +125,12 @@ impl<D: Detail> Driver<'_, D> {
             mark: &mark,
         };
         match self.server(part)?.create(new).await {
-            Ok(batch) => self.created(part, batch.id),
-            Err(failure) => self.not_made(part, &failure),
+            Ok(batch) => self.batch_created(part, batch.id),
+            Err(failure) => self.call_failed(part, &failure),
         }
     }
 
-    /// Looks for the batch of a part that may have been made.
+    /// Searches for the batch of a part that may have been created.
     pub(super) async fn find_batch(&mut self, part: usize) -> Result<Step> {
         let listed = self.server(part)?.batches().await;
         let batches = match listed {
@@ -136,13 +138,15 @@ impl<D: Detail> Driver<'_, D> {
             Err(failure) if failure.is_unsupported() && self.until == Goal::Cancelled => {
                 return self.withdraw(part).await;
             }
-            Err(failure) if failure.is_unsupported() => return Err(self.unknown(part)),
-            Err(failure) => return self.look_failed(part, &failure),
+            Err(failure) if failure.is_unsupported() => {
+                return Err(self.unknown_batch_error(part));
+            }
+            Err(failure) => return self.check_failed(part, &failure),
         };
         match self.part_batch(part, batches) {
             Some(batch) => {
-                self.was_found(part);
-                self.created(part, batch.id)
+                self.end_search(part);
+                self.batch_created(part, batch.id)
             }
             None if self.is_missing(part, "batch") => {
                 self.refuse(part, "the batch is not at the server")
@@ -151,35 +155,35 @@ impl<D: Detail> Driver<'_, D> {
         }
     }
 
-    /// Looks for a batch that an earlier attempt made all the same; `None` if a new one is to be made.
+    /// Searches for a batch that an earlier attempt created although it seemed to fail; `None` if a new one must be created.
     async fn find_earlier(&mut self, part: usize) -> Result<Option<Step>> {
         let listed = self.server(part)?.batches().await;
         match listed {
             Ok(batches) => match self.part_batch(part, batches) {
-                Some(batch) => self.created(part, batch.id).map(Some),
+                Some(batch) => self.batch_created(part, batch.id).map(Some),
                 None => Ok(None),
             },
             Err(failure) if failure.is_unsupported() => Ok(None),
-            Err(failure) => self.look_failed(part, &failure).map(Some),
+            Err(failure) => self.check_failed(part, &failure).map(Some),
         }
     }
 
-    /// The batch of a part: of its last attempt, else one of an earlier attempt that the server did not refuse.
+    /// The batch of a part: that of its last attempt, or else one of an earlier attempt that has not failed.
     fn part_batch(&self, part: usize, batches: Vec<RemoteBatch>) -> Option<RemoteBatch> {
-        let last = self.mark(part);
-        let any = format!("{}/{}/", self.journal.run, self.part(part).stem());
-        let is_ours = |batch: &RemoteBatch| {
-            batch.mark == last
-                || (batch.mark.starts_with(&any) && batch.state != BatchState::Failed)
-        };
-        let (own, earlier): (Vec<_>, Vec<_>) = batches
+        let last_mark = self.mark(part);
+        let prefix = format!("{}/{}/", self.journal.run, self.part(part).stem());
+        let (last, earlier): (Vec<_>, Vec<_>) = batches
             .into_iter()
-            .filter(is_ours)
-            .partition(|batch| batch.mark == last);
-        own.into_iter().chain(earlier).next()
+            .filter(|batch| {
+                batch.mark == last_mark
+                    || (batch.mark.starts_with(&prefix) && batch.state != BatchState::Failed)
+            })
+            .partition(|batch| batch.mark == last_mark);
+        last.into_iter().chain(earlier).next()
     }
 
-    fn created(&mut self, part: usize, id: String) -> Result<Step> {
+    /// Records and prints that the batch of a part is created.
+    fn batch_created(&mut self, part: usize, id: String) -> Result<Step> {
         let facts = &self.part(part).facts;
         let cost = match facts.dollars.zip(facts.most_dollars) {
             Some((expected, most)) => {
@@ -190,20 +194,20 @@ impl<D: Detail> Driver<'_, D> {
         let line = format!("batch {id} of {} requests{cost}", facts.requests);
         self.say(part, &line);
         self.journal.record(part, Event::Created { id })?;
-        // The first look is worth a wait.
-        self.notes.looked_at.insert(part);
+        // Wait before the first check.
+        self.notes.checked.insert(part);
         Ok(Step::Moved)
     }
 
-    /// Handles an upload or a creation that did not succeed.
-    fn not_made(&mut self, part: usize, failure: &AskError) -> Result<Step> {
+    /// Handles a failed upload or creation.
+    fn call_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
         if let Some(quota) = &failure.quota {
             return self.quota_reached(part, quota);
         }
         if failure.may_have_effect {
             let failed = self.notes.failed_calls.entry(part).or_default();
             *failed += 1;
-            if *failed >= MOST_FAILED {
+            if *failed >= MAX_FAILED_CALLS {
                 return Err(self.fatal(part, failure));
             }
         } else {
@@ -219,7 +223,7 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Waiting)
     }
 
-    /// Notes that nothing was made by the last call.
+    /// Records that the last call had no effect.
     fn refuse(&mut self, part: usize, why: &str) -> Result<Step> {
         let why = why.to_owned();
         self.journal.record(part, Event::Refused { why })?;
@@ -238,14 +242,14 @@ impl<D: Detail> Driver<'_, D> {
         stated.unwrap_or(known.purpose()).to_owned()
     }
 
-    /// The mark by which the batch of a part is found again.
+    /// The mark that identifies the batch of a part's last attempt at the server.
     fn mark(&self, part: usize) -> String {
         let (run, part) = (&self.journal.run, self.part(part));
         format!("{run}/{}/{}", part.stem(), part.attempt)
     }
 
     /// The error for a file that the server could not read.
-    fn unread(&self, part: usize) -> Error {
+    fn unreadable_file_error(&self, part: usize) -> Error {
         let part = self.part(part);
         let id = part.files.first().map_or("", String::as_str);
         let problem = format!("{}: the server could not read this file ({id})", part.name);
@@ -255,8 +259,8 @@ impl<D: Detail> Driver<'_, D> {
         }
     }
 
-    /// The error for a batch that may or may not exist, at a server that lists none.
-    fn unknown(&self, part: usize) -> Error {
+    /// The error for a batch that may exist at a server that does not list batches.
+    fn unknown_batch_error(&self, part: usize) -> Error {
         let part = self.part(part);
         Error::Endpoint {
             endpoint: part.facts.base.clone(),

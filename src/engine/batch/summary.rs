@@ -6,9 +6,7 @@ use std::fmt::Write as _;
 use super::journal::Journal;
 use super::part::{Part, Stage};
 
-/// One line a part: its file, requests, batch and state.
-///
-/// `states` has the states of parts that the server was just asked about, by name.
+/// One line per part, with its file, requests, batch and state. `states` are current states from the server, by name of the part.
 pub(super) fn lines(journal: &Journal, states: &BTreeMap<String, String>) -> String {
     let mut text = String::new();
     for part in &journal.parts {
@@ -22,22 +20,22 @@ pub(super) fn lines(journal: &Journal, states: &BTreeMap<String, String>) -> Str
             states
                 .get(&part.name)
                 .cloned()
-                .unwrap_or_else(|| state(part))
+                .unwrap_or_else(|| state_words(part))
         );
     }
     text
 }
 
 /// The state of a part, in words.
-fn state(part: &Part) -> String {
+fn state_words(part: &Part) -> String {
     match (&part.stage, part.outcome) {
         (Stage::Written | Stage::Uploading | Stage::Uploaded, _) => "not submitted yet".to_owned(),
         (Stage::Creating, _) => "being submitted".to_owned(),
         (Stage::Created, _) if part.state.is_empty() => "submitted".to_owned(),
         (Stage::Fetched { state }, _) => format!("{state}, fetched"),
-        (Stage::TakenOver | Stage::Ended, Some((answered, failed))) => {
+        (Stage::Imported | Stage::Ended, Some((answered, failed))) => {
             format!("{}: {answered} answered, {failed} not", part.state)
         }
-        (Stage::Created | Stage::TakenOver | Stage::Ended, _) => part.state.clone(),
+        (Stage::Created | Stage::Imported | Stage::Ended, _) => part.state.clone(),
     }
 }

@@ -24,16 +24,16 @@ const MESSAGE_TOKENS: f64 = 10.0;
 /// Tokens reserved for the first reply of a model without a token limit; chosen.
 const UNLIMITED_REPLY: u64 = 4096;
 
-/// Whose replies a run has: the models of all its phases, and those that its manifest knows from earlier commands.
+/// The models that have replies in a run: those of all its phases, and those of earlier commands in its manifest.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Answering<'a> {
+pub(crate) struct RunModels<'a> {
     pub(crate) models: &'a [&'a ModelUnderTest],
-    /// `None` if the models are all.
+    /// `None` if there are no other models.
     pub(crate) manifest: Option<&'a RunManifest>,
 }
 
-impl Answering<'_> {
-    /// The price of the replies under a name in records; `None` if it is not known.
+impl RunModels<'_> {
+    /// Price of the replies of the model that has this name in records; `None` if unknown.
     fn price(self, money: &MoneySettings, name: &str) -> Option<Price> {
         let model = self.models.iter().find(|model| *model.name == *name);
         match (model, self.manifest) {
@@ -49,7 +49,7 @@ impl Answering<'_> {
 pub(crate) struct Budget {
     models: Vec<ModelBudget>,
     spending: Arc<Spending>,
-    /// Stored requests without stated tokens: their number, and the most that they can have cost, in US dollars.
+    /// Number of stored requests without stated tokens, and the upper bound of their cost in US dollars.
     unstated: (u32, f64),
 }
 
@@ -63,19 +63,19 @@ struct ModelBudget {
     excess: Arc<ReplyExcess>,
 }
 
-/// Whether a question may be asked now.
+/// Permission to ask a question now.
 #[derive(Debug)]
 pub(crate) enum Permit {
-    /// It costs nothing, as far as is known.
+    /// Permitted: the model has no known price.
     Free,
-    /// It may cost as much as is reserved.
+    /// Permitted, with the cost reserved.
     Reserved(Box<Reservation>),
-    /// It may not be asked before others have ended.
+    /// Not permitted before other questions have ended.
     Refused,
 }
 
 impl Budget {
-    /// A budget that includes the cost of the stored records, which are of these models.
+    /// A budget for models, which includes the cost of their stored records.
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
@@ -85,21 +85,21 @@ impl Budget {
         stored: &[StoredTrial],
     ) -> Result<Self> {
         let all: Vec<&ModelUnderTest> = models.iter().collect();
-        let answering = Answering {
+        let run_models = RunModels {
             models: &all,
             manifest: None,
         };
-        Self::for_run(money, models, answering, stored)
+        Self::for_run(money, models, run_models, stored)
     }
 
-    /// A budget of the models that are asked now. It includes the cost of the stored records of all models of the run.
+    /// A budget for the `models` that are asked now. It includes the cost of the stored records of all models of the run.
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
     pub(crate) fn for_run(
         money: &MoneySettings,
         models: &[ModelUnderTest],
-        answering: Answering<'_>,
+        run_models: RunModels<'_>,
         stored: &[StoredTrial],
     ) -> Result<Self> {
         let budgets: Vec<ModelBudget> = models
@@ -125,13 +125,13 @@ impl Budget {
             ));
         }
         let costs = stored.iter().filter_map(|record| {
-            let price = answering.price(money, &record.model)?;
-            Some(share(money, record.via) * charged(price, record))
+            let price = run_models.price(money, &record.model)?;
+            Some(price_factor(money, record.via) * charged(price, record))
         });
         let unstated = stored.iter().filter_map(|record| {
-            let price = answering.price(money, &record.model)?;
+            let price = run_models.price(money, &record.model)?;
             let unstated = record.lost()?.unstated;
-            let dollars = share(money, record.via) * price.max_cost(bound(unstated));
+            let dollars = price_factor(money, record.via) * price.max_cost(bound(unstated));
             Some((unstated.requests, dollars))
         });
         Ok(Self {
@@ -143,8 +143,8 @@ impl Budget {
         })
     }
 
-    /// The same budget, with this much in US dollars that requests without a record may cost: those of batches that have not ended, and
-    /// those of killed processes.
+    /// Adds an upper bound in US dollars of the cost of requests without a record: those of batches that have not ended, and those of
+    /// killed processes.
     pub(crate) fn with_unrecorded(self, dollars: f64) -> Self {
         let max_cost = self.spending.limit();
         let spending = Spending::new(max_cost, self.spending.spent()).with_pending_batches(dollars);
@@ -154,7 +154,7 @@ impl Budget {
         }
     }
 
-    /// Permission to ask a question now: its first request, at the upper bound of its cost.
+    /// Asks for permission to ask a question now, and reserves the upper bound of the cost of its first request.
     pub(crate) fn permit<'a, I: Item>(
         &self,
         model: &ModelUnderTest,
@@ -168,7 +168,7 @@ impl Budget {
         reservation.map_or(Permit::Refused, |held| Permit::Reserved(Box::new(held)))
     }
 
-    /// A trial's request with the upper bound of its tokens; `None` if its model has no known price.
+    /// The request of a trial with the upper bound of its tokens; `None` if the model has no known price.
     pub(crate) fn request<'a, I: Item>(
         &self,
         model: &ModelUnderTest,
@@ -178,7 +178,7 @@ impl Budget {
         let budget = &self.models[trial.model];
         let price = budget.price?;
         let sizes = prompt_bounds::sizes(images.clone());
-        let image_tokens = self.expected_image_tokens((trial.model, model), images);
+        let image_tokens = self.expected_image_tokens(trial.model, model, images);
         let facts = facts(model, trial, &sizes, image_tokens);
         Some(PricedRequest {
             price,
@@ -190,7 +190,7 @@ impl Budget {
         })
     }
 
-    /// Takes the charged tokens of a trial's prompt into account for the bounds of later ones.
+    /// Corrects the bounds of later prompts by the charged tokens of a trial's prompt.
     pub(crate) fn observe<'a, I: Item>(
         &mut self,
         model: &ModelUnderTest,
@@ -199,13 +199,13 @@ impl Budget {
         usage: Usage,
     ) {
         let sizes = prompt_bounds::sizes(images.clone());
-        let image_tokens = self.expected_image_tokens((trial.model, model), images);
+        let image_tokens = self.expected_image_tokens(trial.model, model, images);
         let facts = facts(model, trial, &sizes, image_tokens);
         let charged = usage.prompt_tokens.unwrap_or(0);
         self.models[trial.model].prompts.observe(facts, charged);
     }
 
-    /// Expected tokens of a trial's prompt: its text by length, its images by the model's family.
+    /// Expected tokens of a trial's prompt: of its text by length, of its images by the rule of the model's family.
     pub(crate) fn expected_tokens<'a, I: Item>(
         &self,
         model: &ModelUnderTest,
@@ -217,10 +217,11 @@ impl Budget {
         text_tokens(&trial.prompt) + images.map(|tokens| tokens.unwrap_or(0.0)).sum::<f64>()
     }
 
-    /// Expected tokens of images for a model, which has this index; `None` if it is not known how the model counts them.
+    /// Expected tokens of images for a model and its index; `None` if the rule of its family is unknown.
     pub(crate) fn expected_image_tokens<'a>(
         &self,
-        (index, model): (usize, &ModelUnderTest),
+        index: usize,
+        model: &ModelUnderTest,
         mut images: impl Iterator<Item = &'a ImageFacts>,
     ) -> Option<f64> {
         let price = self.models[index].price;
@@ -237,17 +238,17 @@ impl Budget {
             .then(|| self.spending.spent())
     }
 
-    /// US dollars spent so far, by all models with a price.
+    /// US dollars spent so far by all models with a price; zero if no model has one.
     pub(crate) fn charged(&self) -> f64 {
         self.spending.spent()
     }
 
-    /// Stored requests without stated tokens: their number, and the most that they can have cost, in US dollars.
+    /// Number of stored requests without stated tokens, and the upper bound of their cost in US dollars.
     pub(crate) fn unstated(&self) -> (u32, f64) {
         self.unstated
     }
 
-    /// The dollars that all requests share.
+    /// The spending that all requests share.
     pub(crate) fn spending(&self) -> &Arc<Spending> {
         &self.spending
     }
@@ -263,15 +264,15 @@ impl Budget {
     }
 }
 
-/// Share of its price that a trial costs, by the way in which it was asked.
-fn share(money: &MoneySettings, via: Via) -> f64 {
+/// Factor of the price for requests that were sent in this way.
+fn price_factor(money: &MoneySettings, via: Via) -> f64 {
     match via {
         Via::Direct | Via::File => 1.0,
         Via::Batch => money.prices.batch,
     }
 }
 
-/// US dollars that all requests of a stored trial were charged, or may have been charged.
+/// Cost of all requests of a stored trial in US dollars; the upper bound for requests without stated tokens.
 fn charged(price: Price, record: &StoredTrial) -> f64 {
     let reply = record.usage().map_or(0.0, |usage| price.charged(usage));
     let others = record.lost();
@@ -308,8 +309,8 @@ pub(crate) fn text_tokens(prompt: &Prompt) -> f64 {
     characters.iter().sum::<usize>() as f64 / CHARACTERS_PER_TOKEN + MESSAGE_TOKENS
 }
 
-/// Tokens of the images that a request about a source shows a model, each `charged` tokens if that is known; `None` if those of one are
-/// unknown.
+/// Tokens of the images in a request about a source: `charged` tokens each if that is known, else by size. `None` if the tokens of an
+/// image are unknown.
 pub(crate) fn shown_tokens(
     model: &ModelUnderTest,
     price: Option<Price>,
@@ -330,7 +331,8 @@ fn image_tokens(
     width: usize,
     height: usize,
 ) -> Option<f64> {
-    let stated = price.and_then(|price| price.image_tokens);
-    let counted = || model.model.image_tokens(width as u64, height as u64);
-    stated.or_else(counted).map(|tokens| tokens as f64)
+    price
+        .and_then(|price| price.image_tokens)
+        .or_else(|| model.model.image_tokens(width as u64, height as u64))
+        .map(|tokens| tokens as f64)
 }

@@ -1,4 +1,4 @@
-//! An estimate of what a run takes, without sending anything: [`estimate`].
+//! Estimate of the tokens, cost, bytes and time of a run, without sending anything: [`estimate`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use crate::engine::costs::measured_tokens::MeasuredTokens;
 use crate::engine::costs::planned_images::{PlannedImages, SampledImages};
 use crate::engine::experiment::{ExpectedRequest, Experiment};
 use crate::engine::models::ModelUnderTest;
-use crate::engine::open_run::limit;
+use crate::engine::open_run::image_limit;
 use crate::error::Result;
 use crate::images::frames::Source;
 use crate::images::image_pipeline::ImagePipeline;
@@ -19,10 +19,10 @@ use crate::store::StoredTrial;
 use crate::types::{Degradation, ImageFacts, ReadingName, View};
 use darkqa_score::cluster::MIN_SCENES;
 
-/// Assumed time of a reply in seconds, if no reply is stored.
+/// Assumed latency of a reply in seconds, if no reply is stored.
 const REPLY_SECONDS: f64 = 2.0;
 
-/// The remaining requests with their tokens, cost, bytes and time. A few images are made to measure their size.
+/// Estimates the remaining requests with their tokens, cost, bytes and time. A few images are made to measure their size.
 pub(crate) fn estimate<E: Experiment>(
     experiment: &E,
     plans: &[Plan<E::Item>],
@@ -41,7 +41,7 @@ pub(crate) fn estimate<E: Experiment>(
     for (phase, plan) in plans.iter().enumerate() {
         let expected = if phase == 0 { &[] } else { &expected[..] };
         let measured = &measured[phase];
-        for (model, line) in self::lines(experiment, phase, plan, measured, expected) {
+        for (model, line) in cost_lines(experiment, phase, plan, measured, expected) {
             add_load(&mut loads, &experiment.models(phase)[model], &line);
             lines.push(line);
         }
@@ -55,13 +55,14 @@ pub(crate) fn estimate<E: Experiment>(
     };
     let images = PlannedImages::new(experiment, plans, &sample);
     let latencies: Vec<u64> = stored.iter().filter_map(StoredTrial::latency_ms).collect();
-    // Endpoints are asked side by side: the slowest decides.
-    let times = loads.iter().map(|load| asking_time(load, &latencies));
-    let slowest = times.max_by(|(a, _), (b, _)| a.total_cmp(b));
-    let (asking_seconds, pace) =
-        slowest.unwrap_or_else(|| (0.0, "built-in models alone".to_owned()));
+    // Endpoints are asked in parallel, so the slowest determines the time.
+    let (asking_seconds, pace) = loads
+        .iter()
+        .map(|load| asking_time(load, &latencies))
+        .max_by(|(a, _), (b, _)| a.total_cmp(b))
+        .unwrap_or_else(|| (0.0, "built-in models alone".to_owned()));
     let largest = sample.images.iter().max_by_key(|image| image.bytes);
-    let limit = limit(settings);
+    let limit = image_limit(settings);
     let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
     let remaining: usize = plans.iter().map(Plan::remaining).sum();
     let is_few = experiment.part().is_none() && sources.len() < MIN_SCENES;
@@ -102,7 +103,7 @@ pub(crate) fn estimate<E: Experiment>(
     })
 }
 
-/// The models of this program that a plan asks, with the number of trials of each.
+/// Built-in models that a plan asks, with the number of trials of each.
 fn built_in_models<E: Experiment>(
     experiment: &E,
     phase: usize,
@@ -121,7 +122,7 @@ fn built_in_models<E: Experiment>(
         .collect()
 }
 
-/// The name of a model with what it is asked for, or as what.
+/// The name of a model, marked if it is a judge or asked without images.
 fn label(model: &ModelUnderTest, phase: &str) -> String {
     let role = match (phase, model.view) {
         ("marks", _) => " (judge)",
@@ -131,21 +132,24 @@ fn label(model: &ModelUnderTest, phase: &str) -> String {
     format!("{}{role}", model.name)
 }
 
-/// The reason why a request is too large for an endpoint: the largest image, or the request with the most images.
+/// The reason why a request is too large for an endpoint, judged by the largest image and the largest number of images in a request;
+/// `None` if all fit.
 fn too_large(limit: ImageLimit, image: &ImageFacts, sources: &[Source]) -> Option<String> {
-    let most = sources
+    let max_images = sources
         .iter()
         .map(|source| source.order.len())
         .max()
         .unwrap_or(0);
-    let checked = limit.check(image);
-    let checked = checked.and_then(|()| limit.check_request(most, Some(image)));
-    let problem = checked.err().map(|problem| problem.to_string());
-    problem.or_else(|| limit.may_exceed(most, image))
+    limit
+        .check(image)
+        .and_then(|()| limit.check_request(max_images, Some(image)))
+        .err()
+        .map(|problem| problem.to_string())
+        .or_else(|| limit.may_exceed(max_images, image))
 }
 
-/// The cost line of each model of a phase that is asked at an endpoint.
-fn lines<E: Experiment>(
+/// The cost line of each model at an endpoint that a phase asks, with the index of the model.
+fn cost_lines<E: Experiment>(
     experiment: &E,
     phase: usize,
     plan: &Plan<E::Item>,
@@ -165,19 +169,19 @@ fn lines<E: Experiment>(
                 let degradation = group.condition.as_ref().and_then(|c| c.degradation());
                 let reading = degradation.and_then(Degradation::reading).cloned();
                 let tokens = by_reading.entry(reading).or_default();
-                let own = group.trials.iter().filter(|trial| trial.model == index);
                 let before = tokens.requests;
-                for trial in own {
+                for trial in group.trials.iter().filter(|trial| trial.model == index) {
                     tokens.add(text_tokens(&trial.prompt), trial.item.reply_tokens());
                 }
                 let source = &sources[place];
                 if group.condition.is_some() && tokens.requests > before {
                     let scaling = experiment.recipe().scaling;
                     let charged = measured.image(index);
-                    let of_request = shown_tokens(model, price, charged, source, scaling);
                     let requests = (tokens.requests - before) as f64;
-                    let known = tokens.image.zip(of_request);
-                    tokens.image = known.map(|(sum, each)| sum + each * requests);
+                    tokens.image = tokens
+                        .image
+                        .zip(shown_tokens(model, price, charged, source, scaling))
+                        .map(|(sum, each)| sum + each * requests);
                 }
             }
             for request in expected.iter().filter(|request| request.model == index) {
@@ -186,7 +190,7 @@ fn lines<E: Experiment>(
             }
             let line = CostLine {
                 charged_image_tokens: measured.image(index),
-                ..line(model, price, &by_reading, E::PHASES[phase])
+                ..cost_line(model, price, &by_reading, E::PHASES[phase])
             };
             (index, line)
         })
@@ -194,14 +198,14 @@ fn lines<E: Experiment>(
         .collect()
 }
 
-/// The requests to one endpoint and their tokens.
+/// Numbers of requests to one endpoint and of their tokens.
 struct Load {
     server: Arc<Server>,
     requests: f64,
     tokens: f64,
 }
 
-/// Adds the requests to a model to those of its endpoint.
+/// Adds the requests to a model to the load of its endpoint.
 fn add_load(loads: &mut Vec<Load>, model: &ModelUnderTest, line: &CostLine) {
     let Some(server) = &model.server else {
         return;
@@ -246,20 +250,21 @@ impl Default for Tokens {
 }
 
 impl Tokens {
-    fn sum<'t>(parts: impl Iterator<Item = &'t Self>) -> Self {
-        parts.fold(Self::default(), |sum, part| Self {
-            requests: sum.requests + part.requests,
-            text: sum.text + part.text,
-            reply: sum.reply + part.reply,
-            image: sum.image.zip(part.image).map(|(sum, part)| sum + part),
+    fn sum<'t>(terms: impl Iterator<Item = &'t Self>) -> Self {
+        terms.fold(Self::default(), |sum, term| Self {
+            requests: sum.requests + term.requests,
+            text: sum.text + term.text,
+            reply: sum.reply + term.reply,
+            image: sum.image.zip(term.image).map(|(sum, term)| sum + term),
         })
     }
 
-    /// The cost if each reply has this many tokens in all; `None` if no price or number of tokens is known.
+    /// The cost in US dollars if all replies together have `reply` tokens; `None` if the price or the tokens of images are unknown.
     fn dollars(&self, price: Option<Price>, reply: f64) -> Option<f64> {
         Some(price?.cost(self.text + self.image?, reply))
     }
 
+    /// Adds a request with these tokens of its text and its reply.
     fn add(&mut self, text: f64, reply: f64) {
         self.requests += 1;
         self.text += text;
@@ -267,8 +272,8 @@ impl Tokens {
     }
 }
 
-/// The cost line of one model, by the noise profile of what it is shown.
-fn line(
+/// The cost line of one model, from its tokens by the noise profile of the images.
+fn cost_line(
     model: &ModelUnderTest,
     price: Option<Price>,
     by_reading: &BTreeMap<Option<ReadingName>, Tokens>,
@@ -280,7 +285,6 @@ fn line(
         .model
         .max_tokens()
         .map(|limit| requests * f64::from(limit));
-    let readings = by_reading.iter().filter(|(_, part)| part.requests > 0);
     CostLine {
         model: label(model, phase),
         endpoints: model
@@ -295,17 +299,20 @@ fn line(
         dollars: tokens.dollars(price, tokens.reply),
         most_dollars: longest.and_then(|longest| tokens.dollars(price, longest)),
         charged_image_tokens: None,
-        readings: readings
-            .map(|(reading, part)| ReadingCost {
+        readings: by_reading
+            .iter()
+            .filter(|(_, tokens)| tokens.requests > 0)
+            .map(|(reading, tokens)| ReadingCost {
                 reading: reading.clone(),
-                requests: part.requests,
-                dollars: part.dollars(price, part.reply),
+                requests: tokens.requests,
+                dollars: tokens.dollars(price, tokens.reply),
             })
             .collect(),
     }
 }
 
-/// Seconds until all replies of an endpoint have arrived, and the limit that decides it: `--rpm`, `--tpm`, or the mean time of a stored reply.
+/// Seconds until all replies of an endpoint have arrived, and a description of the limit that determines them: `--rpm`, `--tpm`, or the
+/// mean latency of stored replies.
 fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
     let Load {
         server,
@@ -318,7 +325,7 @@ fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
         .filter(|ms| **ms > 0)
         .map(|ms| *ms as f64 / 1e3)
         .collect();
-    let (each, origin) = if times.is_empty() {
+    let (latency, origin) = if times.is_empty() {
         (REPLY_SECONDS, "assumed")
     } else {
         (times.iter().sum::<f64>() / times.len() as f64, "as so far")
@@ -326,18 +333,19 @@ fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
     let sending = &server.sending;
     let concurrency = server.max_in_flight();
     let mut slowest = (
-        requests * each / concurrency as f64,
-        format!("{each:.1} s a reply {origin}, {concurrency} at once"),
+        requests * latency / concurrency as f64,
+        format!("{latency:.1} s a reply {origin}, {concurrency} at once"),
     );
-    let minutes = |number: f64, quota: Option<std::num::NonZeroU32>| {
-        quota.map(|quota| 60.0 * number / f64::from(quota.get()))
-    };
     let quotas = [
-        ("--rpm", minutes(requests, sending.quota.requests)),
-        ("--tpm", minutes(tokens, sending.quota.tokens)),
+        ("--rpm", requests, sending.quota.requests),
+        ("--tpm", tokens, sending.quota.tokens),
     ];
-    for (flag, seconds) in quotas {
-        if let Some(seconds) = seconds.filter(|seconds| *seconds > slowest.0) {
+    for (flag, number, per_minute) in quotas {
+        let Some(per_minute) = per_minute else {
+            continue;
+        };
+        let seconds = 60.0 * number / f64::from(per_minute.get());
+        if seconds > slowest.0 {
             slowest = (seconds, format!("by {flag}"));
         }
     }

@@ -1,5 +1,5 @@
-//! The cost of requests in flight, noted in the run folder: [`InFlightCost`]. A process that is killed leaves the note, so that the next
-//! one counts the requests that may have been charged and have no record.
+//! The cost of requests in flight, as a file in the run folder: [`InFlightCost`]. If the process is killed, the file remains, and the next
+//! process counts the requests that may have been charged without a record.
 
 use std::fs;
 use std::path::Path;
@@ -11,13 +11,13 @@ use crate::files;
 use crate::files::reading;
 use crate::store::set_file_aside;
 
-/// Name of the note in a run folder; it is there while requests are in flight, and after a killed process.
+/// Name of the file in a run folder. It exists while requests are in flight, and after a process was killed.
 const NOTE: &str = "in_flight.json";
 
-/// Factor by which a note exceeds what is reserved, so that few notes are written; chosen.
+/// Factor by which the written cost exceeds the reserved one, so that the file is seldom written; chosen.
 const MARGIN: f64 = 1.25;
 
-/// Cost that no record has, in US dollars.
+/// Cost of requests without a record, in US dollars.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(crate) struct InFlightCost {
     /// Upper bound of the requests in flight when earlier processes were killed.
@@ -27,10 +27,10 @@ pub(crate) struct InFlightCost {
 }
 
 impl InFlightCost {
-    /// The note in a run folder. What is noted as in flight was so when a process was killed.
+    /// Reads the file in a run folder. Requests that it states as in flight are counted as those of a killed process.
     ///
     /// # Errors
-    /// If the note cannot be read.
+    /// If the file cannot be read.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(NOTE);
         let text = match reading::read(&path) {
@@ -57,12 +57,12 @@ impl InFlightCost {
         })
     }
 
-    /// US dollars that killed processes may have spent without a record.
+    /// Upper bound of the cost of requests that killed processes left without a record, in US dollars.
     pub(crate) fn killed(self) -> f64 {
         self.killed
     }
 
-    /// Notes that this much is in flight, if more than before.
+    /// Writes the cost in flight, if it is higher than the written one.
     pub(crate) fn raise(&mut self, folder: &Path, dollars: f64) -> Result<()> {
         if dollars <= self.in_flight {
             return Ok(());
@@ -71,7 +71,7 @@ impl InFlightCost {
         self.write(folder)
     }
 
-    /// Notes that nothing is in flight: all requests have a record.
+    /// Writes that nothing is in flight, once all requests have a record. Deletes the file if no process was killed either.
     pub(crate) fn end(&mut self, folder: &Path) -> Result<()> {
         if self.in_flight <= 0.0 {
             return Ok(());

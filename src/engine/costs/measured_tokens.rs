@@ -1,7 +1,7 @@
 //! Tokens of images as the server charges them: [`MeasuredTokens`].
 //!
-//! Before the first reply, the tokens of an image follow from the rule of the model's family, which may not be that of the server. The
-//! prompts' real usage corrects it: what a prompt was charged, less the tokens of its text.
+//! Before the first reply, the tokens of an image are estimated by the rule of the model's family, from which the server may deviate.
+//! Afterwards they are measured: the charged tokens of a prompt minus the estimated tokens of its text.
 
 use std::collections::HashMap;
 
@@ -11,16 +11,16 @@ use crate::images::trials::{Item, Plan};
 use crate::store::StoredTrial;
 use crate::types::TrialKey;
 
-/// Number of replies from which the tokens are taken; chosen.
+/// Number of replies whose median is used; chosen.
 const REPLIES: usize = 10;
 
-/// The share by which an estimate may differ from the charge without a word; chosen.
+/// Relative deviation of an estimate from the charge up to which no warning is printed; chosen.
 const TOLERANCE: f64 = 0.1;
 
 /// Tokens charged for images, by model of a phase.
 #[derive(Debug, Clone)]
 pub(crate) struct MeasuredTokens {
-    /// Charged tokens less those of the text, by the number of images; one number a reply, at most [`REPLIES`].
+    /// For each model, the charged tokens per image of each of the first replies, at most [`REPLIES`].
     images: Vec<Vec<f64>>,
 }
 
@@ -32,14 +32,14 @@ pub(crate) struct Difference {
 }
 
 impl MeasuredTokens {
-    /// Nothing measured yet, of so many models.
+    /// No measurements yet, for a number of models.
     pub(crate) fn new(models: usize) -> Self {
         Self {
             images: vec![Vec::new(); models],
         }
     }
 
-    /// Tokens charged for stored replies to trials of a plan about these sources.
+    /// Measures the stored replies to the trials of a plan about these sources.
     pub(crate) fn from_stored<I: Item>(
         models: usize,
         plan: &Plan<I>,
@@ -62,7 +62,7 @@ impl MeasuredTokens {
         measured
     }
 
-    /// Adds a reply about images: the tokens that its prompt was charged, the expected tokens of its text, and the number of images.
+    /// Adds a reply about a number of images: the charged tokens of its prompt, and the estimated tokens of the text.
     pub(crate) fn add(&mut self, model: usize, charged: u64, text: f64, images: usize) {
         let measured = &mut self.images[model];
         if measured.len() < REPLIES && images > 0 {
@@ -70,7 +70,7 @@ impl MeasuredTokens {
         }
     }
 
-    /// Median tokens of one image; `None` before [`REPLIES`] replies.
+    /// Median of the tokens charged for one image; `None` before [`REPLIES`] replies.
     pub(crate) fn image(&self, model: usize) -> Option<f64> {
         let mut images = self.images[model].clone();
         images.sort_by(f64::total_cmp);
@@ -78,16 +78,17 @@ impl MeasuredTokens {
         (images.len() == REPLIES).then(|| f64::midpoint(images[middle - 1], images[middle]))
     }
 
-    /// By how much the estimate of a prompt with this text and so many images differs from the charge; `None` if it differs by 10 %
-    /// or less, or if too few replies are known. `tokens` are those that were expected of all images.
+    /// Compares the estimated tokens of a prompt with the charged ones: `text` and `image_tokens` are the estimates for the text and for
+    /// all `images` together. `None` if they differ by at most [`TOLERANCE`], or before [`REPLIES`] replies.
     pub(crate) fn difference(
         &self,
         model: usize,
         text: f64,
-        (images, tokens): (usize, f64),
+        images: usize,
+        image_tokens: f64,
     ) -> Option<Difference> {
         let charged = text + self.image(model)? * images as f64;
-        let estimated = text + tokens;
+        let estimated = text + image_tokens;
         let differs = (charged - estimated).abs() > TOLERANCE * estimated;
         differs.then_some(Difference { estimated, charged })
     }
@@ -104,19 +105,19 @@ mod tests {
             assert_eq!(measured.image(1), None, "{i}");
             // One reply that was charged far more does not count.
             let charged = if i == 3 { 90_000 } else { 100 + 1000 + i };
-            // What several images are charged together counts for each alike.
+            // The charge for several images is divided equally among them.
             let images = if i < 5 { 1 } else { 2 };
             measured.add(1, 100 + (charged - 100) * images as u64, 100.0, images);
         }
         let image = measured.image(1).unwrap();
         assert!((image - 1005.5).abs() < 1.0, "{image}");
         assert_eq!(measured.image(0), None);
-        let difference = measured.difference(1, 100.0, (1, 765.0)).unwrap();
+        let difference = measured.difference(1, 100.0, 1, 765.0).unwrap();
         assert!((difference.charged - 1105.5).abs() < 1.0);
         assert!((difference.estimated - 865.0).abs() < 1e-9);
         // Within 10 %.
-        assert_eq!(measured.difference(1, 100.0, (1, 1000.0)), None);
-        assert_eq!(measured.difference(1, 100.0, (2, 2000.0)), None);
-        assert!(measured.difference(1, 100.0, (2, 1000.0)).is_some());
+        assert_eq!(measured.difference(1, 100.0, 1, 1000.0), None);
+        assert_eq!(measured.difference(1, 100.0, 2, 2000.0), None);
+        assert!(measured.difference(1, 100.0, 2, 1000.0).is_some());
     }
 }

@@ -11,7 +11,7 @@ mod planned_images;
 mod prompt_bounds;
 
 pub(crate) use budget::text_tokens;
-pub(super) use budget::{Answering, Budget, Permit};
+pub(super) use budget::{Budget, Permit, RunModels};
 pub(super) use budget_notes::BudgetNotes;
 pub(super) use in_flight_cost::InFlightCost;
 pub(super) use measured_tokens::MeasuredTokens;

@@ -49,7 +49,7 @@ pub(crate) struct MoneySettings {
 }
 
 impl MoneySettings {
-    /// The limits of these flags, with the prices read: those of `--prices`, else those that the run keeps in its settings.
+    /// Validates the flags, and reads the prices: those of `--prices`, else those in the `stored` settings of the run.
     ///
     /// # Errors
     /// If the file of prices, or the table in the settings, cannot be used.
@@ -63,7 +63,7 @@ impl MoneySettings {
             None => Prices::from_settings(stored)?,
         };
         if args.prices.is_none() && args.max_cost.is_some() && prices.setting().is_some() {
-            // A folder may come from somebody else, and its prices decide when the run stops.
+            // The folder may come from another user, and its prices determine when the run stops.
             tracing::warn!(
                 "--max-cost counts with the prices that the run folder keeps; --prices FILE names others"
             );

@@ -1,4 +1,4 @@
-//! The images that are left to make and to send, as a few of them suggest: [`PlannedImages`], [`SampledImages`].
+//! Estimates of the images that remain to be made and sent, from a sample: [`PlannedImages`], [`SampledImages`].
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -13,8 +13,8 @@ use crate::images::stored::Needed;
 use crate::images::trials::Plan;
 use crate::types::{Condition, ImageFacts};
 
-/// Number of sources whose images are made to measure their size; with enhancers, only the first source.
-const SAMPLED: usize = 3;
+/// Number of sources whose images are made to measure their size. Images with enhancers are made for the first of them only.
+const SAMPLED_SOURCES: usize = 3;
 
 /// Bytes of a request besides its images and its text.
 const REQUEST_BYTES: f64 = 300.0;
@@ -22,7 +22,7 @@ const REQUEST_BYTES: f64 = 300.0;
 /// Bytes of base64 text for each byte of an image.
 const BASE64: f64 = 4.0 / 3.0;
 
-/// The images and requests that are left, as a sample of images suggests.
+/// Numbers, bytes and times of the remaining images and requests, estimated from a sample of images.
 pub(crate) struct PlannedImages {
     /// Number of images to be made.
     pub(crate) made: usize,
@@ -30,14 +30,16 @@ pub(crate) struct PlannedImages {
     pub(crate) sent: usize,
     /// Bytes of all requests.
     pub(crate) bytes: f64,
+    /// Bytes of the largest request.
     pub(crate) largest_request: f64,
     /// Time to make all images on this machine, in seconds.
     pub(crate) seconds: f64,
-    /// The images that an image store would hold; `None` without one.
+    /// The images that an image store would contain; `None` without a store.
     pub(crate) set: Option<ImageSet>,
 }
 
 impl PlannedImages {
+    /// Estimates the images of the remaining trials in these plans, one plan for each phase.
     pub(crate) fn new<E: Experiment>(
         experiment: &E,
         plans: &[Plan<E::Item>],
@@ -90,7 +92,7 @@ impl PlannedImages {
             let bytes = mean.map_or(0.0, |mean| mean.bytes);
             set.add(condition.enhancer.is_some(), bytes * frames as f64);
         }
-        // The frames of a walk are made in parallel, one per core. A frame alone is made by all cores together.
+        // The frames of a walk are made in parallel, one per core. For a single frame, all cores work together.
         let in_parallel = if frames > 1 { cores } else { 1 };
         self.seconds += mean.map_or(0.0, |mean| {
             mean.seconds * frames as f64 / in_parallel as f64
@@ -108,6 +110,7 @@ struct ImageMeans {
 /// Images that were made to measure their size and time.
 #[derive(Default)]
 pub(crate) struct SampledImages {
+    /// Sizes of all sampled images.
     pub(crate) images: Vec<ImageFacts>,
     /// Sum of bytes, sum of seconds and number of images, by condition.
     sums: BTreeMap<Condition, (f64, f64, usize)>,
@@ -130,7 +133,7 @@ impl SampledImages {
                 Some((part, source, source.middle()?))
             })
             .collect();
-        let step = shown.len().div_ceil(SAMPLED).max(1);
+        let step = shown.len().div_ceil(SAMPLED_SOURCES).max(1);
         for (i, (part, source, frame)) in shown.into_iter().step_by(step).enumerate() {
             let mut work = FrameWork::planned(pipeline.steps.without_store(), source, frame);
             let conditions = part.conditions();

@@ -1,8 +1,8 @@
 //! Upper bounds of the tokens of prompts: [`PromptBounds`].
 //!
-//! Before the first reply, a bound follows from the length of the text and the rule of the model's family for images. Afterwards it
-//! follows from the charged tokens of an earlier prompt with images of the same sizes: no tokenizer makes more tokens than bytes of the
-//! part of the text that differs.
+//! Before the first reply, a bound is computed from the length of the text and the rule of the model's family for images. Afterwards it is
+//! computed from the charged tokens of an earlier prompt with images of the same sizes, plus the bytes of the differing text: no tokenizer
+//! makes more tokens than bytes.
 
 use std::collections::VecDeque;
 
@@ -15,21 +15,21 @@ const TEMPLATE_TOKENS: u64 = 64;
 /// Pixels per token of an image, if the model's rule is not known: patches of 14 × 14, the smallest in use.
 const PIXELS_PER_TOKEN: u64 = 14 * 14;
 
-/// Minimum for an image, if the model's rule is not known: five tiles of 576 tokens, as of LLaVA-NeXT.
+/// Minimum number of tokens of an image, if the model's rule is not known: five tiles of 576 tokens, as in LLaVA-NeXT.
 const MIN_IMAGE_TOKENS: u64 = 5 * 576;
 
-/// Tokens by which a text may have more than its parts, at the places where they are joined; chosen.
+/// Number of tokens by which a text may exceed the sum of its parts, because of their joins; chosen.
 const JOINS: u64 = 4;
 
 /// Number of earlier prompts that are kept for comparison; chosen.
-const REFERENCES: usize = 16;
+const MAX_REFERENCES: usize = 16;
 
-/// Number of later prompts that must agree with an earlier one before it replaces the bound by length; chosen: the first reply of a
-/// server may be from another replica, or from a cache.
-const AGREEING: usize = 2;
+/// Number of later prompts that must agree with an earlier one before it replaces the bound by length. Chosen: the first reply of a server
+/// may come from another replica, or from a cache.
+const MIN_AGREEING: usize = 2;
 
-/// Factor between a bound and the charged tokens from which a prompt is kept for comparison; chosen.
-const CLOSE: f64 = 1.05;
+/// Ratio of a bound to the charged tokens up to which the bound is close, so that the prompt need not be kept for comparison; chosen.
+const MAX_CLOSE_RATIO: f64 = 1.05;
 
 /// Facts that determine the tokens of a prompt.
 #[derive(Debug, Clone, Copy)]
@@ -54,12 +54,12 @@ struct Reference {
     prompt: Prompt,
     sizes: Vec<(usize, usize)>,
     charged: u64,
-    /// Number of later prompts that were charged at most what this one let expect.
+    /// Number of later prompts that were charged no more than the bound from this one.
     agreeing: usize,
 }
 
 impl Reference {
-    /// The most tokens of another prompt with images of the same sizes.
+    /// Upper bound of the tokens of another prompt with images of the same sizes.
     fn most_tokens(&self, facts: PromptFacts<'_>) -> f64 {
         (self.charged + differing_bytes(&self.prompt, facts.prompt) as u64 + JOINS) as f64
     }
@@ -69,9 +69,9 @@ impl Reference {
 #[derive(Debug)]
 pub(crate) struct PromptBounds {
     references: VecDeque<Reference>,
-    /// Factor by which a prompt exceeded the bound by its length; at least 1.
+    /// Largest ratio of charged tokens to the bound by length; at least 1.
     excess_by_length: f64,
-    /// Factor by which a prompt exceeded the bound by comparison; at least 1.
+    /// Largest ratio of charged tokens to the bound by comparison; at least 1.
     excess_by_comparison: f64,
 }
 
@@ -84,7 +84,7 @@ impl PromptBounds {
         }
     }
 
-    /// The most tokens of a prompt.
+    /// Upper bound of the tokens of a prompt.
     pub(crate) fn bound(&self, facts: PromptFacts<'_>) -> u64 {
         let by_length = by_length(facts) * self.excess_by_length;
         let by_comparison = self.by_comparison(facts);
@@ -94,7 +94,7 @@ impl PromptBounds {
             .ceil() as u64
     }
 
-    /// Takes the charged tokens of a prompt into account.
+    /// Corrects the bounds of later prompts by the charged tokens of a prompt.
     pub(crate) fn observe(&mut self, facts: PromptFacts<'_>, charged: u64) {
         if charged == 0 {
             return;
@@ -110,13 +110,13 @@ impl PromptBounds {
         {
             let most = one.most_tokens(facts);
             one.agreeing += usize::from(tokens <= most);
-            is_close |= (tokens..=CLOSE * tokens).contains(&most);
+            is_close |= (tokens..=MAX_CLOSE_RATIO * tokens).contains(&most);
         }
         if let Some(expected) = by_comparison {
             self.excess_by_comparison = self.excess_by_comparison.max(tokens / expected);
         }
         if !is_close {
-            if self.references.len() == REFERENCES {
+            if self.references.len() == MAX_REFERENCES {
                 self.references.pop_front();
             }
             self.references.push_back(Reference {
@@ -128,43 +128,44 @@ impl PromptBounds {
         }
     }
 
-    /// The most tokens of a prompt, by the earlier prompt that is most like it, among those that enough later ones agree with; `None` if
-    /// none of them had images of these sizes.
+    /// Lowest upper bound by comparison with earlier prompts. Only prompts with images of the same sizes count, if enough later ones agree
+    /// with them; `None` without any.
     fn by_comparison(&self, facts: PromptFacts<'_>) -> Option<f64> {
         self.references
             .iter()
-            .filter(|one| one.sizes == facts.sizes && one.agreeing >= AGREEING)
+            .filter(|one| one.sizes == facts.sizes && one.agreeing >= MIN_AGREEING)
             .map(|one| one.most_tokens(facts))
             .min_by(f64::total_cmp)
     }
 }
 
-/// The most tokens of a prompt, by its bytes and the sizes of its images.
+/// Upper bound of the tokens of a prompt by its bytes and the sizes of its images.
 fn by_length(facts: PromptFacts<'_>) -> f64 {
     let text: usize = facts.prompt.parts().iter().map(|part| part.len()).sum();
     let text = (text + facts.system_bytes) as u64 + TEMPLATE_TOKENS;
-    let tiled = facts
-        .sizes
-        .iter()
-        .map(|(width, height)| (width * height) as u64)
-        .map(|area| area.div_ceil(PIXELS_PER_TOKEN).max(MIN_IMAGE_TOKENS));
-    let images = facts
-        .image_tokens
-        .unwrap_or_else(|| tiled.sum::<u64>() as f64);
+    let images = facts.image_tokens.unwrap_or_else(|| {
+        facts
+            .sizes
+            .iter()
+            .map(|(width, height)| (width * height) as u64)
+            .map(|area| area.div_ceil(PIXELS_PER_TOKEN).max(MIN_IMAGE_TOKENS))
+            .sum::<u64>() as f64
+    });
     text as f64 + images
 }
 
-/// Bytes of a prompt's text that another one does not share at its beginning or end.
+/// Number of bytes of a prompt's text without the beginnings and ends that its parts share with those of another prompt.
 fn differing_bytes(other: &Prompt, prompt: &Prompt) -> usize {
     other
         .parts()
         .into_iter()
         .zip(prompt.parts())
-        .map(|(other, text)| differing(other.as_bytes(), text.as_bytes()))
+        .map(|(other, text)| unshared(other.as_bytes(), text.as_bytes()))
         .sum()
 }
 
-fn differing(other: &[u8], text: &[u8]) -> usize {
+/// Number of bytes of a text without the beginning and end that it shares with another one.
+fn unshared(other: &[u8], text: &[u8]) -> usize {
     let start = other.iter().zip(text).take_while(|(a, b)| a == b).count();
     let (other, text) = (&other[start..], &text[start..]);
     let ends = other.iter().rev().zip(text.iter().rev());
@@ -234,10 +235,9 @@ mod tests {
 
     #[test]
     fn shared_beginnings_and_ends_are_not_counted() {
-        let of = |a: &str, b: &str| differing(a.as_bytes(), b.as_bytes());
-        assert_eq!(of("is #17 here", "is #2 here"), 1);
-        assert_eq!(of("aaa", "aaaa"), 1);
-        assert_eq!(of("aaaa", "aa"), 0);
-        assert_eq!(of("", "abc"), 3);
+        assert_eq!(unshared(b"is #17 here", b"is #2 here"), 1);
+        assert_eq!(unshared(b"aaa", b"aaaa"), 1);
+        assert_eq!(unshared(b"aaaa", b"aa"), 0);
+        assert_eq!(unshared(b"", b"abc"), 3);
     }
 }

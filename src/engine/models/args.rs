@@ -36,7 +36,7 @@ pub(crate) struct ModelArgs {
 }
 
 impl ModelArgs {
-    /// Whether no model is named.
+    /// True if no flag names a model or a models file.
     pub(crate) fn is_empty(&self) -> bool {
         self.model.is_empty() && self.blind_model.is_empty() && self.models.is_none()
     }

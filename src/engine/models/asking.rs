@@ -1,4 +1,4 @@
-//! The flags that each model of a file may have for itself: [`AskingArgs`].
+//! Request settings, which each model of a models file can override: [`AskingArgs`].
 
 use clap::builder::Resettable;
 use clap::{ArgAction, Args, Command, FromArgMatches as _, value_parser};
@@ -36,7 +36,7 @@ pub(crate) struct AskingArgs {
 }
 
 impl AskingArgs {
-    /// The settings of a call without flags.
+    /// The default settings.
     ///
     /// # Errors
     /// None in practice: every flag has a default.
@@ -57,27 +57,27 @@ impl AskingArgs {
             .collect()
     }
 
-    /// Takes the key away: it belongs to another address than the one that follows.
+    /// Removes the API key, because it belongs to another address.
     pub(super) fn forget_key(&mut self) {
         (self.access.api_key_env, self.access.api_key_file) = (None, None);
     }
 
-    /// Takes all headers away: those that follow replace them.
+    /// Removes all headers.
     pub(super) fn forget_headers(&mut self) {
         self.access.header.clear();
         self.access.header_env.clear();
     }
 
-    /// Replaces the settings that these words name; the others stay. A switch is written `--flag=true`.
+    /// Replaces the settings named by these command-line words, and keeps the others. A switch is written `--flag=true`.
     ///
     /// # Errors
-    /// The text of the parser about a value that cannot be used.
+    /// The message of the parser if a value is invalid.
     pub(super) fn update(&mut self, words: &[String]) -> Result<(), String> {
         let matches = command()
             .try_get_matches_from(words)
             .map_err(|e| line(&e))?;
         let given = |id: &str| matches.contains_id(id);
-        // Of two settings of one thing, the one of this layer holds.
+        // A source of the key or of the system message replaces the other source.
         if given("api_key_env") || given("api_key_file") {
             self.forget_key();
         }
@@ -88,7 +88,7 @@ impl AskingArgs {
     }
 }
 
-/// The parser of one layer: no flag has a default, so that only those that are named change anything.
+/// A parser of settings that overrides others. No flag has a default, so that only named settings change.
 fn command() -> Command {
     let command = Command::new("model")
         .no_binary_name(true)
@@ -105,7 +105,7 @@ fn command() -> Command {
     })
 }
 
-/// The text of an error of the parser, on one line.
+/// The message of a parser error, on one line.
 fn line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines: Vec<&str> = text
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_is_named_changes() {
+    fn only_named_settings_change() {
         let mut args = AskingArgs::defaults().unwrap();
         args.access.allow_http = true;
         args.sending.retries = 9;

@@ -1,8 +1,8 @@
-//! One small request to each model, to see that it answers: [`check`].
+//! A test request to each model: [`check`].
 
 use std::sync::Arc;
 
-use super::describe::opened;
+use super::describe::open_model;
 use super::settings::AskSettings;
 use crate::ask::{Call, ImagePlaces, Message, Query};
 use crate::error::Result;
@@ -12,20 +12,20 @@ use crate::picture::{Payload, PayloadFormat};
 use crate::types::{Condition, QuestionId, Rgb, View};
 
 /// A question for a model without images.
-const WORDS: &str = "Is snow cold?\nA. yes\nB. no\nAnswer with the letter of one choice.";
+const TEXT_QUESTION: &str = "Is snow cold?\nA. yes\nB. no\nAnswer with the letter of one choice.";
 
-/// A question for a model with images, about an image of one colour, [`RED`].
-const ABOUT_IMAGE: &str =
+/// A question for a model with images, about a [`RED`] image.
+const IMAGE_QUESTION: &str =
     "Which colour has the image?\nA. blue\nB. red\nAnswer with the letter of one choice.";
 
-/// The colour of the image that is sent.
+/// Colour of the image.
 const RED: [u8; 3] = [220, 30, 30];
 
-/// Its side in pixels; chosen: some servers refuse images below 28 pixels.
+/// Width and height of the image in pixels; chosen: some servers refuse images below 28 pixels.
 const SIDE: usize = 64;
 
-/// Sends one small request to each model that is asked at an endpoint, with an image if it is asked with images; its reply, or why
-/// there is none.
+/// Sends one small request to each model at an endpoint, with an image if the model is asked with images. Returns the name of each model
+/// with a description of its reply, or with the error.
 ///
 /// # Errors
 /// If a model cannot be opened.
@@ -45,15 +45,15 @@ pub(crate) fn check(
             continue;
         }
         seen.push((&model.name, model.view));
-        let Some(opened) = opened(model)? else {
+        let Some(opened) = open_model(model)? else {
             continue;
         };
         progress.say(&format!("asking {} ({})", model.name, model.view));
         let (condition, message, sent) = match model.view {
-            View::Blind => (None, Message::text_only(WORDS), "without an image"),
+            View::Blind => (None, Message::text_only(TEXT_QUESTION), "without an image"),
             View::Image => {
                 let message = Message {
-                    before: ABOUT_IMAGE,
+                    before: IMAGE_QUESTION,
                     images: &images,
                     after: "",
                     places: ImagePlaces::Together,

@@ -1,4 +1,4 @@
-//! A description of models for people: [`describe`].
+//! A readable description of the models: [`describe`].
 
 use std::fmt::Write as _;
 
@@ -9,8 +9,7 @@ use super::{endpoint, open};
 use crate::ask::{Message, Model};
 use crate::error::{Error, Result};
 
-/// A few lines about each model: what it is called, where it is asked, where its key comes from, its request, and the digest that
-/// enters the keys of its trials.
+/// Lines about each model: its name, its endpoint, the source of its key, its request, and the digest that is part of its trial keys.
 ///
 /// # Errors
 /// If a model cannot be opened.
@@ -28,7 +27,7 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
             let _ = writeln!(text, "  {name:9} {value}");
         };
         line("id", &model.id.label());
-        let Some(opened) = opened(model)? else {
+        let Some(opened) = open_model(model)? else {
             continue;
         };
         for address in field("endpoints")
@@ -62,8 +61,8 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
     Ok(text)
 }
 
-/// The model at its endpoint; `None` if it is built in and has no replies of its own.
-pub(super) fn opened(model: &ModelSettings) -> Result<Option<Model>> {
+/// Opens a model; `None` for a built-in model that answers multiple-choice questions only.
+pub(super) fn open_model(model: &ModelSettings) -> Result<Option<Model>> {
     if model.id.is_choice_only() {
         return Ok(None);
     }

@@ -1,4 +1,4 @@
-//! One model of a run before it is opened: [`Entry`], made of the flags and the layers of a file of models.
+//! One model of a run before it is opened, merged from the flags and the tables of a models file: [`Entry`].
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
@@ -14,8 +14,8 @@ use crate::error::{Error, Result};
 use crate::types::View;
 use crate::types::text::near_name::{nearest, question};
 
-/// Keys of a model that are no flags, or have another form than the flag.
-const OWN: [&str; 10] = [
+/// Keys of a model that do not correspond to a flag, or have another form than the flag.
+const MODEL_KEYS: [&str; 10] = [
     "name",
     "id",
     "deployment",
@@ -28,8 +28,8 @@ const OWN: [&str; 10] = [
     "omit",
 ];
 
-/// Keys that have another name than the flag.
-const RENAMED: [(&str, &str); 5] = [
+/// Keys with another name than their flag, each with the flag.
+const RENAMED_KEYS: [(&str, &str); 5] = [
     ("endpoints", "base-url"),
     ("key-env", "api-key-env"),
     ("key-file", "api-key-file"),
@@ -37,14 +37,14 @@ const RENAMED: [(&str, &str); 5] = [
     ("omit", "omit-field"),
 ];
 
-/// Keys that only one model can have.
+/// Keys that cannot be set for all models together.
 const NOT_IN_DEFAULTS: [&str; 4] = ["name", "id", "deployment", "endpoints"];
 
-/// Keys of settings that hold for all models, because each image is made once for all of them, and shown at one place.
-const OF_THE_RUN: [&str; 3] = ["image", "max-side", "image-first"];
+/// Keys of settings that apply to the whole run, because all models are shown the same images at the same position in the prompt.
+const RUN_KEYS: [&str; 3] = ["image", "max-side", "image-first"];
 
-/// Names that users of other tools may write, with the key.
-const ELSEWHERE: [(&str, &str); 6] = [
+/// Names from other tools, each with the key that users probably mean.
+const FOREIGN_KEYS: [(&str, &str); 6] = [
     ("model", "id"),
     ("label", "name"),
     ("base-url", "endpoints"),
@@ -56,25 +56,25 @@ const ELSEWHERE: [(&str, &str); 6] = [
 /// One model of a run, not opened yet.
 #[derive(Debug, Clone)]
 pub(super) struct Entry {
-    /// The name in tables.
+    /// Name in tables.
     pub(super) name: String,
     pub(super) id: ModelName,
     /// The views of the model; both if it is asked with and without images.
     pub(super) views: Vec<View>,
     pub(super) deployment: Option<String>,
-    /// The heading under which tables show it; `None` without one.
+    /// Heading in tables under which the model is listed.
     pub(super) group: Option<String>,
     pub(super) asking: AskingArgs,
-    /// The price, if it is not that of the table of prices.
+    /// The model's own price; `None` for the price in the table.
     pub(super) price: Option<Price>,
-    /// The number of questions that it is asked; `None` for all.
+    /// Number of questions that the model is asked; `None` for all.
     pub(super) limit: Option<NonZeroUsize>,
-    /// The place of its table in the file; `None` for a model that a flag names.
+    /// File and line of the model's table; `None` for a model that a flag names.
     pub(super) place: Option<String>,
 }
 
 impl Entry {
-    /// The model that a flag names, with the settings of the flags.
+    /// A model that a flag names, with the settings of the flags.
     pub(super) fn from_flag(id: ModelName, view: View, asking: AskingArgs) -> Self {
         Self {
             name: match &id {
@@ -92,10 +92,10 @@ impl Entry {
         }
     }
 
-    /// A model of a file: the settings of the flags, then those of each layer, each above the one before.
+    /// A model of a models file: the settings of the flags, overridden by each layer in order. `keys` is the model's own table.
     ///
     /// # Errors
-    /// If a key is unknown or its value cannot be used; the error names the line.
+    /// If a key is unknown or has an invalid value; the error names the line.
     pub(super) fn from_file(
         keys: &Keys,
         layers: &[&Keys],
@@ -118,7 +118,7 @@ impl Entry {
             ..Self::from_flag(name, view, asking)
         };
         if keys.contains_key("endpoints") {
-            // A key of the flags belongs to the address of the flags. One of [defaults] is of all models of the file.
+            // An API key from the flags belongs to the address of the flags. One from [defaults] is for all models of the file.
             entry.asking.forget_key();
         }
         for layer in layers {
@@ -127,7 +127,7 @@ impl Entry {
         Ok(entry)
     }
 
-    /// Sets what the keys of a layer say.
+    /// Sets the values of the keys of a layer.
     pub(super) fn apply(&mut self, keys: &Keys) -> Result<()> {
         for (key, located) in keys {
             match &**key {
@@ -138,11 +138,11 @@ impl Entry {
                 "price" => self.price = Some(price(located)?),
                 "limit" => self.limit = Some(limit(located)?),
                 "id" => {}
-                key if is_of_the_run(key) => {}
+                key if is_run_key(key) => {}
                 key => {
                     let words = words(key, located)?;
                     if key == "headers" {
-                        // One table holds, even an empty one: the headers of two layers are not mixed.
+                        // A table of headers replaces that of an earlier layer, even if it is empty.
                         self.asking.forget_headers();
                     }
                     let wrong = |problem: String| located.error(format_args!("{key}: {problem}"));
@@ -154,10 +154,10 @@ impl Entry {
     }
 }
 
-/// Refuses keys that are not known, with the one that is most alike.
+/// Refuses unknown keys, and keys that do not belong in this table.
 ///
 /// # Errors
-/// The error names the line of the key.
+/// [`Error::Usage`] with the line of the key, and the most similar known key.
 pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
     let known = known_keys();
     for (key, located) in keys {
@@ -166,7 +166,7 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
                 "{key} belongs to one model: it cannot be in [defaults]"
             )));
         }
-        if is_of_the_run(key) {
+        if is_run_key(key) {
             if is_defaults {
                 continue;
             }
@@ -176,18 +176,21 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
             return Err(located.error(problem));
         }
         if !known.contains(key) {
-            let other = ELSEWHERE.iter().find(|(other, _)| other == key);
-            let other = other.map(|(_, key)| *key);
-            let hint = question(other.or_else(|| nearest(key, &known)));
+            let meant = FOREIGN_KEYS
+                .iter()
+                .find(|(foreign, _)| foreign == key)
+                .map(|(_, key)| *key)
+                .or_else(|| nearest(key, &known));
+            let hint = question(meant);
             return Err(located.error(format_args!("there is no key {key}{hint}")));
         }
     }
     Ok(())
 }
 
-/// Whether a key is of the run, and of no model.
-pub(super) fn is_of_the_run(key: &str) -> bool {
-    OF_THE_RUN.contains(&key)
+/// True if a key is a setting of the run, and not of a model.
+pub(super) fn is_run_key(key: &str) -> bool {
+    RUN_KEYS.contains(&key)
 }
 
 /// All keys of a model.
@@ -196,25 +199,25 @@ pub(super) fn known_keys() -> BTreeSet<String> {
         .into_iter()
         .filter(|flag| !matches!(&**flag, "header" | "header-env"))
         .map(
-            |flag| match RENAMED.iter().find(|(_, name)| *name == flag) {
+            |flag| match RENAMED_KEYS.iter().find(|(_, name)| *name == flag) {
                 Some((key, _)) => (*key).to_owned(),
                 None => flag,
             },
         )
-        .chain(OWN.map(str::to_owned))
+        .chain(MODEL_KEYS.map(str::to_owned))
         .collect()
 }
 
-/// The flag that a key sets; `None` for keys that are no flags.
+/// The flag that corresponds to a key; `None` without one.
 pub(super) fn flag_of(key: &str) -> Option<&str> {
-    match RENAMED.iter().find(|(name, _)| *name == key) {
+    match RENAMED_KEYS.iter().find(|(name, _)| *name == key) {
         Some((_, flag)) => Some(flag),
         None if key == "headers" => Some("header"),
-        None => (!OWN.contains(&key)).then_some(key),
+        None => (!MODEL_KEYS.contains(&key)).then_some(key),
     }
 }
 
-/// The words that set a key, as flags.
+/// Command-line words that set a key to its value.
 fn words(key: &str, located: &Located) -> Result<Vec<String>> {
     let flag = flag_of(key).unwrap_or(key);
     let wrong = |expected: &str| Err(located.error(format_args!("{key}: {expected} expected")));

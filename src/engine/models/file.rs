@@ -1,4 +1,4 @@
-//! A file of models: [`ModelsFile`], its tables with the line of each key.
+//! The tables of a models file, with the line of each key: [`ModelsFile`].
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,10 +11,10 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::text::{TomlFault, line_at};
 
-/// The number of characters from which the value of a header with a telling name is taken for a secret; chosen.
-const LONG: usize = 20;
+/// Minimum length in bytes of a secret header value: shorter values of headers with the name of a secret are allowed; chosen.
+const MIN_SECRET_LENGTH: usize = 20;
 
-/// A file of models as it stands; the values are not looked at yet.
+/// The tables of a models file. Keys and values are not validated yet.
 #[derive(Debug)]
 pub(super) struct ModelsFile {
     pub(super) path: PathBuf,
@@ -23,7 +23,7 @@ pub(super) struct ModelsFile {
     pub(super) models: Vec<Keys>,
 }
 
-/// The keys of one table, with hyphens, each with its value and its line.
+/// The values of one table with their places, by key. Keys are spelled with hyphens.
 pub(super) type Keys = BTreeMap<String, Located>;
 
 /// A value with its place, for errors.
@@ -42,11 +42,11 @@ impl Located {
 }
 
 impl ModelsFile {
-    /// Reads a file of models.
+    /// Reads a models file.
     ///
     /// # Errors
-    /// If it cannot be read, is no TOML, has other tables than `[defaults]` and `[[model]]`, or holds a secret. The error names the
-    /// line, and shows no secret.
+    /// If it cannot be read, is not TOML, has other tables than `[defaults]` and `[[model]]`, or contains a secret. The error names the
+    /// line, and does not show the secret.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
         let in_line = |line: usize| format!("{}, line {line}", path.display());
@@ -67,7 +67,7 @@ impl ModelsFile {
             let place = at(key.span().start);
             match (name, value.get_ref(), values.get(name)) {
                 ("defaults", DeValue::Table(keys), Some(Value::Table(values))) => {
-                    file.defaults = located(keys, values, &at)?;
+                    file.defaults = locate_keys(keys, values, &at)?;
                 }
                 ("model", DeValue::Array(tables), Some(Value::Array(all))) => {
                     for (keys, values) in tables.iter().zip(all) {
@@ -75,7 +75,7 @@ impl ModelsFile {
                         else {
                             return Err(Error::usage(place, "tables [[model]] expected"));
                         };
-                        file.models.push(located(keys, values, &at)?);
+                        file.models.push(locate_keys(keys, values, &at)?);
                     }
                 }
                 _ => {
@@ -93,8 +93,8 @@ impl ModelsFile {
     }
 }
 
-/// The keys of a table with their values and lines, none of them a secret.
-fn located(keys: &DeTable<'_>, values: &Table, at: &impl Fn(usize) -> String) -> Result<Keys> {
+/// Adds the lines to the keys and values of a table. Refuses secrets, and keys that are set twice.
+fn locate_keys(keys: &DeTable<'_>, values: &Table, at: &impl Fn(usize) -> String) -> Result<Keys> {
     let mut found = Keys::new();
     for (key, spanned) in keys {
         let name = &**key.get_ref();
@@ -115,7 +115,7 @@ fn located(keys: &DeTable<'_>, values: &Table, at: &impl Fn(usize) -> String) ->
     Ok(found)
 }
 
-/// Refuses a value that looks like a key. `in_headers` states that the keys are names of headers.
+/// Refuses a value that looks like an API key or another secret. `in_headers` is true if the keys are names of headers.
 fn refuse_secrets(
     key: &str,
     value: &Spanned<DeValue<'_>>,
@@ -124,9 +124,11 @@ fn refuse_secrets(
 ) -> Result<()> {
     match value.get_ref() {
         DeValue::String(text) => {
-            let long = text.len() >= LONG && is_secret_name(key);
-            let named = matches!(key, "key-env" | "key_env" | "env") && looks_like_key(text);
-            if is_secret_value(text) || named || (in_headers && long) {
+            let is_secret_header =
+                in_headers && text.len() >= MIN_SECRET_LENGTH && is_secret_name(key);
+            let is_key_as_variable =
+                matches!(key, "key-env" | "key_env" | "env") && looks_like_key(text);
+            if is_secret_value(text) || is_key_as_variable || is_secret_header {
                 let problem = format_args!(
                     "{key} looks like a secret, which is not shown here and must not be in a file of models: name a variable \
                      that holds it (key-env = \"NAME\", or {{ env = \"NAME\" }} for a header)"

@@ -1,37 +1,37 @@
-//! Keys of `[defaults]` that are no model's, because they hold for a whole run: [`run_defaults`].
+//! Keys in the `[defaults]` of a models file that are settings of the whole run: [`run_defaults`].
 
 use std::path::Path;
 
 use toml::Value;
 
-use super::entry::is_of_the_run;
+use super::entry::is_run_key;
 use super::file::ModelsFile;
 use crate::error::Result;
 
-/// A flag of the run that a file of models sets.
+/// A flag of the run that a models file sets.
 #[derive(Debug)]
 pub(crate) struct RunDefault {
-    /// The flag, by its long name.
+    /// Long name of the flag.
     pub(crate) flag: String,
     pub(crate) value: Value,
-    /// The file and the line.
+    /// File and line.
     pub(crate) place: String,
 }
 
-/// The flags of the run that the `[defaults]` of a file of models set.
+/// Reads the flags of the run that the `[defaults]` of a models file set.
 ///
 /// # Errors
-/// If the file cannot be read as a file of models.
+/// See [`ModelsFile::read`].
 pub(crate) fn run_defaults(path: &Path) -> Result<Vec<RunDefault>> {
     let file = ModelsFile::read(path)?;
-    let defaults = file
+    Ok(file
         .defaults
         .into_iter()
-        .filter(|(key, _)| is_of_the_run(key))
+        .filter(|(key, _)| is_run_key(key))
         .map(|(flag, located)| RunDefault {
             flag,
             value: located.value,
             place: located.place,
-        });
-    Ok(defaults.collect())
+        })
+        .collect())
 }

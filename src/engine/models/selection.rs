@@ -1,31 +1,29 @@
-//! Changes to a list of models by a call: `--set` ([`set`]) and `--only` ([`select`]).
+//! Changes to the list of models by flags: `--set` ([`apply_set`]) and `--only` ([`retain_only`]).
 
 use super::entry::{Entry, check_keys};
 use super::file::{Keys, Located};
 use crate::error::{Error, Result};
 
-/// Carries out one `--set NAME.KEY=VALUE`.
+/// Applies one `--set NAME.KEY=VALUE`.
 ///
 /// # Errors
-/// If there is no such model, or the key or its value cannot be used.
-pub(super) fn set(entries: &mut [Entry], text: &str) -> Result<()> {
+/// If no model has the name, or the key or its value is invalid.
+pub(super) fn apply_set(entries: &mut [Entry], text: &str) -> Result<()> {
     let wrong = |problem: String| Error::usage("--set", problem);
     let (place, value) = text
         .split_once('=')
         .ok_or_else(|| wrong("NAME.KEY=VALUE expected, as GPT-4o.rpm=60".to_owned()))?;
-    let of_name = |entry: &Entry| {
-        place
-            .strip_prefix(&*entry.name)?
-            .strip_prefix('.')
-            .map(str::to_owned)
-    };
-    // The longest name first: a name may begin as another one does.
-    let longest = entries
+    // The longest matching name, because a name may contain a dot and begin with another name.
+    let longest_match = entries
         .iter()
-        .filter(|entry| of_name(entry).is_some())
+        .filter(|entry| {
+            place
+                .strip_prefix(&*entry.name)
+                .is_some_and(|rest| rest.starts_with('.'))
+        })
         .map(|entry| entry.name.clone())
         .max_by_key(String::len);
-    let Some(name) = longest else {
+    let Some(name) = longest_match else {
         let names: Vec<&str> = entries.iter().map(|entry| &*entry.name).collect();
         let problem = format!(
             "{place}: no model of this name; the models are {}",
@@ -33,10 +31,11 @@ pub(super) fn set(entries: &mut [Entry], text: &str) -> Result<()> {
         );
         return Err(wrong(problem));
     };
-    // What is no value of TOML is a text.
+    // A value that is not TOML is taken as a string.
     let mut parsed: toml::Table = format!("value = {value}").parse().unwrap_or_default();
-    let as_text = || toml::Value::String(value.to_owned());
-    let value = parsed.remove("value").unwrap_or_else(as_text);
+    let value = parsed
+        .remove("value")
+        .unwrap_or_else(|| toml::Value::String(value.to_owned()));
     let key = place[name.len() + 1..].replace('_', "-");
     if matches!(&*key, "name" | "id") {
         return Err(wrong(format!(
@@ -49,21 +48,21 @@ pub(super) fn set(entries: &mut [Entry], text: &str) -> Result<()> {
     };
     let keys = Keys::from([(key, located)]);
     check_keys(&keys, false)?;
-    let mut named = entries.iter_mut().filter(|entry| entry.name == name);
-    named.try_for_each(|entry| {
+    for entry in entries.iter_mut().filter(|entry| entry.name == name) {
         if keys.contains_key("endpoints") {
-            // A key that belongs to another address is not sent to this one.
+            // The API key belongs to the earlier address.
             entry.asking.forget_key();
         }
-        entry.apply(&keys)
-    })
+        entry.apply(&keys)?;
+    }
+    Ok(())
 }
 
 /// Keeps only the models that `--only` names.
 ///
 /// # Errors
-/// If there is no model of one of these names.
-pub(super) fn select(entries: &mut Vec<Entry>, only: &[String]) -> Result<()> {
+/// If no model has one of the names.
+pub(super) fn retain_only(entries: &mut Vec<Entry>, only: &[String]) -> Result<()> {
     if only.is_empty() {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! The models of a run, resolved: [`AskSettings`], one [`ModelSettings`] a model.
+//! Validated settings of the models of a run: [`AskSettings`], with one [`ModelSettings`] for each model.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
@@ -12,7 +12,7 @@ use super::asking::AskingArgs;
 use super::entry::{Entry, check_keys, flag_of};
 use super::file::{Keys, ModelsFile};
 use super::name::ModelName;
-use super::selection::{select, set};
+use super::selection::{apply_set, retain_only};
 use super::trust::{self, Trust};
 use crate::ask::{AccessArgs, Parameters, Price, Sending, Server};
 use crate::error::{Error, Result};
@@ -20,79 +20,79 @@ use crate::runs::shard::Shard;
 use crate::types::manifests::{Columns, Views};
 use crate::types::{ListedModel, View};
 
-/// One model of a run, with all that its requests need.
+/// One model of a run, with the settings of its requests.
 #[derive(Debug, Clone)]
 pub(crate) struct ModelSettings {
-    /// The name in records and tables.
+    /// Name in records and tables.
     pub(crate) name: String,
     pub(crate) id: ModelName,
-    /// Whether it sees the images.
+    /// With or without images.
     pub(crate) view: View,
     /// Parameters of every request.
     pub(crate) parameters: Parameters,
-    /// The endpoint; `None` if the model is built in. Models with the same endpoint and pace share one.
+    /// The endpoint; `None` for a built-in model. Models with the same endpoint and rate limits share one.
     pub(crate) server: Option<Arc<Server>>,
-    /// The price, if it is not that of the table of prices.
+    /// The model's own price; `None` for the price in the table.
     pub(crate) price: Option<Price>,
-    /// The number of questions that it is asked; `None` for all.
+    /// Number of questions that the model is asked; `None` for all.
     pub(crate) limit: Option<usize>,
 }
 
 /// The models of a run.
 #[derive(Debug)]
 pub(crate) struct AskSettings {
-    /// The models: those of the file in its order, then those that flags name.
+    /// Models of the models file in its order, followed by those that flags name.
     pub(crate) models: Vec<ModelSettings>,
-    /// The note about the file of models; `None` without one.
+    /// Content of the models file for the manifest; `None` without a file.
     pub(crate) file: Option<FileNote>,
 }
 
-/// The manifest's note about a file of models.
+/// Content of a models file for the manifest.
 #[derive(Debug)]
 pub(crate) struct FileNote {
-    /// The models that are asked, as resolved, without secrets.
+    /// Resolved settings of the models that are asked, without secrets.
     pub(crate) resolved: Value,
-    /// All models of the file in its order, then those that flags name.
+    /// All models of the file in its order, followed by those that flags name.
     pub(crate) listed: Vec<ListedModel>,
 }
 
-/// Inputs of resolving models besides their flags.
+/// Inputs to [`AskSettings::resolve`] besides the flags of models and requests.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ResolveContext<'a> {
-    /// The flags of the call itself, by long name: those of variables and files are not among them.
+    /// Long names of the flags on the command line, without flags that variables or files set.
     pub(crate) typed: &'a BTreeSet<String>,
     pub(crate) shard: Shard,
-    /// How many shards run at once; `None` for all.
+    /// Number of shards that run at once; `None` for all.
     pub(crate) workers: Option<NonZeroU32>,
-    /// Whether keys are read.
+    /// Controls whether API keys are read.
     pub(crate) keys: KeyUse,
-    /// The file or folder of the data, if a file of models may have come with it.
+    /// The file or folder of the data, with which a models file may have come.
     pub(crate) data: Option<&'a Path>,
-    /// Which models are asked without images, too.
+    /// Models that are also asked without images.
     pub(crate) text_baseline: TextBaseline,
 }
 
-/// Which of the models that see images are asked without any, too.
+/// Selects the models that are asked both with and without images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum TextBaseline {
-    /// Models marked by a flag or in the file of models.
+    /// Models marked by a flag or in the models file.
     #[default]
-    AsSaid,
-    /// All of them.
+    AsMarked,
+    /// All models.
     Always,
 }
 
-/// Whether the keys of endpoints are needed.
+/// Need for API keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum KeyUse {
-    /// Requests are sent: a key that is missing is an error.
+    /// Requests are sent, so a missing key is an error.
     Needed,
-    /// Nothing is sent.
+    /// Nothing is sent, and no key is read.
     NotNeeded,
 }
 
 impl AskSettings {
-    /// The view of each model, by name.
+    /// The views of each model, by name.
     pub(crate) fn views(&self) -> Views {
         let mut views = Views::new();
         for model in &self.models {
@@ -104,7 +104,7 @@ impl AskSettings {
         views
     }
 
-    /// The models of these flags and of the file that they name. The keys are read if a model needs one.
+    /// Resolves the models of these flags and of the models file that they name. Reads the API keys that the models need.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag, or the line of the file, that cannot be used.
@@ -121,9 +121,9 @@ impl AskSettings {
         };
         if let Some(file) = &file {
             let trust = if args.trust_models {
-                Trust::Own
+                Trust::Stated
             } else {
-                Trust::ByPlace
+                Trust::ByLocation
             };
             trust::check(file, &entries, asking, context.data, trust)?;
         }
@@ -132,7 +132,7 @@ impl AskSettings {
         entries.extend(args.model.iter().map(|name| flag(name, view)));
         entries.extend(args.blind_model.iter().map(|name| flag(name, View::Blind)));
         for text in &args.set {
-            set(&mut entries, text)?;
+            apply_set(&mut entries, text)?;
         }
         if context.text_baseline == TextBaseline::Always {
             add_text_baselines(&mut entries);
@@ -144,7 +144,7 @@ impl AskSettings {
                 group: entry.group.clone(),
             })
             .collect();
-        select(&mut entries, &args.only)?;
+        retain_only(&mut entries, &args.only)?;
         if asking.access.base_url.is_empty() {
             entries
                 .iter()
@@ -155,7 +155,7 @@ impl AskSettings {
         let (mut models, mut servers, mut notes) = (Vec::new(), Servers::default(), Vec::new());
         for entry in &entries {
             let resolved = resolve(entry, context, &mut servers)?;
-            notes.push(note(entry, &resolved));
+            notes.push(manifest_note(entry, &resolved));
             models.extend(entry.views.iter().map(|view| ModelSettings {
                 view: *view,
                 ..resolved.clone()
@@ -171,8 +171,8 @@ impl AskSettings {
         })
     }
 
-    /// Goes on with a run with these columns: a token limit that has grown since does not make other trials. A model with the settings of
-    /// another name in the run has been renamed.
+    /// Adapts the settings to a run with these columns, so that a larger token limit does not change its trial keys. Models whose settings
+    /// the run has, under this or another name, are left as they are.
     pub(crate) fn continue_from(&mut self, columns: &Columns) {
         let Some(stored) = columns.get("model") else {
             return;
@@ -181,24 +181,26 @@ impl AskSettings {
             let ModelName::Remote(id) = &model.id else {
                 continue;
             };
-            let own = Parameters {
+            let parameters = Parameters {
                 model: id.clone(),
                 ..model.parameters.clone()
             };
-            let mut others = stored.values();
-            if others.any(|column| own.match_column(column)) {
+            if stored
+                .values()
+                .any(|column| parameters.match_column(column))
+            {
                 continue;
             }
             let Some(column) = stored.get(&model.name) else {
                 continue;
             };
-            if let Some(grown) = own.raised_from_column(column) {
+            if let Some(grown) = parameters.raised_from_column(column) {
                 model.parameters = grown;
             }
         }
     }
 
-    /// Whether a model of this name is shown images.
+    /// True if the model of this name is asked with images.
     pub(crate) fn shows_images_to(&self, id: &ModelName) -> bool {
         self.models
             .iter()
@@ -217,20 +219,21 @@ impl AskSettings {
     }
 }
 
-/// Has every model that sees images be asked without any, too, unless it is already.
+/// Adds the view without images to every model that does not have it.
 fn add_text_baselines(entries: &mut [Entry]) {
     let blind: BTreeSet<String> = entries
         .iter()
         .filter(|entry| entry.views.contains(&View::Blind))
         .map(|entry| entry.name.clone())
         .collect();
-    let seeing = entries.iter_mut();
-    for entry in seeing.filter(|entry| !blind.contains(&entry.name)) {
-        entry.views.push(View::Blind);
+    for entry in entries {
+        if !blind.contains(&entry.name) {
+            entry.views.push(View::Blind);
+        }
     }
 }
 
-/// The models of a file: the flags of the call above its defaults, its tables above the flags.
+/// The models of a models file. Flags on the command line override its `[defaults]`, and its `[[model]]` tables override the flags.
 fn entries_from_file(
     file: &ModelsFile,
     view: View,
@@ -245,10 +248,10 @@ fn entries_from_file(
         "key-env" | "key-file" => typed.contains("api-key-env") || typed.contains("api-key-file"),
         key => flag_of(key).is_some_and(|flag| typed.contains(flag)),
     };
-    // A key of the flags is not sent to an address of the file, so that it is above no key of [defaults] there.
-    let holds = |key: &str, keys: &Keys| {
-        let is_key = matches!(key, "key-env" | "key-file");
-        !is_typed(key) || (is_key && keys.contains_key("endpoints"))
+    // An API key from the flags is not sent to an address of the file, so it does not override a key from [defaults] there.
+    let applies = |key: &str, keys: &Keys| {
+        let is_api_key = matches!(key, "key-env" | "key-file");
+        !is_typed(key) || (is_api_key && keys.contains_key("endpoints"))
     };
     let mut entries = Vec::new();
     let mut overridden = BTreeSet::new();
@@ -258,7 +261,7 @@ fn entries_from_file(
             .defaults
             .clone()
             .into_iter()
-            .filter(|(key, _)| holds(key, keys))
+            .filter(|(key, _)| applies(key, keys))
             .collect();
         overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
         entries.push(Entry::from_file(
@@ -279,12 +282,12 @@ fn entries_from_file(
     Ok(entries)
 }
 
-/// The endpoints of a run, each made once for its flags.
+/// The endpoints of a run. Models with the same settings share one.
 #[derive(Debug, Default)]
 struct Servers(Vec<(AccessArgs, Sending, Arc<Server>)>);
 
 impl Servers {
-    /// The endpoint with these flags; a new one only if no model had the same.
+    /// The endpoint with these settings, created on the first call.
     fn get(&mut self, access: &AccessArgs, sending: Sending) -> Result<Arc<Server>> {
         let known = self.0.iter().find(|(a, s, _)| (a, *s) == (access, sending));
         if let Some((_, _, server)) = known {
@@ -296,7 +299,7 @@ impl Servers {
     }
 }
 
-/// A model with its endpoint and parameters; the view is that of its first line in tables.
+/// Resolves the endpoint and parameters of a model, with the first of its views.
 fn resolve(
     entry: &Entry,
     context: ResolveContext<'_>,
@@ -312,19 +315,19 @@ fn resolve(
         seed,
         reply_headers,
     } = entry.asking.clone();
-    let placed = |e: Error| match (&entry.place, e) {
+    let with_place = |e: Error| match (&entry.place, e) {
         (Some(place), Error::Usage { origin, problem }) => {
             Error::usage(place, format_args!("{}: {origin}: {problem}", entry.name))
         }
         (_, e) => e,
     };
-    let mut extra = request.resolve().map_err(placed)?;
+    let mut extra = request.resolve().map_err(with_place)?;
     for name in reply_headers {
         let value = plain_header(&access.header, &name);
         let problem =
             "no header of this name with a value in headers: only such a one can decide replies";
         let missing = || {
-            placed(Error::usage(
+            with_place(Error::usage(
                 "reply-headers",
                 format_args!("{name}: {problem}"),
             ))
@@ -341,7 +344,7 @@ fn resolve(
         ..parameters
     };
     if probabilities {
-        parameters.require_greedy().map_err(placed)?;
+        parameters.require_greedy().map_err(with_place)?;
     }
     let sending = Sending {
         quota: context.shard.quota(sending.quota, context.workers),
@@ -359,7 +362,7 @@ fn resolve(
         id: entry.id.clone(),
         view: entry.views[0],
         parameters,
-        server: server.map_err(placed)?,
+        server: server.map_err(with_place)?,
         price: entry.price,
         limit: entry.limit.map(std::num::NonZeroUsize::get),
     })
@@ -367,15 +370,15 @@ fn resolve(
 
 /// The value of a header that is not secret.
 fn plain_header(headers: &[String], name: &str) -> Option<String> {
-    let found = headers
+    headers
         .iter()
         .filter_map(|text| text.split_once(':'))
-        .find(|(other, _)| other.trim().eq_ignore_ascii_case(name));
-    found.map(|(_, value)| value.trim().to_owned())
+        .find(|(other, _)| other.trim().eq_ignore_ascii_case(name))
+        .map(|(_, value)| value.trim().to_owned())
 }
 
-/// The manifest's note about a model, without keys, passwords and values of secret headers.
-fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
+/// The settings of a model for the manifest, without keys, passwords and values of secret headers.
+fn manifest_note(entry: &Entry, resolved: &ModelSettings) -> Value {
     let access = &entry.asking.access;
     let views: Vec<String> = entry.views.iter().map(ToString::to_string).collect();
     let names = |headers: &[String]| -> Vec<String> {
@@ -419,7 +422,8 @@ fn note(entry: &Entry, resolved: &ModelSettings) -> Value {
     note
 }
 
-/// Refuses `--blind-model` with a model of the file: it would be asked at another address, and with other settings than with images.
+/// Refuses `--blind-model` with a model of the models file, because it would be asked at another address and with other settings than
+/// with images.
 fn refuse_models_of_file(entries: &[Entry], blind: &[ModelName]) -> Result<()> {
     for name in blind.iter().map(ModelName::label) {
         let known = entries
@@ -437,7 +441,7 @@ fn refuse_models_of_file(entries: &[Entry], blind: &[ModelName]) -> Result<()> {
     Ok(())
 }
 
-/// Refuses two models of one name and view: their replies could not be told apart in tables.
+/// Refuses two models with the same name and view, because tables could not distinguish their replies.
 fn refuse_same_names(models: &[ModelSettings]) -> Result<()> {
     for (i, model) in models.iter().enumerate() {
         let mut before = models[..i].iter();

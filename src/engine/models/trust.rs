@@ -1,6 +1,6 @@
-//! Refuses settings that a file of models may not have if it came with data: [`check`].
+//! Refuses dangerous settings in a models file that may have come with the data: [`check`].
 //!
-//! Such a file is a stranger's: it could name a variable or a file of this machine, and an address of its own to send it to.
+//! Such a file may be written by an attacker: it could name a variable or a file of this machine, and an address to send its content to.
 
 use std::path::{Path, PathBuf};
 
@@ -13,19 +13,19 @@ use crate::error::{Error, Result};
 /// The value of `key-env` for an endpoint without keys.
 const NO_KEY: &str = "none";
 
-/// Whether the user has said that a file of models is the user's own.
+/// Trust in a models file. A trusted file may name any variable and file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Trust {
-    /// It may name any variable and file.
-    Own,
-    /// It may if it does not lie in the folder of the data.
-    ByPlace,
+    /// Trusted, because a flag states it.
+    Stated,
+    /// Trusted if it is not in the folder of the data.
+    ByLocation,
 }
 
-/// Refuses a file in the folder of the `data` by which variables other than those of the host's own tools would be sent, or files
-/// outside the file's own folder. A file is the user's own if the working directory lies in that folder. `entries` are the file's
-/// models as merged: what they come to is looked at, and not what single tables say. What the `flags` alone send is the user's own
-/// wish, but to the addresses of the flags only.
+/// Refuses an untrusted models file that would send variables other than those of the host's own tools, or files outside its own folder.
+/// A file is untrusted in the folder of the `data`, unless the working directory is in that folder too. The check applies to the merged
+/// models of the file, `entries`, and not to single tables. Variables and files that the `flags` name are allowed, but only at the
+/// addresses of the flags.
 ///
 /// # Errors
 /// [`Error::Usage`] with the line of the key.
@@ -36,14 +36,14 @@ pub(super) fn check(
     data: Option<&Path>,
     trust: Trust,
 ) -> Result<()> {
-    let Some(data) = data.filter(|_| trust == Trust::ByPlace) else {
+    let Some(data) = data.filter(|_| trust == Trust::ByLocation) else {
         return Ok(());
     };
-    if !is_strange(&file.path, data) {
+    if !is_in_data_folder(&file.path, data) {
         return Ok(());
     }
     for (keys, entry) in file.models.iter().zip(entries) {
-        let model = Suspect {
+        let model = UntrustedModel {
             file,
             keys,
             entry,
@@ -56,23 +56,23 @@ pub(super) fn check(
     Ok(())
 }
 
-/// Whether a file lies in the folder of the data, and the working directory does not.
-fn is_strange(file: &Path, data: &Path) -> bool {
+/// True if a file is in the folder of the data, and the working directory is not.
+fn is_in_data_folder(file: &Path, data: &Path) -> bool {
     let folder = if data.is_dir() {
         Some(data)
     } else {
         data.parent()
     };
-    let folder = folder.and_then(real);
-    let below = |path: Option<PathBuf>| match (&folder, path) {
+    let folder = folder.and_then(canonical_path);
+    let is_inside = |path: &Path| match (&folder, canonical_path(path)) {
         (Some(folder), Some(path)) => path.starts_with(folder),
         _ => false,
     };
-    below(real(file)) && !below(real(Path::new(".")))
+    is_inside(file) && !is_inside(Path::new("."))
 }
 
-/// The path without links; `None` if there is no such file.
-fn real(path: &Path) -> Option<PathBuf> {
+/// The absolute path without symbolic links; `None` if there is no such file. An empty path is the working directory.
+fn canonical_path(path: &Path) -> Option<PathBuf> {
     let path = if path.as_os_str().is_empty() {
         Path::new(".")
     } else {
@@ -81,26 +81,26 @@ fn real(path: &Path) -> Option<PathBuf> {
     path.canonicalize().ok()
 }
 
-/// A model of a file that may be a stranger's.
-struct Suspect<'a> {
+/// A model of an untrusted models file.
+struct UntrustedModel<'a> {
     file: &'a ModelsFile,
-    /// Its own table.
+    /// The model's own table.
     keys: &'a Keys,
-    /// The resolved entry.
+    /// The model merged from flags and tables.
     entry: &'a Entry,
     flags: &'a AskingArgs,
 }
 
-/// A variable that is sent, and the key of the file that states it.
-struct Sent<'a> {
+/// A variable whose value would be sent, and the key of the file that names it.
+struct SentVariable<'a> {
     key: &'static str,
     variable: &'a str,
-    /// Whether the flags alone send it, too.
+    /// True if the flags name it, too.
     by_flags: bool,
 }
 
-impl Suspect<'_> {
-    /// Refuses files outside the folder of the file of models, whose content would be sent.
+impl UntrustedModel<'_> {
+    /// Refuses to send the content of files outside the folder of the models file.
     fn check_files(&self) -> Result<()> {
         let (asking, flags) = (&self.entry.asking, self.flags);
         let body = |asking: &AskingArgs| {
@@ -120,32 +120,33 @@ impl Suspect<'_> {
             ),
             ("body", body(asking), body(flags)),
         ];
-        for (key, path, of_flags) in files {
+        for (key, path, flag_path) in files {
             if let Some(path) = path
-                && Some(&path) != of_flags.as_ref()
+                && Some(&path) != flag_path.as_ref()
                 && !self.is_inside(&path)
             {
                 let problem = format_args!("{key}: {} is outside its folder", path.display());
-                return Err(self.strange(key, problem));
+                return Err(self.error_at_key(key, problem));
             }
         }
         Ok(())
     }
 
-    /// Refuses what decides which variables are sent, whom a connection trusts, and whether others can read it.
+    /// Refuses settings that select the variables to send or the trusted authorities of a connection, or that allow unencrypted
+    /// connections.
     fn check_connection(&self) -> Result<()> {
         let (access, flags) = (&self.entry.asking.access, &self.flags.access);
         if access.vendor != flags.vendor {
             let problem = "vendor: such a table decides which variables are sent";
-            return Err(self.strange("vendor", format_args!("{problem}")));
+            return Err(self.error_at_key("vendor", format_args!("{problem}")));
         }
         if access.ca_file != flags.ca_file {
             let problem = "ca-file: its authorities could pass off another server as the vendor's";
-            return Err(self.strange("ca-file", format_args!("{problem}")));
+            return Err(self.error_at_key("ca-file", format_args!("{problem}")));
         }
         if access.allow_http && !flags.allow_http {
             let problem = "allow-http: others on the way could read what is sent";
-            return Err(self.strange("allow-http", format_args!("{problem}")));
+            return Err(self.error_at_key("allow-http", format_args!("{problem}")));
         }
         Ok(())
     }
@@ -153,50 +154,54 @@ impl Suspect<'_> {
     /// Refuses variables that would be sent to a host whose own tools do not read them.
     fn check_variables(&self) -> Result<()> {
         let access = &self.entry.asking.access;
-        let of_flags = self.flags.access.addresses()?;
+        let flag_addresses = self.flags.access.addresses()?;
         for base in access.addresses()? {
-            let own = vendor_variables(base.host());
-            let is_of_flags = of_flags.contains(&base);
-            let mut sent = named(access, &self.flags.access);
-            sent.extend(self.default_key(&base, &own));
-            let mut foreign = sent.iter().filter(|sent| {
-                let is_wished = sent.by_flags && is_of_flags;
-                !is_wished && !own.contains(&sent.variable)
-            });
-            if let Some(Sent { key, variable, .. }) = foreign.next() {
-                return Err(self.foreign(key, variable, &base));
+            let host_variables = vendor_variables(base.host());
+            let is_flag_address = flag_addresses.contains(&base);
+            let mut variables = named_variables(access, &self.flags.access);
+            variables.extend(self.default_key(&base, &host_variables));
+            for sent in variables {
+                let is_requested = sent.by_flags && is_flag_address;
+                if !is_requested && !host_variables.contains(&sent.variable) {
+                    return Err(self.foreign_variable_error(sent.key, sent.variable, &base));
+                }
             }
         }
         Ok(())
     }
 
-    /// The variable that is taken for a host that the table of vendors does not have, if no other key is named.
-    fn default_key(&self, base: &BaseUrl, own: &[&str]) -> Option<Sent<'static>> {
+    /// The default key variable, which is sent to hosts without variables of their own if no other key is named and the variable is set.
+    fn default_key(
+        &self,
+        base: &BaseUrl,
+        host_variables: &[&str],
+    ) -> Option<SentVariable<'static>> {
         let (access, flags) = (&self.entry.asking.access, &self.flags.access);
-        let none =
+        let has_no_key =
             |access: &AccessArgs| access.api_key_env.is_none() && access.api_key_file.is_none();
         let is_set = std::env::var_os(OPENAI_KEY).is_some_and(|text| !text.is_empty());
-        let is_sent = none(access) && own.is_empty() && !base.is_loopback() && is_set;
-        is_sent.then(|| Sent {
+        let is_sent =
+            has_no_key(access) && host_variables.is_empty() && !base.is_loopback() && is_set;
+        is_sent.then(|| SentVariable {
             key: "endpoints",
             variable: OPENAI_KEY,
-            by_flags: none(flags),
+            by_flags: has_no_key(flags),
         })
     }
 
-    /// The error about a variable at a host that is not its own.
-    fn foreign(&self, key: &str, variable: &str, base: &BaseUrl) -> Error {
+    /// The error for a variable that the tools of a host do not read.
+    fn foreign_variable_error(&self, key: &str, variable: &str, base: &BaseUrl) -> Error {
         let host = base.host();
         if self.stated(key, variable).is_some() && key != "endpoints" {
             let problem = format_args!("{key}: {variable} is not a variable of {host}'s own tools");
-            return self.strange_at(self.stated(key, variable), problem);
+            return self.error_at(self.stated(key, variable), problem);
         }
         let problem = if key == "endpoints" {
             format!("{variable} would be sent to {host}, which the table of vendors does not have")
         } else {
             format!("{variable} would be sent to {host}, which no flag names")
         };
-        self.strange("endpoints", format_args!("endpoints: {problem}"))
+        self.error_at_key("endpoints", format_args!("endpoints: {problem}"))
     }
 
     /// The key of the model's own table, else that of `[defaults]`, if it names the variable.
@@ -212,21 +217,21 @@ impl Suspect<'_> {
     }
 
     fn is_inside(&self, path: &Path) -> bool {
-        let own = self.file.path.parent().and_then(real);
-        match (own, real(path)) {
-            (Some(own), Some(path)) => path.starts_with(own),
-            // What is not there cannot be sent.
+        let folder = self.file.path.parent().and_then(canonical_path);
+        match (folder, canonical_path(path)) {
+            (Some(folder), Some(path)) => path.starts_with(folder),
+            // A missing file cannot be sent.
             _ => true,
         }
     }
 
-    /// The error at the line of a key: that of the model's own table, else that of `[defaults]`.
-    fn strange(&self, key: &str, problem: std::fmt::Arguments<'_>) -> Error {
+    /// An error at the line of a key in the model's own table, else in `[defaults]`.
+    fn error_at_key(&self, key: &str, problem: std::fmt::Arguments<'_>) -> Error {
         let located = self.keys.get(key).or_else(|| self.file.defaults.get(key));
-        self.strange_at(located, problem)
+        self.error_at(located, problem)
     }
 
-    fn strange_at(&self, located: Option<&Located>, problem: std::fmt::Arguments<'_>) -> Error {
+    fn error_at(&self, located: Option<&Located>, problem: std::fmt::Arguments<'_>) -> Error {
         let problem = format!(
             "{problem}, and the file may have come with the data from someone else; --allow models-file states that you trust it"
         );
@@ -238,21 +243,21 @@ impl Suspect<'_> {
     }
 }
 
-/// The variables that an endpoint names for its key and its headers.
-fn named<'a>(access: &'a AccessArgs, flags: &AccessArgs) -> Vec<Sent<'a>> {
+/// The variables that the settings of an endpoint name for its key and its headers.
+fn named_variables<'a>(access: &'a AccessArgs, flags: &AccessArgs) -> Vec<SentVariable<'a>> {
     let key = access
         .api_key_env
         .as_deref()
         .filter(|name| *name != NO_KEY)
         .filter(|_| access.api_key_file.is_none());
-    let key = key.map(|variable| Sent {
+    let key = key.map(|variable| SentVariable {
         key: "key-env",
         variable,
         by_flags: access.api_key_env == flags.api_key_env,
     });
     let headers = access.header_env.iter().filter_map(|text| {
         let (_, variable) = text.split_once('=')?;
-        Some(Sent {
+        Some(SentVariable {
             key: "headers",
             variable: variable.trim(),
             by_flags: flags.header_env.contains(text),

@@ -1,10 +1,10 @@
-//! `batch status`, `batch fetch` and `batch cancel`: the batches of a run, by its folder alone.
+//! `batch status`, `batch fetch` and `batch cancel` for the batches of a run folder.
 
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::reported;
+use super::report;
 use crate::ask::AccessArgs;
 use crate::engine::batch::{CollectArgs, FolderBatches, FolderTask};
 use crate::error::Result;
@@ -13,7 +13,7 @@ use crate::run_reports::{choice, open};
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
-use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
+use crate::runs::stored::{ExperimentKind, StoredRun, read_run_manifest};
 use crate::store::{AddressChange, Store};
 use crate::types::manifests::Status;
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
@@ -44,17 +44,17 @@ pub(crate) struct BatchFolderArgs {
     pub show: ShowArgs,
 }
 
-/// Prints how far the batches of a run have come. Changes nothing, also while another process waits for them.
+/// Prints the progress of the batches of a run. Changes nothing, and works while another process is waiting for them.
 ///
 /// # Errors
 /// If the folder has no batches that the program submitted, or the server cannot be asked.
 pub(crate) fn status(args: &BatchStatusArgs) -> Result<Outcome> {
-    let manifest = manifest(&args.run)?;
+    let manifest = read_run_manifest(&args.run)?;
     let batches = FolderBatches::open(&args.run, &manifest, &args.access)?;
     Ok(Outcome::text(Status::Complete, batches.status()?))
 }
 
-/// Looks at each batch once, and takes over the replies of those that have ended.
+/// Queries each batch once, and imports the replies of those that have ended.
 ///
 /// # Errors
 /// If the folder has no batches that the program submitted, or the server refuses.
@@ -62,7 +62,7 @@ pub(crate) fn fetch(args: &BatchFolderArgs, progress: &Progress) -> Result<Outco
     carry_out(args, FolderTask::Fetch, progress)
 }
 
-/// Cancels the batches, waits until they have ended, and takes over the existing replies.
+/// Cancels the batches, waits until they have ended, and imports the existing replies.
 ///
 /// # Errors
 /// If the folder has no batches that the program submitted, or the server refuses.
@@ -72,21 +72,21 @@ pub(crate) fn cancel(args: &BatchFolderArgs, progress: &Progress) -> Result<Outc
 
 fn carry_out(args: &BatchFolderArgs, task: FolderTask, progress: &Progress) -> Result<Outcome> {
     match ExperimentKind::read(&args.run.run)? {
-        ExperimentKind::Choice => in_run::<ChoiceDetail>(args, task, progress, choice::write),
-        ExperimentKind::Open => in_run::<OpenDetail>(args, task, progress, open::write),
+        ExperimentKind::Choice => carry_out_in::<ChoiceDetail>(args, task, progress, choice::write),
+        ExperimentKind::Open => carry_out_in::<OpenDetail>(args, task, progress, open::write),
     }
 }
 
-fn in_run<D: Detail>(
+fn carry_out_in<D: Detail>(
     args: &BatchFolderArgs,
     task: FolderTask,
     progress: &Progress,
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
     let folder = &args.run.run;
-    let manifest = manifest(folder)?;
+    let manifest = read_run_manifest(folder)?;
     let mut store = Store::<D>::open(folder, &manifest, AddressChange::Allowed)?;
     let batches = FolderBatches::open(folder, &manifest, &args.run.access)?;
     let text = batches.carry_out(task, &mut store, &args.collect, progress)?;
-    reported(&store, manifest, &args.show, &text, write)
+    report(&store, manifest, &args.show, &text, write)
 }

@@ -1,4 +1,4 @@
-//! `batch import`: reading the output of a Batch API into the records of a run; and the batches of a folder.
+//! `batch import` reads the output of a Batch API into the records of a run; [`folder`] has the commands for submitted batches.
 
 mod folder;
 
@@ -13,7 +13,7 @@ use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::StdoutFormat;
 use crate::runs::record_table;
-use crate::runs::stored::{ExperimentKind, StoredRun, manifest};
+use crate::runs::stored::{ExperimentKind, StoredRun, read_run_manifest};
 use crate::store::{AddressChange, Store};
 use crate::types::manifests::{Counts, RunManifest};
 use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
@@ -38,7 +38,7 @@ pub(crate) struct BatchImportArgs {
 /// Imports the replies of output and error files. Each reply is imported once, even if a file is imported again.
 ///
 /// # Errors
-/// If the folder holds no run or no batch, or a line is not valid. The replies of the lines before it stay imported.
+/// If the folder has no run or no batch, or a line is invalid. The replies of earlier lines stay imported.
 pub(crate) fn import(args: &BatchImportArgs) -> Result<Outcome> {
     match ExperimentKind::read(&args.run)? {
         ExperimentKind::Choice => import_into::<ChoiceDetail>(args, choice::write),
@@ -50,14 +50,14 @@ fn import_into<D: Detail>(
     args: &BatchImportArgs,
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let manifest = manifest(&args.run)?;
+    let manifest = read_run_manifest(&args.run)?;
     let mut store = Store::<D>::open(&args.run, &manifest, AddressChange::Allowed)?;
     let imported = replies::import(&mut store, &manifest, &args.files)?;
-    reported(&store, manifest, &args.show, &imported, write)
+    report(&store, manifest, &args.show, &imported, write)
 }
 
-/// The report of a run with new replies, behind a text about them.
-fn reported<D: Detail>(
+/// Writes the report of a run with new replies. The text for standard output begins with `text`, which describes the new replies.
+fn report<D: Detail>(
     store: &Store<D>,
     manifest: RunManifest,
     show: &ShowArgs,
@@ -69,7 +69,7 @@ fn reported<D: Detail>(
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.count(Counts::new(trials, failed));
     let mut outcome = write(store, run, show.format())?;
-    record_table::update(store.folder(), show.table())?;
+    record_table::update(store.folder(), show.record_table())?;
     if !show.format().is_json() {
         outcome.output.insert_str(0, text);
     }

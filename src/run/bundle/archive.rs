@@ -1,4 +1,4 @@
-//! The ZIP file of a bundle: [`zipped`], and [`is_bundle`].
+//! The ZIP file of a bundle: [`zip_files`] and [`is_bundle`].
 
 use std::fmt::Write as _;
 use std::io::{self, Cursor, Read as _, Seek as _, SeekFrom, Write as _};
@@ -11,38 +11,40 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// The comment of the archive, by which a bundle is known again.
+/// Comment of the archive, which identifies a bundle.
 const MARK: &[u8] = b"darkqa.bundle/1";
 
-/// Length of the record that ends a ZIP file, without its comment.
+/// Length of the end record of a ZIP file without its comment, in bytes.
 const END_RECORD: usize = 22;
 
 /// Name of the file with the digests of the others.
 const SUMS: &str = "SHA256SUMS";
 
-/// Level of compression (the usual one of deflate).
+/// Compression level, the default of deflate.
 const LEVEL: i64 = 6;
 
-/// Whether a file is a bundle, by its end alone: its directory may have millions of entries.
+/// True if a file is a bundle. Only the end of the file is read, because the directory of a ZIP file may have millions of entries.
 pub(super) fn is_bundle(path: &Path) -> bool {
-    // The record that ends a ZIP file has the length of the comment in its last two bytes, and the comment behind them.
-    let length = END_RECORD + MARK.len();
-    let read = || -> io::Result<Vec<u8>> {
-        let mut file = reading::open(path)?;
-        file.seek(SeekFrom::End(-(length as i64)))?;
-        let mut end = Vec::new();
-        file.take(length as u64).read_to_end(&mut end)?;
-        Ok(end)
-    };
-    read().is_ok_and(|end| end.starts_with(b"PK\x05\x06") && end.ends_with(MARK))
+    // The comment follows the end record, whose last two bytes are the length of the comment.
+    read_end(path, END_RECORD + MARK.len())
+        .is_ok_and(|end| end.starts_with(b"PK\x05\x06") && end.ends_with(MARK))
 }
 
-/// The files by name as one archive, in a folder of this name, with their digests as `sha256sum` reads them. The same files are the same
-/// bytes: names are sorted, and times are all 1980-01-01.
+/// The last `length` bytes of a file.
+fn read_end(path: &Path, length: usize) -> io::Result<Vec<u8>> {
+    let mut file = reading::open(path)?;
+    file.seek(SeekFrom::End(-(length as i64)))?;
+    let mut end = Vec::new();
+    file.take(length as u64).read_to_end(&mut end)?;
+    Ok(end)
+}
+
+/// Packs files into an archive, in a folder of this name, with a file of digests for `sha256sum`. The same files give the same bytes:
+/// names are sorted, and all times are 1980-01-01.
 ///
 /// # Errors
 /// If the archive cannot be made.
-pub(super) fn zipped(folder: &str, mut files: Vec<(String, Vec<u8>)>) -> Result<Vec<u8>> {
+pub(super) fn zip_files(folder: &str, mut files: Vec<(String, Vec<u8>)>) -> Result<Vec<u8>> {
     files.sort();
     files.push((SUMS.to_owned(), sums(&files).into_bytes()));
     files.sort();
@@ -90,7 +92,7 @@ mod tests {
             let files = files
                 .into_iter()
                 .map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
-            zipped("run", files.collect()).unwrap()
+            zip_files("run", files.collect()).unwrap()
         };
         let bytes = named(files.to_vec());
         assert_eq!(bytes, named(files.into_iter().rev().collect()));

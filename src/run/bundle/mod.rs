@@ -1,9 +1,9 @@
-//! `bundle`: a run as one ZIP file to pass on.
+//! `bundle`: packs a run into a ZIP file for sharing.
 
 mod archive;
-mod parts;
 mod readme;
 mod redact;
+mod redacted_run;
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -13,18 +13,18 @@ use clap::Args;
 
 use crate::error::{Error, Result};
 use crate::files;
-use crate::run_reports::whole;
+use crate::run_reports::whole_report;
 use crate::runs::Outcome;
 use crate::runs::record_table::RECORDS_PARQUET;
-use crate::runs::stored::name;
+use crate::runs::stored::run_name;
 use crate::types::Decides;
 use crate::types::manifests::Status;
 
-use archive::{is_bundle, zipped};
-use parts::RunParts;
-pub(crate) use parts::ThumbnailChoice;
+use archive::{is_bundle, zip_files};
 use readme::{ReadmeInputs, command, readme};
 use redact::Redactor;
+use redacted_run::RedactedRun;
+pub(crate) use redacted_run::ThumbnailChoice;
 
 /// The flags of `bundle`.
 #[derive(Debug, Args)]
@@ -40,27 +40,26 @@ pub(crate) struct BundleArgs {
     pub thumbnails: ThumbnailChoice,
 }
 
-/// Packs a run. Paths, addresses and secrets are removed from all files; the report is made again from the rest.
+/// Packs a run. Paths, URLs and secrets are removed from all files, and the report is made again from the redacted files.
 ///
 /// # Errors
-/// If the folder holds no run, something else than a bundle is at `--out`, or something private would be left in a file.
+/// If the folder has no run, `--out` is an existing file other than a bundle, or private information would be left in a file.
 pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
     let replaces = args.out.symlink_metadata().is_ok();
     if replaces && !is_bundle(&args.out) {
         let problem = "exists already and is not a bundle; name another file";
         return Err(Error::data(args.out.display(), problem));
     }
-    let folder_name = file_name(&name(&args.run));
+    let folder_name = file_name(&run_name(&args.run));
     let mut redactor = Redactor::new(&args.run);
-    let parts = RunParts::read(&args.run, &folder_name, args.thumbnails, &mut redactor)?;
-    let RunParts {
+    let RedactedRun {
         manifest,
         mut files,
         run,
         thumbnails,
-    } = parts;
+    } = RedactedRun::read(&args.run, &folder_name, args.thumbnails, &mut redactor)?;
     let command = command(&manifest, &run);
-    let report = whole(run)?;
+    let report = whole_report(run)?;
     files.extend(report.files);
     let mut changes: Vec<String> = redactor
         .changes
@@ -68,15 +67,15 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         .map(|(change, times)| change.words(*times))
         .collect();
     if thumbnails[1] > 0 {
-        let of = thumbnails[0] + thumbnails[1];
+        let all = thumbnails[0] + thumbnails[1];
         changes.push(format!(
-            "{} of {of} small images are left out",
+            "{} of {all} small images are left out",
             thumbnails[1]
         ));
     }
-    let mut others = others(&args.run, &files)?;
+    let mut others = other_entries(&args.run, &files)?;
     if let Some(table) = others.iter().position(|name| name == RECORDS_PARQUET) {
-        // What it has of users and paths is not taken out of it.
+        // The table is not redacted.
         others.remove(table);
         changes.push(format!(
             "{RECORDS_PARQUET} is left out: report writes it again, from records.jsonl"
@@ -103,9 +102,9 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         files: &sizes,
     });
     files.push(("README.md".to_owned(), text.into_bytes()));
-    check(&files, &redactor)?;
+    check_leaks(&files, &redactor)?;
     let count = files.len() + 1;
-    let archive = zipped(&folder_name, files)?;
+    let archive = zip_files(&folder_name, files)?;
     files::write(&args.out, &archive)?;
     let verb = if replaces { "replaced" } else { "written" };
     let mut output = format!(
@@ -122,8 +121,8 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
     Ok(Outcome::wrote(&args.out, Status::Complete, output))
 }
 
-/// Checks that nothing private is left in any file.
-fn check(files: &[(String, Vec<u8>)], redactor: &Redactor) -> Result<()> {
+/// Checks that no private information is left in any file.
+fn check_leaks(files: &[(String, Vec<u8>)], redactor: &Redactor) -> Result<()> {
     for (name, content) in files {
         if let Some(what) = redactor.find_leak(&String::from_utf8_lossy(content)) {
             let problem = format_args!(
@@ -135,8 +134,8 @@ fn check(files: &[(String, Vec<u8>)], redactor: &Redactor) -> Result<()> {
     Ok(())
 }
 
-/// Files and folders beside those of the bundle, sorted.
-fn others(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<String>> {
+/// Names of the entries of the run folder that are not in the bundle, sorted.
+fn other_entries(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<String>> {
     let known: BTreeSet<&str> = files
         .iter()
         .map(|(name, _)| name.split('/').next().unwrap_or(name))
@@ -154,7 +153,7 @@ fn others(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<String>> {
     Ok(others)
 }
 
-/// A name of a folder for any system, from that of the run.
+/// Converts the name of a run to a folder name that is valid on all systems.
 fn file_name(name: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_.+@".contains(c);
     let name: String = name

@@ -16,17 +16,17 @@ use darkqa_score::answers::record::Detail;
 pub(super) struct ReadmeInputs<'a> {
     /// Name of the run, and of the folder in the archive.
     pub(super) name: &'a str,
-    /// The command that asks the same again: [`command`].
+    /// The command that repeats the run, from [`command`].
     pub(super) command: &'a str,
     /// The findings and the table by level, as Markdown.
     pub(super) findings: &'a str,
-    /// Parts that were left out or changed, a line each.
+    /// Changes to the run and parts left out, one line each.
     pub(super) changes: &'a [String],
     /// Names and sizes of the files.
     pub(super) files: &'a [(String, usize)],
 }
 
-/// The text of the README, in Markdown, with hidden characters written out.
+/// The text of the README in Markdown, with hidden characters escaped.
 pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
     let mut text = inputs.findings.to_owned();
     let name = shell_word(inputs.name);
@@ -51,7 +51,7 @@ pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
     shown(&text).into_owned()
 }
 
-/// Lines of a shell in a block of code that no text in them ends.
+/// Shell lines in a fenced code block, whose fence is longer than any in the lines.
 fn fenced(lines: &str) -> String {
     let mut fence = "```".to_owned();
     while lines.contains(&fence) {
@@ -60,16 +60,17 @@ fn fenced(lines: &str) -> String {
     format!("{fence}sh\n{lines}\n{fence}\n")
 }
 
-/// The questions, models and conditions of a run, from its trials.
+/// The levels and models of a run, from its trials.
 #[derive(Default)]
-struct Asked {
+struct RunModels {
     levels: BTreeSet<AxisLevel>,
-    /// Models with images, and without.
+    /// Models asked with images.
     seeing: BTreeSet<String>,
+    /// Models asked without images.
     blind: BTreeSet<String>,
 }
 
-impl Asked {
+impl RunModels {
     fn from_trials<D: Detail>(trials: &Trials<D>) -> Self {
         let mut asked = Self::default();
         for (model, condition) in trials.asked().into_iter().flatten() {
@@ -85,16 +86,16 @@ impl Asked {
     }
 }
 
-/// The command that asks what the run asked, as far as its manifest tells.
+/// The command that repeats a run, as far as its manifest states it.
 pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     let mut words = vec!["darkqa-eval".to_owned()];
     let asked = match run {
-        AnyRun::Choice(run) => Asked::from_trials(&run.trials),
+        AnyRun::Choice(run) => RunModels::from_trials(&run.trials),
         AnyRun::Open(run) => {
-            // The manifest has the digest of the questions, not their place.
+            // The manifest has the digest of the questions, not their path.
             let questions = ["openeqa", "--questions", "DIR/questions.json"];
             words.extend(questions.map(str::to_owned));
-            Asked::from_trials(&run.trials)
+            RunModels::from_trials(&run.trials)
         }
     };
     let setting = |name: &str| manifest.settings.get(name).and_then(Value::as_str);
@@ -110,7 +111,7 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
         words.extend(["--model".to_owned(), word(model)]);
     }
     for model in asked.blind.iter().filter(|model| !is_in_file(model)) {
-        // The judge sees no image, either.
+        // The judge is a blind model, too, but has its own flag.
         if Some(&**model) != judge {
             words.extend(["--blind-model".to_owned(), word(model)]);
         }
@@ -142,7 +143,7 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
         .identity
         .iter()
         .filter(|(flag, value)| {
-            // Digests stand for files, which the flags of images name.
+            // Digests identify files, which are named by the image flags.
             let is_plain = value.as_str().is_none_or(|text| text.len() < 64);
             flag.starts_with("--") && !has(flag) && is_plain && *flag != "--data"
         })
@@ -155,7 +156,7 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     })
 }
 
-/// The settings of the models at endpoints, by their names.
+/// The settings of the models at endpoints, by name.
 fn remote_models(manifest: &RunManifest) -> BTreeMap<&String, &Value> {
     manifest
         .columns
@@ -166,29 +167,34 @@ fn remote_models(manifest: &RunManifest) -> BTreeMap<&String, &Value> {
         .collect()
 }
 
-/// A file of models that asks for the same, if flags cannot: if names are not those at the endpoints, or settings differ.
+/// The models file for a run whose models cannot be given by flags, because their names differ from those at the endpoints or their
+/// settings differ from each other. `None` if flags suffice.
 fn models_file(
     remote: &BTreeMap<&String, &Value>,
-    asked: &Asked,
+    asked: &RunModels,
     judge: Option<&str>,
 ) -> Option<String> {
-    let decides = |content: &Value| {
+    let without_id = |content: &Value| {
         let mut content = content.as_object().cloned().unwrap_or_default();
         content.remove("--model");
         content
     };
-    // The judge has flags of its own.
-    let is_model = |name: &str| Some(name) != judge || asked.seeing.contains(name);
-    let models = remote.iter().filter(|(name, _)| is_model(name));
-    let mut contents = models.clone().map(|(_, content)| decides(content));
-    let first = contents.next()?;
-    let mut named = models.clone();
-    if contents.all(|other| other == first) && named.all(|(name, of)| of["--model"] == **name) {
+    // The judge has its own flags.
+    let models: Vec<(&String, &Value)> = remote
+        .iter()
+        .map(|(name, content)| (*name, *content))
+        .filter(|(name, _)| Some(name.as_str()) != judge || asked.seeing.contains(*name))
+        .collect();
+    let first = without_id(models.first()?.1);
+    if models
+        .iter()
+        .all(|(name, content)| without_id(content) == first && content["--model"] == **name)
+    {
         return None;
     }
     let mut text = String::new();
     for (name, content) in models {
-        let view = match (asked.seeing.contains(*name), asked.blind.contains(*name)) {
+        let view = match (asked.seeing.contains(name), asked.blind.contains(name)) {
             (true, true) => "both",
             (false, true) => "blind",
             _ => "image",
@@ -213,12 +219,12 @@ fn models_file(
     Some(text)
 }
 
-/// Whether a model is a control of the observer, which is asked with it.
+/// True if a model is a control of the observer, which is asked together with the observer.
 fn is_control(model: &str) -> bool {
     model.starts_with("observer:")
 }
 
-/// The flags of models that all of them have with the same value.
+/// The flags whose value is the same for all models.
 fn common_flags(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
     let remote: Vec<&Value> = remote.values().copied().collect();
     let Some(first) = remote.first().and_then(|first| first.as_object()) else {
@@ -227,8 +233,11 @@ fn common_flags(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
     let shared: BTreeMap<&String, &Value> = first
         .iter()
         .filter(|(flag, value)| {
-            let same = |other: &&Value| other.get(flag.as_str()) == Some(value);
-            flag.starts_with("--") && *flag != "--model" && remote.iter().all(same)
+            flag.starts_with("--")
+                && *flag != "--model"
+                && remote
+                    .iter()
+                    .all(|other| other.get(flag.as_str()) == Some(value))
         })
         .collect();
     shared
@@ -237,13 +246,15 @@ fn common_flags(remote: &BTreeMap<&String, &Value>) -> Vec<String> {
         .collect()
 }
 
-/// A flag with its value as words of a shell; several for a list, none for a value that is not set.
+/// Shell words for a flag with its value. A list repeats the flag; an unset value gives no words.
 fn flag_words(flag: &str, value: &Value) -> Vec<String> {
     let text = match value {
         Value::Null | Value::Bool(false) | Value::Object(_) => return Vec::new(),
         Value::Array(values) => {
-            let values = values.iter();
-            return values.flat_map(|value| flag_words(flag, value)).collect();
+            return values
+                .iter()
+                .flat_map(|value| flag_words(flag, value))
+                .collect();
         }
         Value::Bool(true) => None,
         Value::String(text) => Some(text.clone()),
@@ -252,7 +263,7 @@ fn flag_words(flag: &str, value: &Value) -> Vec<String> {
     let keyed = flag.strip_prefix("--").and_then(keyed_form);
     match (keyed, text) {
         (Some((keyed, key)), None) => vec![format!("--{}", keyed.name), key.to_owned()],
-        // Commas separate keys.
+        // A text with a comma cannot be written as a key, because commas separate keys.
         (Some((keyed, key)), Some(text)) if !text.contains(',') => {
             vec![format!("--{}", keyed.name), word(&format!("{key}={text}"))]
         }

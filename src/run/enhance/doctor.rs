@@ -1,4 +1,4 @@
-//! `enhance doctor`: what a model makes of dark frames with each convention, as a page, a picture and a proposed sidecar.
+//! `enhance doctor`: runs a model on dark frames with each convention, and writes a page, a picture and a proposed sidecar.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use crate::types::manifests::Status;
 use crate::types::{Decides, Rgb};
 use darkqa_enhance::{Enhancer, Examination, ImageOutput, Settled};
 
-/// Names of the page and of the picture.
+/// File names of the page and the picture.
 const PAGE: &str = "doctor.html";
 const PICTURE: &str = "doctor.png";
 
@@ -30,10 +30,10 @@ pub(super) struct DoctorFileArgs {
     write: bool,
 }
 
-/// Examines the model on dark frames, and writes page and picture; with `--write`, the proposed sidecar, too.
+/// Examines the model on dark frames, and writes the page and the picture, with `--write` also the proposed sidecar.
 ///
 /// # Errors
-/// If the model takes none of the sizes of the probe, a file cannot be written, or `--write` finds a sidecar that is there already.
+/// If the model accepts none of the sizes of the probe, a file cannot be written, or `--write` is set and a sidecar exists.
 pub(super) fn doctor(
     args: &DoctorFileArgs,
     image: ImageOutput,

@@ -1,4 +1,4 @@
-//! `enhance`: writing images that an enhancer made, describing the enhancer, or examining it.
+//! `enhance`: writes enhanced images, or describes or examines an enhancer.
 
 mod doctor;
 
@@ -18,14 +18,14 @@ use crate::images::frames::InputTally;
 use crate::images::progress::Progress;
 use crate::images::stored::{ImageCounts, ImageOrigin, Placed, Refusals};
 use crate::runs::Outcome;
-use crate::runs::part_args::{PartArgs, keep_part};
+use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::types::manifests::Status;
 use crate::types::{Decides, Digest, FrameId, InputNote, Rgb};
 use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, SizeArgs, list_of_presets};
 use doctor::DoctorFileArgs;
 
-/// Number of outputs that are tried as the image; chosen: models that give each of their steps have fewer.
-const MOST_OUTPUTS: usize = 16;
+/// Maximum number of outputs tried as the image. Chosen: models that output each of their steps have fewer.
+const MAX_OUTPUTS: usize = 16;
 
 /// `enhance`, or another form of it.
 #[derive(Debug, Args)]
@@ -114,7 +114,7 @@ struct EnhanceArgs {
     out: PathBuf,
     /// The part of the images.
     #[command(flatten)]
-    part: PartArgs,
+    part: ShardArgs,
     /// Replace images that exist already, also those of other models and settings
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     force: bool,
@@ -126,9 +126,11 @@ impl ModelArgs {
     }
 
     fn open(&self, file: ModelFile) -> Result<Enhancer> {
-        let enhancers = OpenEnhancers::load(vec![file], &self.loading)?.take()?;
-        let only = enhancers.into_iter().next();
-        only.ok_or_else(|| Error::usage("MODEL", "one model expected"))
+        OpenEnhancers::load(vec![file], &self.loading)?
+            .take()?
+            .into_iter()
+            .next()
+            .ok_or_else(|| Error::usage("MODEL", "one model expected"))
     }
 }
 
@@ -158,7 +160,7 @@ pub(crate) fn enhance(command: &EnhanceCommand, progress: &Progress) -> Result<O
 
 /// Examines the model on dark versions of images.
 fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
-    let (mut enhancer, image) = open_unsure(&args.enhancer)?;
+    let (mut enhancer, image) = open_for_examination(&args.enhancer)?;
     let sample = sample(&args.images.open()?);
     if sample.is_empty() {
         let problem = "needs at least one image that can be read";
@@ -172,17 +174,15 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
     doctor::doctor(&args.files, image, &mut enhancer, &dark)
 }
 
-/// Images that stand for all. One that cannot be read is named when its turn comes.
+/// A sample of the images. Unreadable ones are skipped here, and reported when they are enhanced.
 fn sample(images: &Inputs) -> Vec<Rgb> {
     evenly(images.entries.len(), FRAMES)
         .into_iter()
-        .filter_map(|place| images.picture(&images.entries[place]).ok()?.decode().ok())
+        .filter_map(|index| images.picture(&images.entries[index]).ok()?.decode().ok())
         .collect()
 }
 
-/// Enhances the images.
-///
-/// If one image fails, the error is logged and counted, and the others continue.
+/// Enhances the images. If one fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
 /// If the model or an input is missing, two images have the same name, or the folder cannot be written to.
@@ -192,7 +192,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let mut enhancer = args.enhancer.open(file)?;
     let (out, loading) = (&args.out, &args.enhancer.loading);
     let mut images = args.images.open()?;
-    keep_part(&mut images.entries, args.part.resolve()?)?;
+    keep_shard(&mut images.entries, args.part.resolve()?)?;
     let sample = sample(&images);
     if !sample.is_empty() {
         enhancer.probe(&darkened(&sample), loading.probe.implausible())?;
@@ -250,16 +250,16 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     ))
 }
 
-/// Everything that decides the pixels of an enhanced image.
+/// All facts that determine the pixels of an enhanced image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct EnhancedOrigin {
     frame: String,
-    /// The digest of the image that was enhanced.
+    /// Digest of the input image.
     source: String,
-    /// Adjustments of the image while its file was read; without fields if there were none.
+    /// Changes made to the image when its file was read; no fields if there were none.
     #[serde(flatten)]
     read: InputNote,
-    /// The digest of the model with its sidecar, and the sizes it takes, by flag.
+    /// Digest of the model with its sidecar, and its size settings, by flag.
     enhancer: Value,
 }
 
@@ -268,9 +268,9 @@ impl ImageOrigin for EnhancedOrigin {
     const IS_REPLACED: bool = false;
 }
 
-/// Settings that determine the pixels besides the image, with a name for the digest that a reader of the message understands.
+/// Settings of the enhancer that determine the pixels. The digest has a name that is understandable in messages.
 fn pixel_settings(digest: &Digest, size: &SizeArgs) -> Value {
-    let mut settings = identity::enhancer(digest, size);
+    let mut settings = identity::enhancer_definition(digest, size);
     if let Some(fields) = settings.as_object_mut()
         && let Some(digest) = fields.remove("--llie")
     {
@@ -291,14 +291,14 @@ impl EnhancedOrigin {
     }
 }
 
-/// The enhancer, and whether it is known which of its outputs is the image. If it is not, all of them are examined.
-fn open_unsure(args: &ModelArgs) -> Result<(Enhancer, ImageOutput)> {
+/// Opens an enhancer, and returns whether it is known which of its outputs is the image. If unknown, the first usable output is opened.
+fn open_for_examination(args: &ModelArgs) -> Result<(Enhancer, ImageOutput)> {
     let problem = match args.open(args.file()?) {
         Ok(enhancer) => return Ok((enhancer, ImageOutput::Known)),
         Err(problem) => problem,
     };
-    for place in 0..MOST_OUTPUTS {
-        if let Ok(enhancer) = args.open(args.file()?.with_output(place)) {
+    for output in 0..MAX_OUTPUTS {
+        if let Ok(enhancer) = args.open(args.file()?.with_output(output)) {
             return Ok((enhancer, ImageOutput::Unknown));
         }
     }

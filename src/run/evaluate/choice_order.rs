@@ -1,4 +1,4 @@
-//! The orders in which the choices of a question are shown: [`ChoiceOrder`], [`arrange`].
+//! Order of the choices of a question, and number of repeats: [`ChoiceOrder`], [`shown_questions`].
 
 use std::num::NonZeroU32;
 
@@ -22,64 +22,64 @@ pub(crate) struct ChoiceOrder {
     pub repeats: Option<NonZeroU32>,
 }
 
-/// How many times each order of choices is asked.
+/// Number of times that each order of choices is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Repeats {
-    /// So many times everywhere.
+    /// The same number in all conditions.
     Everywhere(NonZeroU32),
-    /// So many times about untouched images without an enhancer, and once everywhere else.
-    InTheLight(NonZeroU32),
+    /// This number for untouched images without an enhancer, and once in other conditions.
+    Untouched(NonZeroU32),
 }
 
-/// How many times untouched images are asked about where nobody knows the answers, so that the report can tell what light changes
-/// from what a model answers differently by itself.
-const IN_THE_LIGHT: NonZeroU32 = NonZeroU32::MIN.saturating_add(1);
+/// Default number of times for untouched images if true answers are unknown. With two replies, the report can separate the effect of light
+/// from the variation of a model's replies.
+const UNTOUCHED_REPEATS: NonZeroU32 = NonZeroU32::MIN.saturating_add(1);
 
 impl Repeats {
-    /// The largest number of times in any condition.
-    pub(super) fn most(self) -> NonZeroU32 {
+    /// The maximum over all conditions.
+    pub(super) fn max(self) -> NonZeroU32 {
         match self {
-            Self::Everywhere(times) | Self::InTheLight(times) => times,
+            Self::Everywhere(times) | Self::Untouched(times) => times,
         }
     }
 
-    /// How many times a question is asked in a condition; without an image if it is `None`.
+    /// The number of times in a condition; `None` is without an image.
     pub(super) fn times(self, condition: Option<&Condition>) -> u32 {
         match self {
             Self::Everywhere(times) => times.get(),
-            Self::InTheLight(times) if condition == Some(&Condition::raw(None)) => times.get(),
-            Self::InTheLight(_) => 1,
+            Self::Untouched(times) if condition == Some(&Condition::raw(None)) => times.get(),
+            Self::Untouched(_) => 1,
         }
     }
 }
 
 impl ChoiceOrder {
-    /// How many times each order is asked, of questions with these truths.
+    /// Number of times that each order is asked: `--repeats`, or a default that depends on whether true answers are known.
     pub(super) fn repeats(self, truths: Truths) -> Repeats {
         match (self.repeats, truths) {
             (Some(times), _) => Repeats::Everywhere(times),
             (None, Truths::Known) => Repeats::Everywhere(NonZeroU32::MIN),
-            (None, Truths::Unknown) => Repeats::InTheLight(IN_THE_LIGHT),
+            (None, Truths::Unknown) => Repeats::Untouched(UNTOUCHED_REPEATS),
         }
     }
 }
 
-/// One order in which a question is shown.
+/// A question with its choices in one order.
 #[derive(Debug)]
 pub(super) struct ShownQuestion {
     /// The question with its choices in the order shown.
     pub(super) question: Question,
-    /// The number of times that this order was shown before.
+    /// Number of times that this order was shown before.
     pub(super) repeat: u32,
-    /// The number of times that the question was shown before, in any order.
+    /// Number of times that the question was shown before, in any order.
     pub(super) turn: u32,
 }
 
-/// All orders in which a question is shown: each rotation of the first order, repeated as often as in any condition.
+/// All showings of a question: each rotation of the first order, repeated up to [`Repeats::max`].
 ///
-/// A record holds the choices in the order shown, so its readings need no mapping back. Two orders have two keys, because
-/// the choices enter the key.
-pub(super) fn arrange(
+/// A record stores the choices in the order shown, so that parsed choices need no mapping. Different orders have different keys, because
+/// the key depends on the choices.
+pub(super) fn shown_questions(
     question: &Question,
     choice_order: ChoiceOrder,
     repeats: Repeats,
@@ -88,7 +88,7 @@ pub(super) fn arrange(
     let choices = &question.choices;
     let mut order: Vec<usize> = (0..choices.len()).collect();
     if choice_order.shuffle_options {
-        // Sorted by one digest per choice: a random order that does not depend on other questions.
+        // Sorting by a digest of each choice gives a random order that does not depend on other questions.
         order.sort_by_cached_key(|&index| {
             let text = choices.texts()[index].as_bytes();
             let parts = [
@@ -105,8 +105,8 @@ pub(super) fn arrange(
     } else {
         1
     };
-    let mut arranged = Vec::new();
-    for repeat in 0..repeats.most().get() {
+    let mut shown = Vec::new();
+    for repeat in 0..repeats.max().get() {
         for rotation in 0..rotations {
             let mut order = order.clone();
             order.rotate_left(rotation);
@@ -114,17 +114,17 @@ pub(super) fn arrange(
             let truth = order
                 .iter()
                 .position(|&index| Some(index) == choices.truth());
-            arranged.push(ShownQuestion {
+            shown.push(ShownQuestion {
                 question: Question {
                     choices: Choices::known_by(texts.collect(), truth)?,
                     ..question.clone()
                 },
                 repeat,
-                turn: arranged.len() as u32,
+                turn: shown.len() as u32,
             });
         }
     }
-    Ok(arranged)
+    Ok(shown)
 }
 
 #[cfg(test)]
@@ -154,19 +154,19 @@ mod tests {
             repeats: NonZeroU32::new(repeats),
         };
         let repeats = choice_order.repeats(Truths::Known);
-        let arranged = arrange(&question(id), choice_order, repeats, 7).unwrap();
-        arranged
+        shown_questions(&question(id), choice_order, repeats, 7)
+            .unwrap()
             .iter()
-            .map(|arranged| {
-                let choices = &arranged.question.choices;
+            .map(|shown| {
+                let choices = &shown.question.choices;
                 assert_eq!(choices.texts()[choices.truth().unwrap()], "b");
-                (choices.texts().concat(), arranged.repeat)
+                (choices.texts().concat(), shown.repeat)
             })
             .collect()
     }
 
     #[test]
-    fn every_rotation_is_shown_as_often_as_asked_for() {
+    fn every_rotation_is_repeated() {
         let expected = |text: &str, repeat| (text.to_owned(), repeat);
         assert_eq!(shown(0, false, false, 1), [expected("abc", 0)]);
         assert_eq!(
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn without_truths_the_untouched_images_alone_are_asked_twice() {
+    fn only_untouched_images_are_asked_twice_without_truths() {
         let times = |repeats: Option<u32>, truths, condition: Option<&str>| {
             let order = ChoiceOrder {
                 shuffle_options: false,

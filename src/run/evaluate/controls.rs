@@ -1,31 +1,30 @@
-//! The controls of the observer that a run asks although no flag names them: [`AddedControls`].
+//! Controls of the observer that are added to a run without a flag: [`AddedControls`].
 
 use super::settings::Evaluation;
 use crate::engine::models::{ModelName, ModelUnderTest};
 use crate::error::{Error, Result};
-
 use crate::images::progress::Progress;
 use crate::types::Control;
 
-/// Whether a model is the control that is shown the image of another scene; the plan gives it that image.
+/// True if a model is the control `observer:other-room`, which gets the image of another scene.
 pub(super) fn is_other_room(model: &ModelUnderTest) -> bool {
     Control::from_model_name(model.model.name()) == Some(Control::OtherRoom)
 }
 
-/// The controls that are added to a run with the observer.
+/// Controls that are added to a run with the observer.
 #[derive(Debug, Default)]
 pub(super) struct AddedControls {
     pub(super) names: Vec<ModelName>,
-    /// A line about other-room; `None` if it is not added.
+    /// Line for the user about other-room; `None` if it is not possible.
     line: Option<&'static str>,
 }
 
 impl AddedControls {
-    /// The controls of a run: none without the observer; else the standing control at least, which is other-room or, if all frames
-    /// are of one scene, the tiles of the right image in another order.
+    /// The controls to add: none without the observer, else at least the default control. This is other-room or, if all frames are of one
+    /// scene, the image with its tiles in another order.
     ///
     /// # Errors
-    /// If other-room is named by a flag, and there is no other scene.
+    /// If a flag names other-room, and all frames are of one scene.
     pub(super) fn new(config: &Evaluation, has_other_scene: bool) -> Result<Self> {
         let ask = &config.job.ask;
         let other_room = ModelName::Observer(Some(Control::OtherRoom));
@@ -36,7 +35,7 @@ impl AddedControls {
         if !ask.shows_images_to(&ModelName::Observer(None)) {
             return Ok(Self::default());
         }
-        let standing = if has_other_scene {
+        let default = if has_other_scene {
             Control::OtherRoom
         } else {
             Control::Tiles
@@ -44,7 +43,7 @@ impl AddedControls {
         let names: Vec<ModelName> = Control::ALL
             .into_iter()
             .filter(|control| {
-                let is_wanted = config.observer_controls || *control == standing;
+                let is_wanted = config.observer_controls || *control == default;
                 is_wanted && (has_other_scene || *control != Control::OtherRoom)
             })
             .map(|control| ModelName::Observer(Some(control)))
@@ -62,7 +61,7 @@ impl AddedControls {
         Ok(Self { names, line })
     }
 
-    /// Prints what is added.
+    /// Prints the line about other-room.
     pub(super) fn print(&self, progress: &Progress) {
         if let Some(line) = self.line {
             progress.say(line);

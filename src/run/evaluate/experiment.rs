@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use serde_json::{Value, json};
 
-use super::plan::{ChoiceItem, trials};
-use super::power::{asked_sets, power};
+use super::plan::{ChoiceItem, plan_trials};
+use super::power::{power_forecast, run_contents};
 use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
 use crate::engine::experiment::Experiment;
@@ -68,7 +68,7 @@ impl Experiment for ChoiceSetup<'_> {
     }
 
     fn questions(&self) -> Vec<RunQuestion> {
-        // In a shard, questions about frames of other shards are asked with images of this one.
+        // In a shard, other-room is also asked questions about frames of other shards, with images of this one.
         let ids: HashSet<&QuestionId> =
             self.questions.iter().map(|question| &question.id).collect();
         let others = self
@@ -95,8 +95,8 @@ impl Experiment for ChoiceSetup<'_> {
             .models
             .iter()
             .filter(|model| model.view == View::Image && !is_reference(&model.name));
-        let asked = asked_sets(&self.conditions, models.count());
-        power(&self.dataset, &self.questions, asked)
+        let asked = run_contents(&self.conditions, models.count());
+        power_forecast(&self.dataset, &self.questions, asked)
     }
 
     fn identity(&self) -> Identity {
@@ -113,7 +113,7 @@ impl Experiment for ChoiceSetup<'_> {
             order.circular.then_some(("--circular", true.into())),
             rules.map(|rules| ("--rules", json!(rules))),
             self.bank.map(|bank| (ASK, json!(bank))),
-            // Left out if unset, so that runs from before the flag go on.
+            // Left out if unset, so that runs older than the flag can be continued.
             (self.config.image_place == ImagePlace::BeforeWords)
                 .then_some(("--image-first", true.into())),
         ];
@@ -126,19 +126,25 @@ impl Experiment for ChoiceSetup<'_> {
     }
 
     fn notes(&self) -> Vec<(&'static str, Value)> {
-        let bank = self.config.bank.iter();
-        let bank = bank.map(|bank| ("questions without answers", json!(bank.words())));
+        let bank = self
+            .config
+            .bank
+            .as_ref()
+            .map(|bank| ("questions without answers", json!(bank.words())));
         let reading = match self.dataset.summary() {
             [] => None,
             lines => Some(("reading of the data", json!(lines))),
         };
-        let set = self.config.job.set_light;
-        let light = (set == SetLight::Dark).then(|| ("--light", json!(set)));
-        let measured = self.brightness.map(|(mean, frames)| {
+        let set_light = self.config.job.set_light;
+        let light = (set_light == SetLight::Dark).then(|| ("--light", json!(set_light)));
+        let brightness = self.brightness.map(|(mean, frames)| {
             let note = json!({"mean": mean, "frames": frames});
             ("brightness", note)
         });
-        bank.chain(reading).chain(light).chain(measured).collect()
+        [bank, reading, light, brightness]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 
     fn columns(&self) -> Columns {
@@ -150,7 +156,7 @@ impl Experiment for ChoiceSetup<'_> {
         _: usize,
         _: impl FnOnce() -> Result<Vec<Record>>,
     ) -> Result<Vec<SourcePlan<ChoiceItem>>> {
-        trials(self)
+        plan_trials(self)
     }
 
     fn report(

@@ -31,11 +31,11 @@ pub(crate) use write_plan::plan;
 pub(crate) fn evaluate(args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, files) = ChoiceSetup::open(&config, progress)?;
-    setup.say_reading(progress);
+    setup.print_reading(progress);
     Job::new(&setup, files, progress)?.run()
 }
 
-/// The estimate of what a run would take, in words.
+/// The estimate of a run, in words.
 fn estimate(args: EvaluateArgs, progress: &Progress) -> Result<String> {
     let config = args.resolve()?;
     let (setup, files) = ChoiceSetup::open(&config, progress)?;
@@ -46,7 +46,7 @@ fn estimate(args: EvaluateArgs, progress: &Progress) -> Result<String> {
 /// Writes the remaining trials as files of a Batch API, and marks them in the run as sent.
 ///
 /// # Errors
-/// If a model is built in, an image is larger than the endpoint takes, or a file cannot be written.
+/// If a model is built in, an image is too large for the endpoint, or a file cannot be written.
 pub(crate) fn export_batch(
     args: EvaluateArgs,
     files: &BatchFileArgs,
@@ -54,14 +54,14 @@ pub(crate) fn export_batch(
 ) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, models) = ChoiceSetup::open(&config, progress)?;
-    setup.say_reading(progress);
+    setup.print_reading(progress);
     Job::new(&setup, models, progress)?.export_batch(files)
 }
 
 /// Asks the remaining trials in batches that the program submits, and waits for their replies.
 ///
 /// # Errors
-/// If a model is built in, or a server refuses what every further call would ask. The batches stay, and the same command goes on.
+/// If a model is built in, or a server refuses all further requests. The batches stay, and the same command continues.
 pub(crate) fn run_batch(
     args: EvaluateArgs,
     files: &BatchFileArgs,
@@ -70,6 +70,6 @@ pub(crate) fn run_batch(
 ) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, models) = ChoiceSetup::open(&config, progress)?;
-    setup.say_reading(progress);
+    setup.print_reading(progress);
     Job::new(&setup, models, progress)?.run_batch(files, batch)
 }

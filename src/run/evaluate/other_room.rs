@@ -1,41 +1,39 @@
-//! Which other frame the control `observer:other-room` is shown: [`OtherRooms`].
+//! Choice of the frame shown to the control `observer:other-room`: [`OtherRooms`].
 
 use std::collections::{BTreeMap, HashSet};
 
 use crate::images::frames::first_asked;
 use crate::types::{FrameId, Question};
 
-/// The frame whose image is shown in place of each frame's own.
+/// For each frame, the frame whose image is shown instead.
 ///
-/// It is the next frame of another scene in the order of the run, from the last frame on to the first again. It is found among
-/// all questions of the run, so that shards and resumed runs show the same.
+/// It is the next frame of another scene in the order of the run; after the last frame, the order starts again at the first. All frames of
+/// the run are considered, so that shards and resumed runs choose the same.
 #[derive(Debug, Default)]
 pub(super) struct OtherRooms(BTreeMap<FrameId, FrameId>);
 
 impl OtherRooms {
-    /// The other frames; `None` if all frames are of one scene. A frame whose scene is not known (empty) is a scene by itself.
+    /// Chooses the other frames; `None` if all frames are of one scene. A frame without a scene (empty) counts as a scene of its own.
     pub(super) fn new(questions: &[Question], scene: impl Fn(&FrameId) -> String) -> Option<Self> {
         let frames: Vec<&FrameId> = first_asked(questions)
             .into_iter()
             .map(|question| &question.frame)
             .collect();
-        let scene_of = |frame: &&FrameId| {
-            let scene = scene(frame);
-            if scene.is_empty() {
-                format!("frame {frame}")
-            } else {
-                scene
-            }
-        };
-        let scenes: Vec<String> = frames.iter().map(scene_of).collect();
+        let scenes: Vec<String> = frames
+            .iter()
+            .map(|frame| match scene(frame) {
+                scene if scene.is_empty() => format!("frame {frame}"),
+                scene => scene,
+            })
+            .collect();
         if scenes.iter().collect::<HashSet<_>>().len() < 2 {
             return None;
         }
         let count = frames.len();
         let mut others = BTreeMap::new();
         let mut next = 0;
-        // From the last frame to the first, `next` is the nearest later frame of another scene. For the last scene of the order that
-        // is the first frame, which is not known until the loop has gone through all frames once; so it does so twice.
+        // Going backwards, `next` is the nearest later frame of another scene. For the last scene this is one of the first frames, which is
+        // known only after one pass over all frames, so the loop makes two.
         for place in (0..2 * count).rev().map(|place| place % count) {
             let after = (place + 1) % count;
             if scenes[after] != scenes[place] {

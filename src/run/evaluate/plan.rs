@@ -1,8 +1,8 @@
-//! The trials of an evaluation: [`trials`].
+//! The trials of an evaluation: [`plan_trials`].
 
 use std::sync::Arc;
 
-use super::choice_order::arrange;
+use super::choice_order::shown_questions;
 use super::controls::is_other_room;
 use super::settings::ImagePlace;
 use super::setup::ChoiceSetup;
@@ -20,9 +20,9 @@ use crate::types::{
 #[derive(Debug, Clone)]
 pub(crate) struct ChoiceItem {
     pub(super) question: Arc<Question>,
-    /// The number of times that this order was asked before.
+    /// Number of times that this order was asked before.
     pub(super) repeat: u32,
-    /// The number of times that the question was asked before, in any order of its choices.
+    /// Number of times that the question was asked before, in any order of its choices.
     pub(super) turn: u32,
     /// The frame whose image is shown, if it is not the frame of the question.
     pub(super) shown_frame: Option<FrameId>,
@@ -80,9 +80,9 @@ struct QuestionPrompts {
     blind: Prompt,
 }
 
-/// The questions that are asked with the images of one frame.
+/// The questions asked with the images of one frame.
 #[derive(Default)]
-struct AskedWith {
+struct FrameQuestions {
     /// Questions about the frame.
     own: Vec<QuestionPrompts>,
     /// Questions about other frames, for the control `observer:other-room`.
@@ -90,9 +90,9 @@ struct AskedWith {
 }
 
 /// All trials, grouped by frame: first the trials without an image, then those of each condition.
-pub(super) fn trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+pub(super) fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
     let mut by_source = Vec::new();
-    by_source.resize_with(setup.sources.len(), AskedWith::default);
+    by_source.resize_with(setup.sources.len(), FrameQuestions::default);
     for question in &setup.questions {
         let own = &mut by_source[setup.places[&question.frame]].own;
         own.extend(prompts(setup, question, None)?);
@@ -106,32 +106,32 @@ pub(super) fn trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceIte
     by_source
         .into_iter()
         .enumerate()
-        .map(|(source, asked)| {
-            let shown = &setup.sources[source];
-            let shown = setup.conditions.iter().filter(|of| shown.can_show(of));
-            let all = std::iter::once(None).chain(shown.map(Some));
-            let groups =
-                all.filter_map(|condition| group(setup, source, condition, &asked).transpose());
-            Ok(SourcePlan {
-                source,
-                groups: groups.collect::<Result<_>>()?,
-            })
+        .map(|(source, questions)| {
+            let shown = setup
+                .conditions
+                .iter()
+                .filter(|condition| setup.sources[source].can_show(condition));
+            let groups = std::iter::once(None)
+                .chain(shown.map(Some))
+                .filter_map(|condition| group(setup, source, condition, &questions).transpose())
+                .collect::<Result<_>>()?;
+            Ok(SourcePlan { source, groups })
         })
         .collect()
 }
 
-/// A question in each order of its choices, with the frame that is shown if it is not its own.
+/// A question in each order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of the question.
 fn prompts(
     setup: &ChoiceSetup<'_>,
     question: &Question,
     shown_frame: Option<&FrameId>,
 ) -> Result<Vec<QuestionPrompts>> {
     let (order, repeats) = (setup.config.order, setup.config.repeats);
-    let arranged = arrange(question, order, repeats, setup.recipe.seed)?.into_iter();
-    arranged
-        .map(|arranged| {
+    shown_questions(question, order, repeats, setup.recipe.seed)?
+        .into_iter()
+        .map(|shown| {
             let prompt = |view| {
-                let words = setup.config.prompts.render(view, &arranged.question)?;
+                let words = setup.config.prompts.render(view, &shown.question)?;
                 let prompt = match (view, setup.config.image_place) {
                     (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
                     _ => Prompt::from_text(words.into()),
@@ -146,9 +146,9 @@ fn prompts(
                 image: prompt(View::Image)?,
                 blind: prompt(View::Blind)?,
                 item: ChoiceItem {
-                    question: Arc::new(arranged.question),
-                    repeat: arranged.repeat,
-                    turn: arranged.turn,
+                    question: Arc::new(shown.question),
+                    repeat: shown.repeat,
+                    turn: shown.turn,
                     shown_frame: shown_frame.cloned(),
                 },
             })
@@ -161,35 +161,37 @@ fn group(
     setup: &ChoiceSetup<'_>,
     source: usize,
     condition: Option<&Condition>,
-    asked: &AskedWith,
+    questions: &FrameQuestions,
 ) -> Result<Option<TrialGroup<ChoiceItem>>> {
     let view = condition.map_or(View::Blind, |_| View::Image);
     let models = asked_in(&setup.models, condition);
     if models.is_empty() {
         return Ok(None);
     }
-    let image = condition.map(|condition| {
-        let source = &setup.sources[source];
-        setup.recipe.stimulus(source, condition)
-    });
-    let image = image.transpose()?;
+    let image = condition
+        .map(|condition| setup.recipe.stimulus(&setup.sources[source], condition))
+        .transpose()?;
     let is_control = |model: &ModelUnderTest| view == View::Image && is_other_room(model);
-    let own = asked.own.iter().map(|shown| (shown, false));
-    let others = asked.others.iter().map(|shown| (shown, true));
-    let mut trials = Vec::with_capacity((asked.own.len() + asked.others.len()) * models.len());
+    let own = questions.own.iter().map(|shown| (shown, false));
+    let others = questions.others.iter().map(|shown| (shown, true));
+    let count = questions.own.len() + questions.others.len();
+    let mut trials = Vec::with_capacity(count * models.len());
     let times = setup.config.repeats.times(condition);
-    let all = own.chain(others);
-    for (shown, is_of_other) in all.filter(|(shown, _)| shown.item.repeat < times) {
+    for (shown, is_of_other) in own
+        .chain(others)
+        .filter(|(shown, _)| shown.item.repeat < times)
+    {
         let prompt = match view {
             View::Image => &shown.image,
             View::Blind => &shown.blind,
         };
-        let models = models.iter();
         let place = setup.question_places[&shown.item.question.id];
-        let models = models.filter(|(_, model)| model.is_asked(place));
-        for &(index, model) in models.filter(|(_, model)| is_control(model) == is_of_other) {
+        for &(index, model) in models
+            .iter()
+            .filter(|(_, model)| model.is_asked(place) && is_control(model) == is_of_other)
+        {
             trials.push(Trial {
-                key: facts(shown, prompt, model, condition, image).key()?,
+                key: key_facts(shown, prompt, model, condition, image).key()?,
                 model: index,
                 prompt: prompt.clone(),
                 item: shown.item.clone(),
@@ -202,7 +204,7 @@ fn group(
     }))
 }
 
-fn facts<'a>(
+fn key_facts<'a>(
     shown: &'a QuestionPrompts,
     prompt: &'a Prompt,
     model: &'a ModelUnderTest,
@@ -210,6 +212,6 @@ fn facts<'a>(
     image: Option<Digest>,
 ) -> KeyFacts<'a> {
     let question = &*shown.item.question;
-    let facts = KeyFacts::new(model, &question.id, prompt, condition, image);
-    facts.with_choices(question.choices.texts(), shown.item.repeat)
+    KeyFacts::new(model, &question.id, prompt, condition, image)
+        .with_choices(question.choices.texts(), shown.item.repeat)
 }

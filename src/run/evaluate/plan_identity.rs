@@ -1,4 +1,4 @@
-//! The settings that the plan of a run and the run itself share: [`plan_identity`].
+//! Settings that a run must share with its plan: [`plan_identity`].
 
 use serde_json::{Value, json};
 
@@ -13,8 +13,7 @@ use crate::types::manifests::Identity;
 use crate::types::{AxisLevel, Family, SetLight};
 use darkqa_questions::rules::Rules;
 
-/// The settings of data, questions and light. Models, enhancers and what is sent besides are not among them: they may be added to a
-/// plan later.
+/// The settings of data, questions and light. Models, enhancers and request settings are not included, so that they may be added later.
 pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Identity> {
     let (selection, rule) = (&config.selection, config.rule);
     let data = match &config.place {
@@ -49,11 +48,11 @@ pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Id
         .into_iter()
         .flatten()
         .map(|(field, value)| (field.to_owned(), value));
-    Ok(fields.chain(light(config)).collect())
+    Ok(fields.chain(light_settings(config)).collect())
 }
 
 /// The settings of each noise profile and of each further variant, and the version of the synthesis.
-fn light(config: &Evaluation) -> impl Iterator<Item = (String, Value)> {
+fn light_settings(config: &Evaluation) -> Vec<(String, Value)> {
     let job = &config.job;
     let recipe = Recipe::lossless(&job.light.kinds, &[]);
     let version = identity::images(&recipe).filter(|(field, _)| field == "synthesis");
@@ -68,5 +67,5 @@ fn light(config: &Evaluation) -> impl Iterator<Item = (String, Value)> {
                     .map(move |(flag, value)| (format!("{flag} of the {place}"), value))
             })
         });
-    version.chain(columns).collect::<Vec<_>>().into_iter()
+    version.chain(columns).collect()
 }

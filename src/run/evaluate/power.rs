@@ -1,4 +1,4 @@
-//! The effect that a planned evaluation can detect: [`power`].
+//! The effect that a planned evaluation can detect: [`power_forecast`].
 
 use std::collections::BTreeSet;
 
@@ -9,11 +9,11 @@ use crate::types::{Condition, Question, Variant};
 use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::tested_sentences::RunContents;
 
-/// The effect that questions about these data can detect; `None` without questions, or if nobody knows their answers.
-pub(super) fn power(
+/// The effect that these questions can detect; `None` without questions, or if a true answer is unknown.
+pub(super) fn power_forecast(
     dataset: &Dataset,
     questions: &[Question],
-    asked: RunContents,
+    contents: RunContents,
 ) -> Option<PowerForecast> {
     if questions
         .iter()
@@ -36,14 +36,15 @@ pub(super) fn power(
         .iter()
         .map(|question| (&question.id, &question.frame));
     let clusters = Clusters::new(pairs, &ties);
-    let of_questions = questions
+    let question_clusters: Vec<u32> = questions
         .iter()
-        .filter_map(|question| clusters.get(&question.frame, &question.id));
-    PowerForecast::new(&clusters, &of_questions.collect::<Vec<u32>>(), asked)
+        .filter_map(|question| clusters.get(&question.frame, &question.id))
+        .collect();
+    PowerForecast::new(&clusters, &question_clusters, contents)
 }
 
-/// The sets of trials in these conditions.
-pub(super) fn asked_sets(conditions: &[Condition], models: usize) -> RunContents {
+/// The numbers of models, enhancers and lights of a run with these conditions.
+pub(super) fn run_contents(conditions: &[Condition], models: usize) -> RunContents {
     let variants: BTreeSet<Variant> = conditions.iter().map(Condition::kind_reading).collect();
     let last = variants.iter().filter_map(|variant| variant.kind).max();
     let lights = variants.iter().filter(|variant| variant.kind == last);

@@ -76,9 +76,7 @@ pub(crate) struct ChoiceArgs {
 /// The place of the image in a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ImagePlace {
-    /// Behind the words.
     AfterWords,
-    /// Before the words.
     BeforeWords,
 }
 
@@ -91,27 +89,27 @@ pub(crate) struct ShrinkArgs {
     pub max_side: Option<NonZeroU32>,
 }
 
-/// The settings of an evaluation, validated.
+/// Validated settings of an evaluation.
 #[derive(Debug)]
 pub(super) struct Evaluation {
     pub(super) place: DataPlace,
-    /// How a ready-made set is read.
+    /// Settings for reading a ready-made set.
     pub(super) set: SetArgs,
     pub(super) scene: SceneArgs,
     pub(super) selection: SelectionArgs,
-    /// The rule by which images are read.
+    /// Rule for decoding images.
     pub(super) rule: ReadingRule,
-    /// The questions that are asked about every image, and how many about each; `None` if questions have answers.
+    /// Questions asked about every image, with the number per image; `None` if the data set has its own questions with answers.
     pub(super) bank: Option<QuestionBank>,
     pub(super) order: ChoiceOrder,
-    /// How many times each order of choices is asked.
+    /// Number of times that each order of choices is asked.
     pub(super) repeats: Repeats,
     pub(super) prompts: Prompts,
     /// The place of the image in a message.
     pub(super) image_place: ImagePlace,
-    /// The rulebook that makes questions, and that the observer answers by.
+    /// The rulebook for making questions and for the observer's answers.
     pub(super) rules: Rules,
-    /// Ask every control of the observer, if it is asked.
+    /// Ask every control of the observer, if the observer is asked.
     pub(super) observer_controls: bool,
     /// The plan in the folder of the run; `None` if there is none.
     pub(super) plan: Option<RunPlan>,
@@ -119,7 +117,7 @@ pub(super) struct Evaluation {
 }
 
 impl EvaluateArgs {
-    /// The settings, after reading the files and environment variables that the flags name.
+    /// Validates the flags, and reads the files and environment variables that they name.
     ///
     /// # Errors
     /// [`Error::Usage`], which names the flag with the invalid value.
@@ -141,7 +139,7 @@ impl EvaluateArgs {
         let mut job = self.job.resolve(&experiment)?;
         let plan = job.place.plan()?;
         if let (Some(plan), Some(whole), true) = (&plan, max_cost, job.shard.is_part()) {
-            job.money.max_cost = Some(whole * plan.share(job.shard));
+            job.money.max_cost = Some(whole * plan.cost_share(job.shard));
         }
         if truths == Truths::Unknown {
             check_without_truths(&job)?;
@@ -173,7 +171,7 @@ impl EvaluateArgs {
         })
     }
 
-    /// The settings that not every experiment has.
+    /// The settings that are specific to this experiment.
     pub(super) fn experiment(&self) -> ExperimentSettings {
         ExperimentSettings {
             constrain: self.choice.constrain,
@@ -182,7 +180,7 @@ impl EvaluateArgs {
             sampling_seed: None,
             data: self.data.place().path().map(Path::to_owned),
             text_baseline: match self.bank.ask {
-                None => TextBaseline::AsSaid,
+                None => TextBaseline::AsMarked,
                 Some(_) => TextBaseline::Always,
             },
             set_light: SetLight::default(),
@@ -190,10 +188,10 @@ impl EvaluateArgs {
     }
 }
 
-/// Checks that a run of questions without answers has what every model is held against: its own answers in the light.
+/// Checks that a run without true answers can compare every model with its own answers at L0.
 ///
 /// # Errors
-/// If the observer is asked, if a model is shown no image, or if the untouched images are left out.
+/// If the observer is asked, a model gets no images, or the untouched images are left out.
 fn check_without_truths(job: &JobSettings) -> Result<()> {
     let models = &job.ask.models;
     if let Some(observer) = models

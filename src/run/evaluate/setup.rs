@@ -1,4 +1,4 @@
-//! [`ChoiceSetup`]: the data and models of an evaluation, opened and checked.
+//! The data and models of an evaluation, opened and checked: [`ChoiceSetup`].
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -22,7 +22,7 @@ use crate::images::progress::Progress;
 use crate::images::recipes::Recipe;
 use crate::images::trials::questions::{QuestionBank, open_data, open_unasked, select};
 use crate::images::trials::{check_enhanced, conditions};
-use crate::runs::part::part;
+use crate::runs::shard_sources::shard_questions;
 use crate::types::manifests::PartPlace;
 use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 use darkqa_enhance::{FRAMES, ModelFile};
@@ -78,12 +78,12 @@ impl<'a> ChoiceSetup<'a> {
         let file_places = file_places(config, &dataset, &selected);
         let other_rooms = OtherRooms::new(&selected, |frame| dataset.scene(frame));
         let controls = AddedControls::new(config, other_rooms.is_some())?;
-        let (questions, part) = part(
+        let (questions, part) = shard_questions(
             selected.clone(),
             job.shard,
             |question| question.frame.0.clone(),
             |question| dataset.scene(&question.frame),
-            |frame| config.plan.as_ref().map_or(1, |plan| plan.cost(frame)),
+            |frame| config.plan.as_ref().map_or(1, |plan| plan.weight(frame)),
         )?;
         let models = open_models(config, &controls, &dataset, &questions)?;
         let mut sources = if shows_images {
@@ -102,7 +102,7 @@ impl<'a> ChoiceSetup<'a> {
         }
         photographs::check_matches(&sources, &job.light.matches)?;
         photographs::tell(&*dataset, &sources, progress);
-        dark_already::tell(job, progress);
+        dark_already::print_note(job, progress);
         if !job.enhancers.is_empty()
             && job.enhancers.on().and(TreatmentSet::DARK).is_none()
             && !photographs::names(&sources).is_empty()
@@ -168,7 +168,7 @@ impl<'a> ChoiceSetup<'a> {
     }
 
     /// Prints the inferred column mapping of a ready-made set, and warns about unnamed scenes.
-    pub(super) fn say_reading(&self, progress: &Progress) {
+    pub(super) fn print_reading(&self, progress: &Progress) {
         for line in self.dataset.printed_summary() {
             progress.note(line);
         }
@@ -211,7 +211,7 @@ fn probe_sources(dataset: &Dataset, selected: &[Question]) -> Vec<Source> {
         .collect()
 }
 
-/// Warns if `room-net` will guess questions, because the rules did not make them.
+/// Warns about the number of questions that `room-net` will guess, because no rule made them.
 fn warn_of_guesses(questions: &[Question], rules: &Rules) {
     let unknown = questions
         .iter()
@@ -225,7 +225,7 @@ fn warn_of_guesses(questions: &[Question], rules: &Rules) {
     }
 }
 
-/// Prints the training data of `room-net` and of the enhancer `lift`, if `room-net` is shown images.
+/// Prints the training data of `room-net`, and of the enhancer `lift` if both are used.
 fn print_training(config: &Evaluation, progress: &Progress) {
     let job = &config.job;
     if !job.ask.shows_images_to(&ModelName::RoomNet) {
@@ -295,7 +295,7 @@ fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
         .collect()
 }
 
-/// Opens the models. Nothing is sent.
+/// Opens the models without sending any request.
 fn open_models(
     config: &Evaluation,
     controls: &AddedControls,

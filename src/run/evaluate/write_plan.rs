@@ -1,4 +1,4 @@
-//! `plan`: the questions and frames of a run, written once, so that no shard makes them again ([`plan`]).
+//! `plan`: writes the questions and frames of a run once, so that no shard makes them again ([`plan`]).
 
 use super::plan_identity::plan_identity;
 use super::settings::EvaluateArgs;
@@ -29,10 +29,10 @@ pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcom
     let is_shared = args.job.output.shared;
     let command = recorded_command(&args.job.words);
     let mut config = args.resolve()?;
-    // A plan is made from the data, also where there is one.
+    // A new plan is made from the data, not from an existing plan.
     config.plan = None;
     let (setup, files) = ChoiceSetup::open(&config, progress)?;
-    setup.say_reading(progress);
+    setup.print_reading(progress);
     let trials = setup.plan(0, || Ok(Vec::new()))?;
     let costs = costs(&setup, &trials);
     let frames = setup.sources.iter().zip(costs).zip(0..);

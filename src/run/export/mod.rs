@@ -1,4 +1,4 @@
-//! `export`: writing ready-made sets for other tools, one set with its images per condition.
+//! `export`: writes ready-made sets for other tools, one set with its images per condition.
 
 mod set;
 
@@ -23,8 +23,8 @@ use crate::images::trials::{check_enhanced, check_used, conditions};
 use crate::images::workers::pool;
 use crate::picture::png;
 use crate::runs::Outcome;
-use crate::runs::part_args::{PartArgs, keep_part};
 use crate::runs::shard::Shard;
+use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::text::words::counted;
 use crate::types::manifests::Status;
 use crate::types::{Condition, Decides, FrameId, Question};
@@ -68,7 +68,7 @@ pub(crate) struct ExportArgs {
     pub loading: EnhancerRunArgs,
     /// The part of the frames.
     #[command(flatten)]
-    pub part: PartArgs,
+    pub part: ShardArgs,
     /// Replace sets that exist already
     #[arg(long, help_heading = "Output", add = Decides::Nothing)]
     pub force: bool,
@@ -103,8 +103,8 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     refuse_several_images(&dataset, &questions)?;
     let shard = args.part.resolve()?;
     let asked: BTreeSet<&FrameId> = questions.iter().map(|question| &question.frame).collect();
-    let names = names(asked.iter().copied());
-    let own_questions = part_of_frames(&questions, asked, shard)?;
+    let names = file_names(asked.iter().copied());
+    let own_questions = shard_questions(&questions, asked, shard)?;
     let files = enhancers::read(&args.enhancers.llie)?;
     let recipe = Recipe::lossless(&light.kinds, &files);
     let recipe = recipe.with_elsewhere(&args.enhancers.enhanced)?;
@@ -114,7 +114,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
         workers.install(|| photographs::measure(&dataset, &mut sources))?;
     }
     if !shard.is_part() {
-        // Frames of another part may have photographs.
+        // Only all frames together show whether there are photographs.
         photographs::check_matches(&sources, &light.matches)?;
     }
     let photographed = photographs::names(&sources);
@@ -123,7 +123,7 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     check_enhanced(&conditions, &enhancement)?;
     warn_of_inputs(&input_summary(&sources));
     recipe.check(&sources, &conditions)?;
-    let mut sets = open_sets((args, shard), &dataset, &conditions, &questions)?;
+    let mut sets = open_sets(args, shard, &dataset, &conditions, &questions)?;
     let timings = Timings::default();
     let steps = ImageSteps {
         frames: &dataset,
@@ -166,48 +166,44 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     for set in sets {
         paths.extend(set.finish()?);
     }
-    let output = format!(
+    let mut output = format!(
         "{} about {} in {}:\n",
         counted(own_questions.len(), "question"),
         counted(sources.len(), "image"),
         counted(conditions.len(), "condition")
     );
-    Ok(wrote(output, paths))
-}
-
-/// The outcome of a call that wrote these sets.
-fn wrote(mut output: String, paths: Vec<PathBuf>) -> Outcome {
     for path in &paths {
         let _ = writeln!(output, "{}", path.display());
     }
-    Outcome {
+    Ok(Outcome {
         status: Status::Complete,
         output,
         written: paths,
-    }
+    })
 }
 
-/// The questions about the frames of a part.
-fn part_of_frames(
+/// The questions about the frames of a shard.
+fn shard_questions(
     questions: &[Question],
     asked: BTreeSet<&FrameId>,
     shard: Shard,
 ) -> Result<Vec<Question>> {
     let mut own: Vec<&FrameId> = asked.into_iter().collect();
-    keep_part(&mut own, shard)?;
+    keep_shard(&mut own, shard)?;
     let own: BTreeSet<&FrameId> = own.into_iter().collect();
-    let own = questions
+    Ok(questions
         .iter()
-        .filter(|question| own.contains(&question.frame));
-    Ok(own.cloned().collect())
+        .filter(|question| own.contains(&question.frame))
+        .cloned()
+        .collect())
 }
 
-/// Refuses questions that show several images: the forms of the sets have one image a question.
+/// Refuses questions that show several images, because the sets have one image per question.
 fn refuse_several_images(dataset: &Dataset, questions: &[Question]) -> Result<()> {
-    let mut several = questions
+    match questions
         .iter()
-        .filter(|question| !dataset.image_series(&question.frame).is_empty());
-    match several.next() {
+        .find(|question| !dataset.image_series(&question.frame).is_empty())
+    {
         None => Ok(()),
         Some(first) => Err(Error::usage(
             "--multi-image",
@@ -221,8 +217,13 @@ fn refuse_several_images(dataset: &Dataset, questions: &[Question]) -> Result<()
     }
 }
 
+/// Opens the set of each condition.
+///
+/// # Errors
+/// If a set exists already, and `--force` is not set.
 fn open_sets(
-    (args, shard): (&ExportArgs, Shard),
+    args: &ExportArgs,
+    shard: Shard,
     dataset: &Dataset,
     conditions: &[Condition],
     questions: &[Question],
@@ -248,12 +249,13 @@ fn open_sets(
     }
 }
 
-/// A unique file name for each frame: its own name without folders and extension, with a number if two are the same.
-fn names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a FrameId, String> {
+/// A unique file name for each frame: its name without folders and extension, followed by a number if it is already used.
+fn file_names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a FrameId, String> {
+    let is_plain = |letter: char| letter.is_alphanumeric() || "-_.".contains(letter);
     let mut used = BTreeSet::new();
-    let name = |frame: &'a FrameId| {
-        let plain = |letter: char| letter.is_alphanumeric() || "-_.".contains(letter);
-        let name = frame.bare().replace(|letter| !plain(letter), "_");
+    let mut names = BTreeMap::new();
+    for frame in frames {
+        let name = frame.bare().replace(|letter| !is_plain(letter), "_");
         let name = name.trim_start_matches('.').to_owned();
         let mut unique = name.clone();
         let mut number = 2;
@@ -261,9 +263,9 @@ fn names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a FrameId,
             unique = format!("{name}-{number}");
             number += 1;
         }
-        (frame, unique)
-    };
-    frames.map(name).collect()
+        names.insert(frame, unique);
+    }
+    names
 }
 
 #[cfg(test)]
@@ -274,7 +276,7 @@ mod tests {
     fn no_two_frames_share_a_file() {
         let frames =
             ["a/b.png", "a_b", "A_B.jpg", "../c d.png", "2"].map(|name| FrameId(name.into()));
-        let names: Vec<String> = names(frames.iter()).into_values().collect();
+        let names: Vec<String> = file_names(frames.iter()).into_values().collect();
         assert_eq!(names, ["_c_d", "2", "A_B-3", "a_b", "a_b-2"]);
     }
 }

@@ -1,4 +1,4 @@
-//! The writer of one ready-made set: [`ReadySet`].
+//! Writer of one ready-made set: [`ReadySet`].
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -27,20 +27,19 @@ pub(crate) enum SetForm {
 }
 
 /// The last sentence of each question for LLaVA.
-const LLAVA: &str = "Answer with the option's letter from the given choices directly.";
+const LLAVA_INSTRUCTION: &str = "Answer with the option's letter from the given choices directly.";
 
-/// Where sets go.
+/// Location of the sets.
 pub(super) struct SetPlace<'a> {
-    /// The folder of all sets.
+    /// Folder of all sets.
     pub(super) out: &'a Path,
-    /// The name of the data.
+    /// Name of the data set.
     pub(super) data: &'a str,
-    /// The part of the data.
     pub(super) shard: Shard,
 }
 
 impl SetPlace<'_> {
-    /// The main file of the set of a condition. That of a part has the part in its name.
+    /// The main file of the set of a condition. Its name contains the shard, if there are several.
     fn file(&self, form: SetForm, condition: &Condition) -> PathBuf {
         let part = if self.shard.is_part() {
             format!("-{}", self.shard.folder())
@@ -62,9 +61,10 @@ impl SetPlace<'_> {
 pub(super) struct ReadySet {
     form: SetForm,
     path: PathBuf,
-    /// The maximum number of choices of a question: the number of choice columns of a table.
+    /// Maximum number of choices of a question, which is the number of choice columns of a table.
     max_choices: usize,
-    part: Option<csv::Writer<File>>,
+    /// Writer of the unfinished file; `None` before the first row.
+    writer: Option<csv::Writer<File>>,
 }
 
 impl ReadySet {
@@ -82,7 +82,7 @@ impl ReadySet {
             form,
             path: place.file(form, condition),
             max_choices: max_choices.unwrap_or(0),
-            part: None,
+            writer: None,
         }
     }
 
@@ -106,33 +106,34 @@ impl ReadySet {
         let mut first = None;
         for &(index, question) in questions {
             match self.form {
-                SetForm::ImageFolder => self.line(&image_folder(&file, question))?,
-                SetForm::Llava => self.line(&llava(&file, question))?,
+                SetForm::ImageFolder => self.write_line(&image_folder_line(&file, question))?,
+                SetForm::Llava => self.write_line(&llava_line(&file, question))?,
                 SetForm::VlmEvalKit => {
-                    // The first row has the image, the others the index of that row.
+                    // The first row has the image, the others the index of the first row.
                     let cell = match first {
                         None => STANDARD.encode(image),
                         Some(first) => usize::to_string(&first),
                     };
                     first = first.or(Some(index));
-                    let mut cells = table(index, cell, question);
+                    let mut cells = table_row(index, cell, question);
                     cells.resize(COLUMNS.len() + self.max_choices, String::new());
-                    self.cells(cells)?;
+                    self.write_row(cells)?;
                 }
             }
         }
         Ok(())
     }
 
-    fn line(&mut self, value: &Value) -> Result<()> {
-        self.cells(vec![value.to_string()])
+    /// Writes a line of JSON, as a row with one unquoted cell.
+    fn write_line(&mut self, value: &Value) -> Result<()> {
+        self.write_row(vec![value.to_string()])
     }
 
-    /// Writes a row. A line of JSON is a row with one cell that is never quoted.
-    fn cells(&mut self, cells: Vec<String>) -> Result<()> {
-        let path = partial_path(&self.path);
-        let part = match &mut self.part {
-            Some(part) => part,
+    /// Writes a row; creates the file with its header before the first one.
+    fn write_row(&mut self, cells: Vec<String>) -> Result<()> {
+        let path = unfinished_path(&self.path);
+        let writer = match &mut self.writer {
+            Some(writer) => writer,
             none => {
                 let folder = path.parent().unwrap_or(Path::new("."));
                 fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
@@ -142,7 +143,7 @@ impl ReadySet {
                     SetForm::ImageFolder | SetForm::Llava => csv::QuoteStyle::Never,
                 };
                 let mut builder = csv::WriterBuilder::new();
-                let part = none.insert(
+                let writer = none.insert(
                     builder
                         .delimiter(b'\t')
                         .quote_style(quotes)
@@ -151,64 +152,69 @@ impl ReadySet {
                 if self.form == SetForm::VlmEvalKit {
                     let letters = (0..self.max_choices).map(|i| letter(i).to_string());
                     let header = COLUMNS.iter().map(|&name| name.to_owned()).chain(letters);
-                    part.write_record(header)
+                    writer
+                        .write_record(header)
                         .map_err(|e| Error::data(path.display(), e))?;
                 }
-                part
+                writer
             }
         };
-        part.write_record(cells)
+        writer
+            .write_record(cells)
             .map_err(|e| Error::data(path.display(), e))
     }
 
-    /// Renames the complete file to its final name, and returns that name; `None` if no image of a part is of this condition.
+    /// Renames the complete file to its final path, and returns the path; `None` if the shard has no image in this condition.
     pub(super) fn finish(self) -> Result<Option<PathBuf>> {
-        let part = partial_path(&self.path);
-        let Some(mut writer) = self.part else {
+        let unfinished = unfinished_path(&self.path);
+        let Some(mut writer) = self.writer else {
             return Ok(None);
         };
-        writer.flush().map_err(|e| Error::file(&part, "write", e))?;
+        writer
+            .flush()
+            .map_err(|e| Error::file(&unfinished, "write", e))?;
         drop(writer);
-        fs::rename(&part, &self.path).map_err(|e| Error::file(&self.path, "write", e))?;
+        fs::rename(&unfinished, &self.path).map_err(|e| Error::file(&self.path, "write", e))?;
         Ok(Some(self.path))
     }
 }
 
-/// The temporary path of a set until it is complete.
-fn partial_path(path: &Path) -> PathBuf {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    part.into()
+/// Path of the file of a set until it is complete.
+fn unfinished_path(path: &Path) -> PathBuf {
+    let mut unfinished = path.as_os_str().to_owned();
+    unfinished.push(".part");
+    unfinished.into()
 }
 
-/// The columns of a table before those of the choices.
+/// The columns of a table before the choices.
 const COLUMNS: [&str; 6] = ["index", "image", "question", "answer", "category", "id"];
 
-/// A row of VLMEvalKit's table (`vlmeval/dataset/image_mcq.py`). The index is a number. A short cell in the column `image`
-/// is the index of the row that has the image.
-fn table(index: usize, image: String, question: &Question) -> Vec<String> {
-    let truth = true_letter(question);
-    let head = [
+/// A row of VLMEvalKit's table (`vlmeval/dataset/image_mcq.py`). A short cell in the column `image` is the index of the row that has the
+/// image.
+fn table_row(index: usize, image: String, question: &Question) -> Vec<String> {
+    [
         index.to_string(),
         image,
         question.text.clone(),
-        truth,
+        true_letter(question),
         question.family.name().to_owned(),
         question.id.0.clone(),
-    ];
-    head.into_iter()
-        .chain(question.choices.texts().iter().cloned())
-        .collect()
+    ]
+    .into_iter()
+    .chain(question.choices.texts().iter().cloned())
+    .collect()
 }
 
-/// The letter of the true choice; empty if nobody knows it.
+/// The letter of the true choice; empty if it is unknown.
 fn true_letter(question: &Question) -> String {
-    let truth = question.choices.truth();
-    truth.map_or_else(String::new, |truth| letter(truth).to_string())
+    question
+        .choices
+        .truth()
+        .map_or_else(String::new, |truth| letter(truth).to_string())
 }
 
 /// A line of `metadata.jsonl` for an image folder.
-fn image_folder(file: &str, question: &Question) -> Value {
+fn image_folder_line(file: &str, question: &Question) -> Value {
     json!({
         "file_name": file,
         "id": question.id,
@@ -220,11 +226,11 @@ fn image_folder(file: &str, question: &Question) -> Value {
 }
 
 /// A line of a question file for LLaVA (`llava/eval/model_vqa_loader.py`), with the letter of the true choice.
-fn llava(file: &str, question: &Question) -> Value {
+fn llava_line(file: &str, question: &Question) -> Value {
     json!({
         "question_id": question.id,
         "image": file,
-        "text": format!("{}\n{}\n{LLAVA}", question.text, lettered(&question.choices)),
+        "text": format!("{}\n{}\n{LLAVA_INSTRUCTION}", question.text, lettered(&question.choices)),
         "answer": true_letter(question),
         "category": question.family,
     })

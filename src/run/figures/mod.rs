@@ -1,4 +1,4 @@
-//! `figures`: the figures of runs for a paper, at the width of its columns.
+//! `figures`: draws the figures of runs for a paper, at the width of its columns.
 
 mod width;
 
@@ -26,16 +26,16 @@ use crate::types::text::shown;
 
 use width::{TEX, Width};
 
-/// Name of the sheet that tells a run in four panels.
+/// Name of the sheet with an overview of a run in four panels.
 const PAPER: &str = "paper";
 /// Name of the tables.
 const TABLES: &str = "tables";
 /// File name of the captions.
 const CAPTIONS: &str = "captions.txt";
-/// Longest side in pixels of a small copy that is read; chosen, and more than a run stores.
+/// Maximum side of a thumbnail that is read, in pixels; chosen, and more than a run stores.
 const MAX_SIDE: u32 = 2048;
-/// Heights of letters in points that `--font-size` takes; chosen.
-const LETTERS: std::ops::RangeInclusive<f64> = 4.0..=24.0;
+/// Font sizes accepted by `--font-size`, in points; chosen.
+const FONT_SIZES: std::ops::RangeInclusive<f64> = 4.0..=24.0;
 
 /// The flags of `figures`.
 #[derive(Debug, Args)]
@@ -67,7 +67,7 @@ pub(crate) struct FiguresArgs {
     #[arg(long, value_enum, default_value = "colour", add = Decides::Nothing)]
     pub palette: Palette,
     /// Height of the letters in points, from 4 to 24; default: that of the captions of the venue
-    #[arg(long, value_name = "PT", value_parser = letters, add = Decides::Nothing)]
+    #[arg(long, value_name = "PT", value_parser = font_size, add = Decides::Nothing)]
     pub font_size: Option<f64>,
     /// The figures to draw, separated by commas; default: all for which there are records
     #[arg(long, value_name = "FIGURES", value_delimiter = ',', add = Decides::Nothing)]
@@ -97,25 +97,27 @@ fn label(text: &str) -> std::result::Result<(String, String), String> {
     }
 }
 
-fn letters(text: &str) -> std::result::Result<f64, String> {
-    let size = text.parse().ok().filter(|size| LETTERS.contains(size));
-    size.ok_or_else(|| {
-        format!(
-            "a size from {} to {} points expected",
-            LETTERS.start(),
-            LETTERS.end()
-        )
-    })
+fn font_size(text: &str) -> std::result::Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|size| FONT_SIZES.contains(size))
+        .ok_or_else(|| {
+            format!(
+                "a size from {} to {} points expected",
+                FONT_SIZES.start(),
+                FONT_SIZES.end()
+            )
+        })
 }
 
 /// Draws the figures of the runs, from the numbers of their report.
 ///
 /// # Errors
-/// If a run cannot be read or asked open questions, a name is not known, or a file cannot be written.
+/// If a run cannot be read or asked open questions, a name is unknown, or a file cannot be written.
 pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
     let look = Look {
         width: args.width.points(args.columns)?,
-        letters: args.font_size.unwrap_or_else(|| args.width.letters()),
+        letters: args.font_size.unwrap_or_else(|| args.width.font_size()),
         palette: args.palette,
     };
     check_only(&args.only)?;
@@ -134,17 +136,17 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
     }
     let drawings = drawings(findings, &names);
     let mut files = Files::default();
-    for name in wanted(&args.only) {
+    for name in wanted_names(&args.only) {
         if name == PAPER {
             let width = args.width.text();
             let look = Look { width, ..look };
-            let made = overview_sheet(
+            let sheet = overview_sheet(
                 &overview(findings, &names),
                 runs.thumbnails(),
                 &look,
                 &|url| pixels_of_url(url, MAX_SIDE),
             )?;
-            files.add_overview(&made, &args.format, &look)?;
+            files.add_overview(&sheet, &args.format, &look)?;
             continue;
         }
         if name == TABLES {
@@ -159,24 +161,27 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
             files.leave_out(name, reason.unwrap_or("the runs have no records for it"));
         }
     }
-    let said = names.said();
-    if !said.is_empty() {
-        let _ = writeln!(files.captions, "{said}\n");
-        let _ = writeln!(output, "note: {said}");
+    let name_note = names.said();
+    if !name_note.is_empty() {
+        let _ = writeln!(files.captions, "{name_note}\n");
+        let _ = writeln!(output, "note: {name_note}");
     }
     output += &files.write(&args.out)?;
     Ok(Outcome::wrote(&args.out, Status::Complete, output))
 }
 
-/// The names of all figures, in their order.
-fn known() -> impl Iterator<Item = &'static str> {
+/// The names of all figures, in order.
+fn all_names() -> impl Iterator<Item = &'static str> {
     std::iter::once(PAPER).chain(FIGURES).chain([TABLES])
 }
 
 fn check_only(only: &[String]) -> Result<()> {
-    match only.iter().find(|name| known().all(|known| known != *name)) {
+    match only
+        .iter()
+        .find(|name| all_names().all(|known| known != *name))
+    {
         Some(name) => {
-            let all: Vec<&str> = known().collect();
+            let all: Vec<&str> = all_names().collect();
             let problem = format!("there is no figure {name:?}; there are {}", all.join(", "));
             Err(Error::usage("--only", problem))
         }
@@ -184,22 +189,22 @@ fn check_only(only: &[String]) -> Result<()> {
     }
 }
 
-/// The names of the figures to draw, in their order.
-fn wanted(only: &[String]) -> impl Iterator<Item = &'static str> {
-    let is_wanted = |name: &&str| only.is_empty() || only.iter().any(|wanted| wanted == name);
-    known().filter(is_wanted)
+/// The names of the figures to draw, in order.
+fn wanted_names(only: &[String]) -> impl Iterator<Item = &'static str> {
+    all_names().filter(|name| only.is_empty() || only.iter().any(|wanted| wanted == name))
 }
 
-/// The same look with its width in points of TeX.
+/// The same look with its width in TeX points.
 fn in_tex(look: &Look) -> Look {
     let width = look.width * TEX;
     Look { width, ..*look }
 }
 
-/// The files of the figures, made before any is written.
+/// The files of the figures. All are made before any is written.
 #[derive(Default)]
 struct Files {
-    made: Vec<(String, Vec<u8>)>,
+    /// Content of each file, with its name.
+    contents: Vec<(String, Vec<u8>)>,
     captions: String,
     left_out: String,
 }
@@ -215,7 +220,7 @@ impl Files {
         self.add(name, &sheet(&drawing.chart, look), formats)?;
         if formats.contains(&FigureFormat::Tex) {
             match &drawing.chart {
-                Drawn::Lines(chart) => self.made.extend(tex(name, chart, &in_tex(look))),
+                Drawn::Lines(chart) => self.contents.extend(tex(name, chart, &in_tex(look))),
                 Drawn::Bars(_) | Drawn::Thresholds(_) | Drawn::Reliability(_) => {
                     self.leave_out(&format!("{name}.tex"), "it is not a chart of lines");
                 }
@@ -244,7 +249,7 @@ impl Files {
             let width = in_tex(look).width / 2.0;
             for (letter, chart) in ('a'..).zip(&overview.charts) {
                 let half = Look { width, ..*look };
-                self.made
+                self.contents
                     .extend(tex(&format!("{PAPER}-{letter}"), chart, &half));
             }
         }
@@ -254,7 +259,7 @@ impl Files {
 
     fn add_tables(&mut self, all: &[Table], args: &FiguresArgs, look: &Look) {
         if !args.format.contains(&FigureFormat::Tex) {
-            // Nobody who draws figures alone waits for tables.
+            // Mention missing tables only if figures were selected by name.
             if !args.only.is_empty() {
                 self.leave_out(TABLES, "they are made with --format tex");
             }
@@ -265,7 +270,7 @@ impl Files {
             return;
         }
         let (files, long) = tables(all, &in_tex(look), args.columns == Some(2));
-        self.made.extend(files);
+        self.contents.extend(files);
         if long > 0 {
             let why = format!(
                 "{long} of more than 40 rows are in tables-full.tex, for text in one column"
@@ -274,15 +279,16 @@ impl Files {
         }
     }
 
-    /// Adds a sheet in the forms that draw it.
+    /// Adds a sheet as PDF and SVG, if these formats are requested.
     fn add(&mut self, name: &str, sheet: &Sheet, formats: &[FigureFormat]) -> Result<()> {
         sheet.check_letters()?;
         if formats.contains(&FigureFormat::Pdf) {
-            self.made.push((format!("{name}.pdf"), pdf(sheet, name)?));
+            self.contents
+                .push((format!("{name}.pdf"), pdf(sheet, name)?));
         }
         if formats.contains(&FigureFormat::Svg) {
             let file = (format!("{name}.svg"), svg(sheet, &png)?.into_bytes());
-            self.made.push(file);
+            self.contents.push(file);
         }
         Ok(())
     }
@@ -291,10 +297,10 @@ impl Files {
         let _ = writeln!(self.left_out, "{name}: left out, {why}");
     }
 
-    /// Writes the files; returns lines that name them.
+    /// Writes the files; returns a line for each.
     fn write(self, out: &Path) -> Result<String> {
         let mut lines = String::new();
-        for (name, content) in &self.made {
+        for (name, content) in &self.contents {
             files::write(&out.join(name), content)?;
             let _ = writeln!(lines, "{}", out.join(name).display());
         }

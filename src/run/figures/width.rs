@@ -1,61 +1,61 @@
-//! Widths of the columns of papers: [`Width`].
+//! Column widths of papers: [`Width`].
 
 use std::str::FromStr;
 
 use crate::error::{Error, Result};
 
-/// Points of PDF in a millimetre: 72 to an inch.
+/// PDF points per millimetre (72 per inch).
 const POINTS: f64 = 72.0 / 25.4;
-/// Points of TeX in one of PDF: 72.27 to an inch.
+/// TeX points (72.27 per inch) per PDF point.
 pub(super) const TEX: f64 = 72.27 / 72.0;
-/// Bounds of a width in millimetres; chosen.
+/// Accepted widths in millimetres; chosen.
 const MILLIMETRES: std::ops::RangeInclusive<f64> = 40.0..=600.0;
 
-/// The measures of a paper.
+/// Width of a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Width {
     Venue(&'static Venue),
-    /// A width in points of PDF that was given in millimetres.
-    Own(f64),
+    /// A custom width, in PDF points.
+    Custom(f64),
 }
 
-/// The columns of a venue.
+/// Layout of a venue's papers.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Venue {
     name: &'static str,
-    /// Width of a column, in points of TeX.
+    /// Width of a column, in TeX points.
     column: f64,
-    /// Width of the text of two columns, in points of TeX; `None` if there is one.
+    /// Width of the text of two columns, in TeX points; `None` if the text has one column.
     text: Option<f64>,
-    /// Height of the letters of captions, in points.
-    letters: f64,
+    /// Font size of captions, in points.
+    font_size: f64,
 }
 
-/// \columnwidth and \textwidth of the classes and style files of these venues.
+/// `\columnwidth` and `\textwidth` of the LaTeX classes and style files of these venues.
 const VENUES: [Venue; 4] = [
     Venue {
         name: "ieee",
         column: 252.0,
         text: Some(516.0),
-        letters: 8.0,
+        font_size: 8.0,
     },
     Venue {
         name: "cvpr",
         column: 237.1,
         text: Some(496.9),
-        letters: 8.0,
+        font_size: 8.0,
     },
     Venue {
         name: "acl",
         column: 219.1,
         text: Some(455.2),
-        letters: 8.0,
+        font_size: 8.0,
     },
     Venue {
         name: "neurips",
         column: 397.5,
         text: None,
-        letters: 9.0,
+        font_size: 9.0,
     },
 ];
 
@@ -68,7 +68,7 @@ impl FromStr for Width {
         }
         match text.parse::<f64>() {
             Ok(millimetres) if MILLIMETRES.contains(&millimetres) => {
-                Ok(Self::Own(millimetres * POINTS))
+                Ok(Self::Custom(millimetres * POINTS))
             }
             _ => Err(format!(
                 "ieee, cvpr, acl, neurips, or a width from {} to {} in millimetres expected",
@@ -80,14 +80,16 @@ impl FromStr for Width {
 }
 
 impl Width {
-    /// Width of a figure over `columns` columns, in points of PDF; by default over one.
+    /// Width of a figure over `columns` columns (one by default), in PDF points.
     ///
     /// # Errors
-    /// If the paper has no two columns.
+    /// If the width is custom, or the paper has only one column.
     pub(super) fn points(self, columns: Option<u8>) -> Result<f64> {
         let problem = match (self, columns) {
-            (Self::Own(_), Some(_)) => "a width in millimetres is that of the figure: leave it out",
-            (Self::Own(width), None) => return Ok(width),
+            (Self::Custom(_), Some(_)) => {
+                "a width in millimetres is that of the figure: leave it out"
+            }
+            (Self::Custom(width), None) => return Ok(width),
             (Self::Venue(Venue { text: None, .. }), Some(2)) => {
                 "this paper has one column: leave it out"
             }
@@ -97,19 +99,19 @@ impl Width {
         Err(Error::usage("--columns", problem))
     }
 
-    /// Width of the text, in points of PDF.
+    /// Width of the text, in PDF points.
     pub(super) fn text(self) -> f64 {
         match self {
             Self::Venue(venue) => venue.text.unwrap_or(venue.column) / TEX,
-            Self::Own(width) => width,
+            Self::Custom(width) => width,
         }
     }
 
-    /// Height of the letters, in points.
-    pub(super) fn letters(self) -> f64 {
+    /// Font size, in points.
+    pub(super) fn font_size(self) -> f64 {
         match self {
-            Self::Venue(venue) => venue.letters,
-            Self::Own(_) => 8.0,
+            Self::Venue(venue) => venue.font_size,
+            Self::Custom(_) => 8.0,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Facts about cameras that a recording has beside its images: [`Cameras`] and [`Exposures`].
+//! Intrinsics and exposures in a recording: [`Cameras`] and [`Exposures`].
 
 use std::collections::{BTreeSet, HashMap, VecDeque};
 
@@ -7,15 +7,15 @@ use serde_json::{Map, Value};
 use crate::import::recording::{CameraInfo, Exposure, Nanoseconds};
 use crate::types::Intrinsics;
 
-/// Exposures that wait for their image (chosen); drivers send both within a few frames.
-const WAITING_EXPOSURES: usize = 1000;
+/// Maximum number of exposures kept until their image arrives (chosen); drivers send both within a few frames.
+const MAX_WAITING: usize = 1000;
 
-/// The cameras of a recording by their names, each with the times from which its facts hold.
+/// The cameras of a recording by name, each with its intrinsics and the times from which they apply.
 #[derive(Default)]
 pub(super) struct Cameras(HashMap<String, Vec<(Nanoseconds, CameraInfo)>>);
 
 impl Cameras {
-    /// Adds facts that differ from those before.
+    /// Adds the intrinsics of a camera, if they differ from the last ones.
     pub(super) fn add(&mut self, camera: &str, time: Nanoseconds, info: CameraInfo) {
         let infos = self.0.entry(camera.to_owned()).or_default();
         if infos.last().is_none_or(|(_, last)| *last != info) {
@@ -23,7 +23,7 @@ impl Cameras {
         }
     }
 
-    /// The intrinsics of a frame: the last ones before it, or else the first.
+    /// The intrinsics at a time: the last ones before it, or else the first.
     pub(super) fn intrinsics(
         &self,
         camera: &str,
@@ -38,7 +38,7 @@ impl Cameras {
     }
 }
 
-/// Exposures of chosen frames, which come before or after their images.
+/// Exposures of chosen frames. An exposure may arrive before or after its image.
 #[derive(Default)]
 pub(super) struct Exposures {
     recent: VecDeque<(String, Exposure)>,
@@ -54,17 +54,19 @@ impl Exposures {
             return;
         }
         self.recent.push_back((camera.to_owned(), exposure));
-        if self.recent.len() > WAITING_EXPOSURES {
+        if self.recent.len() > MAX_WAITING {
             self.recent.pop_front();
         }
     }
 
-    /// Notes that the exposure of a frame is needed.
+    /// Requests the exposure of a frame.
     pub(super) fn want(&mut self, camera: &str, stamp: Nanoseconds) {
         let key = (camera.to_owned(), stamp);
-        let is_of_frame =
-            |(name, exposure): &&(String, Exposure)| name == camera && exposure.stamp == stamp;
-        match self.recent.iter().find(is_of_frame) {
+        match self
+            .recent
+            .iter()
+            .find(|(name, exposure)| name == camera && exposure.stamp == stamp)
+        {
             Some((_, exposure)) => drop(self.found.insert(key, exposure.values.clone())),
             None => drop(self.wanted.insert(key)),
         }

@@ -1,4 +1,4 @@
-//! Writing frames of a recording or video, several at once: [`FrameWriter`].
+//! Writes frames of a recording or video in parallel: [`FrameWriter`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -21,19 +21,19 @@ use crate::text::words::counted;
 use crate::types::text::excerpt;
 use crate::types::{FrameId, Labels, Rgb};
 
-/// The most bytes of frames that wait to be written (chosen). Writing takes two to three times as many.
-const MOST_WAITING: usize = 32 << 20;
+/// Maximum size of the frames waiting to be written, in bytes (chosen). Writing needs two to three times as much memory.
+const MAX_WAITING_BYTES: usize = 32 << 20;
 
-/// Frames that wait for each thread (chosen).
+/// Number of waiting frames per thread (chosen).
 const WAITING_PER_THREAD: usize = 4;
 
-/// Maximum number of characters of a problem: it may repeat texts of the recording.
+/// Maximum length of a problem in characters, because it may quote texts of the recording.
 const MAX_PROBLEM: usize = 300;
 
-/// Image files that are copied from messages, by the endings of their names.
+/// File extensions of images that are copied unchanged from messages.
 pub(super) const COPIED: [&str; 3] = ["jpg", "png", "webp"];
 
-/// A frame that was chosen.
+/// A frame chosen to be written.
 pub(super) struct ChosenFrame {
     pub(super) topic: String,
     /// Name of the frame in its scene.
@@ -45,7 +45,7 @@ pub(super) struct ChosenFrame {
 
 /// The image of a chosen frame.
 pub(super) enum FrameSource {
-    /// A message of a channel, not decoded.
+    /// An undecoded message of a channel.
     Message {
         channel: Arc<Channel>,
         bytes: Vec<u8>,
@@ -61,7 +61,7 @@ impl ChosenFrame {
         }
     }
 
-    /// The topic and time, for messages.
+    /// Topic and time, for messages.
     fn words(&self) -> String {
         let since = seconds(self.place.since);
         format!("{} at {since:.3} s", self.topic)
@@ -73,17 +73,17 @@ pub(super) struct WrittenFrame {
     pub(super) topic: String,
     pub(super) time: Nanoseconds,
     pub(super) log_time: Nanoseconds,
-    /// Width and height in pixels, after a turn that its file states.
+    /// Width and height in pixels, after the turn that the file states.
     pub(super) size: (usize, usize),
-    /// Whether its file states a turn, so that the camera's intrinsics are not those of the image.
+    /// True if the file states a turn, so that the camera's intrinsics do not apply to the image.
     pub(super) is_turned: bool,
-    /// The greatest sample of an image of 16 bits.
+    /// Largest sample, for 16-bit images.
     peak_16: Option<u16>,
-    /// The line of the frame in `frames.jsonl`.
+    /// Line in `frames.jsonl`.
     pub(super) line: Map<String, Value>,
 }
 
-/// An image as it is written.
+/// The image file to write.
 struct EncodedFrame {
     bytes: Vec<u8>,
     ending: &'static str,
@@ -93,17 +93,17 @@ struct EncodedFrame {
     frame_id: String,
 }
 
-/// Writes frames, and keeps the facts about them.
+/// Writes frames, and collects facts about them.
 pub(super) struct FrameWriter<'a> {
     out: &'a Path,
-    /// Name of the drive, with which the names of scenes begin.
+    /// Name of the drive, which is the prefix of scene names.
     drive: String,
-    /// The code of white in images of 16 bits.
+    /// Code of white in 16-bit images.
     white: u16,
     pool: ThreadPool,
     tally: InputTally,
     waiting: Vec<ChosenFrame>,
-    /// Number of waiting frames that are known to be intact.
+    /// Number of waiting frames known to be intact; these come first.
     intact: usize,
     pub(super) written: Vec<WrittenFrame>,
     /// Number of frames that could not be written, by topic.
@@ -125,13 +125,13 @@ impl<'a> FrameWriter<'a> {
         }
     }
 
-    /// Takes a frame, and writes the waiting ones if they are many. A frame of a chunk is not known to be intact before the chunk was
-    /// read, unless the chunk is larger than the memory for waiting frames.
+    /// Adds a frame, and first writes the waiting ones if there are many. A frame in a chunk is known to be intact only after the whole chunk
+    /// was read, but is written earlier if the chunk exceeds the memory for waiting frames.
     pub(super) fn push(&mut self, frame: ChosenFrame, is_intact: bool) {
         let bytes: usize = self.waiting.iter().map(ChosenFrame::bytes).sum();
-        let most = WAITING_PER_THREAD * self.pool.current_num_threads();
-        let is_many = self.waiting.len() >= most && self.intact == self.waiting.len();
-        if bytes + frame.bytes() > MOST_WAITING || is_many {
+        let max_waiting = WAITING_PER_THREAD * self.pool.current_num_threads();
+        let is_full = self.waiting.len() >= max_waiting && self.intact == self.waiting.len();
+        if bytes + frame.bytes() > MAX_WAITING_BYTES || is_full {
             self.write_waiting();
         }
         self.waiting.push(frame);
@@ -141,7 +141,7 @@ impl<'a> FrameWriter<'a> {
     }
 
     /// Marks all waiting frames as intact.
-    pub(super) fn keep_waiting(&mut self) {
+    pub(super) fn mark_intact(&mut self) {
         self.intact = self.waiting.len();
     }
 
@@ -152,7 +152,7 @@ impl<'a> FrameWriter<'a> {
         doubtful
     }
 
-    /// Writes all waiting frames. Each that fails is counted, and the first of each topic is logged.
+    /// Writes all waiting frames. Failures are counted, and the first of each topic is logged.
     pub(super) fn write_waiting(&mut self) {
         let waiting = std::mem::take(&mut self.waiting);
         self.intact = 0;
@@ -167,7 +167,7 @@ impl<'a> FrameWriter<'a> {
         }
     }
 
-    /// Counts a frame that cannot be written.
+    /// Counts a failed frame, and logs the first one of a topic.
     pub(super) fn fail(&mut self, topic: &str, problem: &str) {
         let count = self.failed.entry(topic.to_owned()).or_default();
         *count += 1;
@@ -176,7 +176,7 @@ impl<'a> FrameWriter<'a> {
         }
     }
 
-    /// Warns of the topics of which several frames failed, and returns the number of all frames that failed.
+    /// Warns of topics with several failed frames, and returns the number of all failed frames.
     pub(super) fn warn_of_failures(&self) -> usize {
         for (topic, count) in self.failed.iter().filter(|(_, count)| **count > 1) {
             tracing::warn!("{}: {topic}: {count} frames could not be read", self.drive);
@@ -256,7 +256,7 @@ impl<'a> FrameWriter<'a> {
                         excerpt(&format, 60)
                     ));
                 }
-                // The message of the file names its place, which the caller does, too.
+                // Only the problem, because the caller adds the place.
                 let (width, height) = file.check().map_err(|e| match e {
                     Error::Data { problem, .. } => problem,
                     other => other.to_string(),
@@ -275,7 +275,7 @@ impl<'a> FrameWriter<'a> {
         }
     }
 
-    /// Writes what is waiting and the files about all frames, with `info` in `dataset.json`. Returns the number of scenes.
+    /// Writes the waiting frames and the files about all frames, with `info` as `dataset.json`. Returns the number of scenes.
     ///
     /// # Errors
     /// If there is no frame, or the files cannot be written.
@@ -302,7 +302,7 @@ impl<'a> FrameWriter<'a> {
         Ok(scenes.len())
     }
 
-    /// Warns if 16-bit images use fewer bits, so that they are too dark.
+    /// Warns if 16-bit images seem to use fewer bits, which makes them too dark.
     fn warn_of_white(&self) {
         let peak = self
             .written
@@ -321,7 +321,7 @@ impl<'a> FrameWriter<'a> {
     }
 }
 
-/// The small copy of a message's image.
+/// The thumbnail of a message's image.
 ///
 /// # Errors
 /// If the message has no image that can be decoded.
@@ -357,7 +357,7 @@ fn parse<'a>(channel: &Channel, bytes: &'a [u8]) -> Result<ImageMessage<'a>, Str
     }
 }
 
-/// The scenes and frames that were written, in words.
+/// The line about the written frames and scenes. `stretch` is the duration of a scene in seconds, `seen` the number of frames read.
 pub(super) fn summary(
     out: &Path,
     frames: usize,

@@ -1,4 +1,4 @@
-//! The MCAP files of a recording: [`files`], [`reader`] and the [`overview`] of their topics.
+//! The MCAP files of a recording: [`files`], [`open_reader`] and the [`overview`] of their topics.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use crate::import::recording::{COMPRESSED_FILE, McapReader, Overview, SQLITE_BAG
 use crate::picture::ImageFile;
 use crate::picture::reading_rule::ReadingRule;
 
-/// The MCAP files that paths stand for: a folder for the files in it, in the order of their numbers.
+/// Replaces folders by the MCAP files in them, in the order of their numbers.
 pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for path in paths {
@@ -22,7 +22,7 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
         let mut inside = entries(path)?;
         inside.retain(|file| file.extension().is_some_and(|ending| ending == "mcap"));
         if inside.is_empty() {
-            return Err(Error::data(path.display(), no_mcap_inside(path)?));
+            return Err(Error::data(path.display(), no_mcap_problem(path)?));
         }
         inside.sort_by_cached_key(|file| {
             let stem = file
@@ -41,8 +41,8 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// The problem of a folder without MCAP files.
-fn no_mcap_inside(folder: &Path) -> Result<&'static str> {
+/// The message for a folder without MCAP files.
+fn no_mcap_problem(folder: &Path) -> Result<&'static str> {
     let files = entries(folder)?;
     let has = |ending: &str| {
         files
@@ -58,16 +58,16 @@ fn no_mcap_inside(folder: &Path) -> Result<&'static str> {
     })
 }
 
-/// Bytes of the files.
-pub(super) fn bytes(files: &[PathBuf]) -> u64 {
+/// Total size of files, in bytes.
+pub(super) fn total_bytes(files: &[PathBuf]) -> u64 {
     files
         .iter()
         .filter_map(|file| file.metadata().ok())
-        .map(|facts| facts.len())
+        .map(|metadata| metadata.len())
         .sum()
 }
 
-pub(super) fn reader(path: &Path) -> Result<McapReader<File>> {
+pub(super) fn open_reader(path: &Path) -> Result<McapReader<File>> {
     let file = open(path).map_err(|e| Error::file(path, "read", e))?;
     McapReader::open(file).map_err(|problem| Error::data(path.display(), problem))
 }
@@ -78,7 +78,7 @@ pub(super) fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overvie
     let mut overview = Overview::default();
     for file in files {
         bar.inc();
-        let reader = match reader(file) {
+        let reader = match open_reader(file) {
             Ok(reader) => reader,
             Err(e) if files.len() == 1 => return Err(e),
             Err(e) => {
@@ -91,7 +91,7 @@ pub(super) fn overview(files: &[PathBuf], progress: &Progress) -> Result<Overvie
     Ok(overview)
 }
 
-/// Width and height of an image file of a message.
+/// Width and height of an image file in a message.
 fn image_size(bytes: &[u8]) -> Result<(u32, u32), String> {
     let name = "the first image".to_owned();
     let file = ImageFile::new(bytes.to_vec(), name, ReadingRule::default());

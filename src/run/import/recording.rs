@@ -1,4 +1,4 @@
-//! `import mcap`: frames of a recording, or the list of its topics.
+//! `import mcap`: imports frames of a recording, or lists its topics.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::camera_facts::{Cameras, Exposures};
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary, thumbnail};
-use super::mcap_files::{bytes, files, overview, reader};
+use super::mcap_files::{files, open_reader, overview, total_bytes};
 use super::topic_list::{MAX_NAMED, listing, no_images};
 use crate::error::{Error, Result};
 use crate::images::progress::{Progress, StepBar};
@@ -27,8 +27,8 @@ use crate::text::words::{counted, first_names};
 use crate::types::Decides;
 use crate::types::flags::positive;
 
-/// Bytes at the start of a message that hold its time.
-const STAMP: u64 = 64;
+/// Number of bytes at the start of a message that contain its time stamp.
+const STAMP_BYTES: u64 = 64;
 
 /// The flags of `import mcap`.
 #[derive(Debug, Args)]
@@ -71,7 +71,7 @@ pub(super) struct WrittenArgs {
 }
 
 impl WrittenArgs {
-    /// Refuses a folder that holds frames already.
+    /// Refuses a file, and a folder that has frames already unless `--force` is set.
     pub(super) fn check(&self, out: &Path) -> Result<()> {
         if out.is_file() {
             return Err(Error::data(
@@ -88,7 +88,7 @@ impl WrittenArgs {
         Err(Error::data(list.display(), problem))
     }
 
-    /// The content of `dataset.json` for the frames of a drive, which is named after its first file.
+    /// The content of `dataset.json` for the frames of a drive.
     pub(super) fn info(&self, source: &str, drive: &str) -> Value {
         json!({
             "schema": "darkqa.dataset/1",
@@ -99,7 +99,7 @@ impl WrittenArgs {
     }
 }
 
-/// Warns of the times of `--at` at which a topic or video has no frame.
+/// Warns of times in `--at` for which a topic or video has no frame.
 pub(super) fn warn_of_missed(sampler: &Sampler, name: &str) {
     let missed = sampler.missed();
     if let Some(first) = missed.first() {
@@ -113,7 +113,7 @@ pub(super) fn warn_of_missed(sampler: &Sampler, name: &str) {
 /// Lists the topics of a recording, or imports frames of them.
 ///
 /// # Errors
-/// If a file is not an MCAP file, no topic has images, several have and none is named, or no frame could be read.
+/// If a file is not an MCAP file, no topic has images, several topics have images and none is named, or no frame could be read.
 pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
     let files = files(&args.files)?;
     if let Some(out) = &args.out {
@@ -127,13 +127,13 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
     let Some(out) = &args.out else {
         return listing(&files[0], &overview.unwrap_or_default());
     };
-    let topics = topics(args, &files[0], overview.as_ref())?;
+    let topics = selected_topics(args, &files[0], overview.as_ref())?;
     let drive = drive_name(&files[0]);
     let mut import = Import::new(args, out, &drive, &topics, overview.as_ref())?;
     let mut problems = Vec::new();
-    let bar = progress.bar("MB", bytes(&files) as usize >> 20);
+    let bar = progress.bar("MB", total_bytes(&files) as usize >> 20);
     for file in &files {
-        match reader(file) {
+        match open_reader(file) {
             Ok(reader) => import.read(file, reader, &bar, &mut problems),
             Err(e) if files.len() == 1 => return Err(e),
             Err(e) => problems.push(e.to_string()),
@@ -144,8 +144,12 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
     import.finish(args, out, info, &files[0], problems)
 }
 
-/// The topics whose images are taken: those that are named, or the only one.
-fn topics(args: &McapArgs, file: &Path, overview: Option<&Overview>) -> Result<BTreeSet<String>> {
+/// The topics to import: the named ones, or the only one with images.
+fn selected_topics(
+    args: &McapArgs,
+    file: &Path,
+    overview: Option<&Overview>,
+) -> Result<BTreeSet<String>> {
     let known = overview.map(Overview::image_topics);
     let topics = match (known, overview) {
         (Some(known), Some(overview)) if known.is_empty() => return Err(no_images(file, overview)),
@@ -168,7 +172,7 @@ fn topics(args: &McapArgs, file: &Path, overview: Option<&Overview>) -> Result<B
     Ok(topics)
 }
 
-/// A topic as a part of a file's name.
+/// A topic as part of a file name.
 fn slug(topic: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '.');
     let name: String = topic
@@ -178,7 +182,7 @@ fn slug(topic: &str) -> String {
     name.trim_matches(['_', '.']).to_owned()
 }
 
-/// The name of a drive, from its first file: without the number of a file of a bag.
+/// The name of a drive: the stem of its first file, without the number that bags append.
 pub(super) fn drive_name(file: &Path) -> String {
     let stem = file
         .file_stem()
@@ -193,21 +197,21 @@ pub(super) fn drive_name(file: &Path) -> String {
     }
 }
 
-/// A topic whose images are taken.
-struct TakenTopic {
+/// A topic whose images are imported.
+struct SelectedTopic {
     sampler: Sampler,
-    /// Start of the names of its frames, if several topics are taken.
+    /// Prefix of frame names; empty if only one topic is imported.
     prefix: String,
-    /// Messages so far.
+    /// Number of messages so far.
     seen: usize,
     clock: TopicClock,
     /// Time of the last frame.
     latest: Option<Nanoseconds>,
 }
 
-/// The import of a recording.
+/// State of the import of a recording.
 struct Import<'a> {
-    topics: BTreeMap<String, TakenTopic>,
+    topics: BTreeMap<String, SelectedTopic>,
     stretches: Stretches,
     writer: FrameWriter<'a>,
     white: u16,
@@ -215,10 +219,11 @@ struct Import<'a> {
     exposures: Exposures,
     /// Topics with images in the recording.
     with_images: BTreeSet<String>,
-    /// Frames whose message has no time.
+    /// Number of messages without a time stamp.
     without_stamp: usize,
-    /// Number of frames that were earlier than the one before of their topic, and the first of them in words.
+    /// Number of frames with an earlier time than the previous frame of their topic.
     backwards: usize,
+    /// Description of the first such frame.
     first_backwards: Option<String>,
 }
 
@@ -231,26 +236,26 @@ impl<'a> Import<'a> {
         overview: Option<&Overview>,
     ) -> Result<Self> {
         let white = args.white.map_or(u16::MAX, NonZeroU16::get);
-        let duration = |topic: &str| {
-            overview
+        let selected = |topic: &String| {
+            let duration = overview
                 .and_then(|overview| overview.topics.get(topic))
-                .map_or(0.0, TopicOverview::duration)
-        };
-        let taken = |topic: &String| TakenTopic {
-            sampler: args.sampling.sampler(duration(topic)),
-            prefix: if topics.len() > 1 {
-                slug(topic) + "-"
-            } else {
-                String::new()
-            },
-            seen: 0,
-            clock: TopicClock::default(),
-            latest: None,
+                .map_or(0.0, TopicOverview::duration);
+            SelectedTopic {
+                sampler: args.sampling.sampler(duration),
+                prefix: if topics.len() > 1 {
+                    slug(topic) + "-"
+                } else {
+                    String::new()
+                },
+                seen: 0,
+                clock: TopicClock::default(),
+                latest: None,
+            }
         };
         Ok(Self {
             topics: topics
                 .iter()
-                .map(|topic| (topic.clone(), taken(topic)))
+                .map(|topic| (topic.clone(), selected(topic)))
                 .collect(),
             stretches: Stretches::new(args.written.stretch),
             writer: FrameWriter::new(
@@ -269,7 +274,7 @@ impl<'a> Import<'a> {
         })
     }
 
-    /// Takes the frames of one file. Damage is added to `problems`; frames before it are kept.
+    /// Imports the frames of one file. Damage is added to `problems`; frames before it are kept.
     fn read(
         &mut self,
         path: &Path,
@@ -283,12 +288,12 @@ impl<'a> Import<'a> {
         while let Some(event) = reader.next() {
             match event {
                 Event::Message(message) => {
-                    self.take(&mut reader, &message);
+                    self.process(&mut reader, &message);
                     if self.topics.contains_key(&message.channel.topic) {
                         last = Some(message);
                     }
                 }
-                Event::ChunkRead => self.writer.keep_waiting(),
+                Event::ChunkRead => self.writer.mark_intact(),
                 Event::ChunkDamaged { times, problem } => {
                     let dropped = self.writer.drop_doubtful();
                     let [from, to] = times.map(|time| self.since_start(time));
@@ -298,7 +303,7 @@ impl<'a> Import<'a> {
                     ));
                 }
                 Event::Cut(problem) => {
-                    self.writer.keep_waiting();
+                    self.writer.mark_intact();
                     let last = last
                         .take()
                         .map_or("before the first image".to_owned(), |message| {
@@ -321,22 +326,22 @@ impl<'a> Import<'a> {
         self.writer.write_waiting();
     }
 
-    /// Seconds from the first frame, at a time of the recorder.
+    /// Seconds from the first frame to a time of the recorder.
     fn since_start(&self, log_time: Nanoseconds) -> f64 {
         seconds(log_time.saturating_sub(self.stretches.log_start().unwrap_or(log_time)))
     }
 
-    /// Takes what is needed of a message.
-    fn take(&mut self, reader: &mut McapReader<File>, message: &Message) {
+    /// Processes a message: an image, intrinsics or an exposure; others are ignored.
+    fn process(&mut self, reader: &mut McapReader<File>, message: &Message) {
         let channel = &message.channel;
         let has_images = matches!(channel.content, ChannelContent::Image(_));
         if has_images && !self.with_images.contains(&channel.topic) {
             self.with_images.insert(channel.topic.clone());
         }
-        if let Some(taken) = self.topics.get_mut(&channel.topic)
+        if let Some(topic) = self.topics.get_mut(&channel.topic)
             && !has_images
         {
-            taken.seen += 1;
+            topic.seen += 1;
             let problem = match &channel.content {
                 ChannelContent::Unsupported(reason) => format!("{}: {reason}", channel.topic),
                 _ => format!(
@@ -363,13 +368,19 @@ impl<'a> Import<'a> {
                 }
             }
             ChannelContent::Image(encoding) if self.topics.contains_key(&channel.topic) => {
-                self.take_image(reader, message, *encoding);
+                self.process_image(reader, message, *encoding);
             }
             _ => {}
         }
     }
 
-    fn take_image(&mut self, reader: &mut McapReader<File>, message: &Message, encoding: Encoding) {
+    /// Gives the image of a message to the writer, if its topic's sampler selects it.
+    fn process_image(
+        &mut self,
+        reader: &mut McapReader<File>,
+        message: &Message,
+        encoding: Encoding,
+    ) {
         let topic = message.channel.topic.clone();
         let schema = &message.channel.schema;
         if message.length > MAX_MESSAGE_BYTES {
@@ -382,8 +393,8 @@ impl<'a> Import<'a> {
             self.writer.fail(&topic, &problem);
             return;
         }
-        // If the body is cut off, the next event states it.
-        let Some(start) = reader.start_of_body(STAMP) else {
+        // If the body is cut off, the next event reports it.
+        let Some(start) = reader.start_of_body(STAMP_BYTES) else {
             return;
         };
         let stated = stamp(schema, encoding, start).or_else(|| {
@@ -393,13 +404,17 @@ impl<'a> Import<'a> {
         let stated = stated.filter(|stamp| *stamp != 0);
         self.without_stamp += usize::from(stated.is_none());
         let time = stated.unwrap_or(message.log_time);
-        let Some(taken) = self.topics.get_mut(&topic) else {
+        let Some(selected) = self.topics.get_mut(&topic) else {
             return;
         };
         let place = self
             .stretches
-            .place(&mut taken.clock, time, message.log_time);
-        if let Some(latest) = taken.latest.replace(time).filter(|latest| time < *latest) {
+            .place(&mut selected.clock, time, message.log_time);
+        if let Some(latest) = selected
+            .latest
+            .replace(time)
+            .filter(|latest| time < *latest)
+        {
             let since = seconds(place.since);
             let back = seconds(latest.saturating_sub(time));
             self.backwards += 1;
@@ -407,21 +422,21 @@ impl<'a> Import<'a> {
                 format!("{topic} at {since:.3} s, {back:.3} s before the frame in front of it")
             });
         }
-        let number = taken.seen;
-        taken.seen += 1;
-        if !taken.sampler.is_due(place) || reader.body().is_none() {
+        let number = selected.seen;
+        selected.seen += 1;
+        if !selected.sampler.is_due(place) || reader.body().is_none() {
             return;
         }
         let bytes = reader.take_body();
-        if taken.sampler.compares_pixels() {
-            // The writer finds the problem of an image that cannot be decoded, too, and counts it.
+        if selected.sampler.compares_pixels() {
+            // An image that cannot be decoded goes to the writer, which counts the problem.
             if let Ok(thumbnail) = thumbnail(&message.channel, &bytes, self.white)
-                && !taken.sampler.has_changed(thumbnail)
+                && !selected.sampler.has_changed(thumbnail)
             {
                 return;
             }
         }
-        let name = format!("{}{number:06}", taken.prefix);
+        let name = format!("{}{number:06}", selected.prefix);
         self.exposures.want(camera_name(&topic), time);
         let frame = ChosenFrame {
             topic,
@@ -436,7 +451,7 @@ impl<'a> Import<'a> {
         self.writer.push(frame, !message.is_in_chunk);
     }
 
-    /// Adds the topics without messages to the problems, and warns of times without a frame.
+    /// Adds topics without messages to the problems, and warns of times without a frame.
     ///
     /// # Errors
     /// If no topic has messages.
@@ -446,8 +461,10 @@ impl<'a> Import<'a> {
             [] => "no topic has images".to_owned(),
             known => format!("topics with images: {}", first_names(known, MAX_NAMED)),
         };
-        let absent = self.topics.iter().filter(|(_, taken)| taken.seen == 0);
-        let absent: Vec<String> = absent
+        let absent: Vec<String> = self
+            .topics
+            .iter()
+            .filter(|(_, selected)| selected.seen == 0)
             .map(|(topic, _)| format!("no messages of {topic}; {known}"))
             .collect();
         if let Some(first) = absent.first()
@@ -459,13 +476,13 @@ impl<'a> Import<'a> {
             return Err(Error::data(place, first));
         }
         problems.extend(absent.iter().map(|problem| format!("{place}: {problem}")));
-        for (topic, taken) in self.topics.iter().filter(|(_, taken)| taken.seen > 0) {
-            warn_of_missed(&taken.sampler, topic);
+        for (topic, selected) in self.topics.iter().filter(|(_, selected)| selected.seen > 0) {
+            warn_of_missed(&selected.sampler, topic);
         }
         Ok(())
     }
 
-    /// Adds intrinsics and exposures to the lines of the frames, and returns how many frames have each.
+    /// Adds intrinsics and exposures to the lines of the frames, and returns the number of frames with each.
     fn add_camera_facts(&mut self) -> [usize; 2] {
         let [mut with_intrinsics, mut with_exposure] = [0; 2];
         for written in &mut self.writer.written {
@@ -487,7 +504,7 @@ impl<'a> Import<'a> {
         [with_intrinsics, with_exposure]
     }
 
-    /// Writes the files about all frames, `info` among them, and returns the report of the import.
+    /// Writes the files about all frames, with `info` in `dataset.json`, and returns the result of the import.
     fn finish(
         mut self,
         args: &McapArgs,
@@ -513,7 +530,7 @@ impl<'a> Import<'a> {
                 counted(self.backwards, "time")
             );
         }
-        let seen = self.topics.values().map(|taken| taken.seen).sum();
+        let seen = self.topics.values().map(|selected| selected.seen).sum();
         let frames = self.writer.written.len();
         let mut output = summary(out, frames, scenes, args.written.stretch, seen, failed);
         let _ = writeln!(

@@ -1,4 +1,4 @@
-//! The topics of a recording in words: [`listing`].
+//! The list of the topics of a recording: [`listing`].
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,10 +8,13 @@ use crate::import::recording::{Overview, TopicOverview};
 use crate::runs::Outcome;
 use crate::text::words::{counted, first_names};
 
-/// Number of topics that a message names.
+/// Maximum number of topics in a message.
 pub(super) const MAX_NAMED: usize = 3;
 
-/// The list of the topics with images.
+/// Lists the topics with images.
+///
+/// # Errors
+/// If no topic has images.
 pub(super) fn listing(file: &Path, overview: &Overview) -> Result<Outcome> {
     if overview.image_topics().is_empty() {
         return Err(no_images(file, overview));
@@ -23,7 +26,7 @@ pub(super) fn listing(file: &Path, overview: &Overview) -> Result<Outcome> {
     Ok(Outcome::text(status, lines(overview)))
 }
 
-/// One line for each topic that has images, and the number of others.
+/// One line for each topic with images, and the number of other topics.
 fn lines(overview: &Overview) -> String {
     let width = |text: fn(&str, &TopicOverview) -> usize| {
         overview
@@ -63,7 +66,7 @@ fn lines(overview: &Overview) -> String {
     lines
 }
 
-/// The error for a recording without images, whose first file is `file`, with the topics that it has.
+/// The error for a recording without images, with its topics. `file` is the first file of the recording.
 pub(super) fn no_images(file: &Path, overview: &Overview) -> Error {
     let unread = overview
         .topics

@@ -1,4 +1,4 @@
-//! `import video`: frames of a video, decoded by ffmpeg.
+//! `import video`: imports frames of a video, decoded by ffmpeg.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -136,13 +136,13 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     ))
 }
 
-/// Seconds at the end of a video that may have no frame (chosen): its sound may be longer.
-const END: f64 = 2.0;
+/// Seconds at the end of a video that may have no frame, because the sound may be longer (chosen).
+const MAX_GAP: f64 = 2.0;
 
-/// The problem of a video whose frames, one every `interval` seconds, end long before the duration that it states.
+/// The warning about a video whose frames, one every `interval` seconds, end long before its stated duration.
 fn early_end(video: &Video, last: f64, interval: f64) -> Option<String> {
     let duration = video.duration?;
-    (duration - last > interval + END).then(|| {
+    (duration - last > interval + MAX_GAP).then(|| {
         format!(
             "the frames end at {last:.1} s of {duration:.1} s, as in a file that is cut off, or of which the last frame is shown for long"
         )

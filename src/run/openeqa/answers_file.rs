@@ -1,4 +1,4 @@
-//! Files with answers of people or other programs, in the form of upstream's result files: [`read`].
+//! Files with answers of people or other programs, in the format of upstream's result files: [`read`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -19,25 +19,24 @@ use crate::types::{
     Condition, Degradation, Digest, KindSet, OpenDetail, Record, Step, TrialKey, Via,
 };
 
-/// An entry of a file; other fields are ignored.
+/// An entry of a file. Other fields are ignored.
 #[derive(Debug, Deserialize)]
 struct AnswerEntry {
     question_id: String,
     /// `None` (`null`) if the person could not answer.
     answer: Option<String>,
-    /// The condition that was shown, as `L2-noise`.
+    /// Condition of the frames shown, for example `L2-noise`.
     condition: Option<Condition>,
-    /// The level of the condition that was shown, as `L2`.
+    /// Level of the frames shown, for example `L2`.
     level: Option<String>,
-    /// The person who answered, if there were several.
+    /// Person who answered, if several did.
     annotator: Option<Value>,
 }
 
-/// The answers of a file as records, in its order. A warning names and counts answers to questions that are not asked.
+/// Reads the answers in a file as records, in the order of the file. Warns about answers to questions that are not selected.
 ///
 /// # Errors
-/// If the file cannot be read, has two answers of one person to the same question in the same condition, or names a level
-/// that several variants have.
+/// If the file cannot be read, a person answered the same question twice in the same condition, or a level exists in several variants.
 pub(super) fn read(
     config: &AnswersFile,
     questions: &[Arc<OpenQuestion>],
@@ -105,7 +104,7 @@ fn warn_of_unknown(path: &Path, unknown: &[&str], all: usize) {
     }
 }
 
-/// The condition that an answer was given in: the clean frames if the entry names none, as in upstream's own files.
+/// The condition of an answer: untouched frames if the entry states none, as in upstream's own files.
 fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Condition, String> {
     let level = match (&entry.condition, entry.level.as_deref()) {
         (Some(condition), _) => return Ok(condition.clone()),
@@ -116,7 +115,7 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
         let severity = kind.severity(level).map_err(|e| e.to_string())?;
         Degradation::new(kind, severity, None).map_err(|e| e.to_string())
     };
-    // A level is one of the kinds of its axis alone.
+    // Kinds on the axis of the level.
     let mut degradations: Vec<Degradation> = Kind::ALL
         .into_iter()
         .filter_map(|kind| of_kind(kind).ok())

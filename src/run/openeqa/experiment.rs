@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use super::marks::{marks, prompt};
-use super::plan::answers;
+use super::marks::{mark_prompt, plan_marks};
+use super::plan::plan_answers;
 use super::record::OpenItem;
 use super::setup::OpenSetup;
 use crate::engine::costs::text_tokens;
@@ -109,23 +109,23 @@ impl Experiment for OpenSetup<'_> {
 
     fn identity(&self) -> Identity {
         let walk = &self.config.walk;
-        let fields = [
+        [
             ("--num-frames", json!(walk.frames)),
             ("--degrade", json!(walk.degraded_at)),
             ("--sensor", json!(walk.camera)),
-        ];
-        let fields = fields.map(|(field, value)| (field.to_owned(), value));
-        fields
-            .into_iter()
-            .chain(identity::images(&self.recipe))
-            .collect()
+        ]
+        .into_iter()
+        .map(|(field, value)| (field.to_owned(), value))
+        .chain(identity::images(&self.recipe))
+        .collect()
     }
 
     fn columns(&self) -> Columns {
         let mut columns = identity::columns(&self.models, &self.recipe, &self.config.job);
         if let Some(judge) = &self.judge {
-            // A model that is its own judge may be asked for marks in another way than for answers.
-            let content = || BTreeMap::from([(judge.name.to_string(), identity::model(judge))]);
+            // A model that is its own judge may have other settings as a judge.
+            let content =
+                || BTreeMap::from([(judge.name.to_string(), identity::model_definition(judge))]);
             columns.insert(JUDGES.to_owned(), content());
             let models = columns.entry("model".to_owned()).or_default();
             for (name, content) in content() {
@@ -156,8 +156,8 @@ impl Experiment for OpenSetup<'_> {
         records: impl FnOnce() -> Result<Vec<Record<OpenDetail>>>,
     ) -> Result<Vec<SourcePlan<OpenItem>>> {
         Ok(match phase {
-            0 => answers(self)?,
-            _ => marks(self, &records()?)?,
+            0 => plan_answers(self)?,
+            _ => plan_marks(self, &records()?)?,
         })
     }
 
@@ -165,12 +165,11 @@ impl Experiment for OpenSetup<'_> {
         if self.judge.is_none() {
             return Vec::new();
         }
-        let trials = remaining
+        // Every missing answer may be a new one, so each is expected to need a mark.
+        remaining
             .iter()
-            .flat_map(|part| &part.groups)
-            .flat_map(|group| &group.trials);
-        // Each answer that has not arrived may differ from all others, so each needs a mark.
-        trials
+            .flat_map(|source| &source.groups)
+            .flat_map(|group| &group.trials)
             .filter_map(|trial| match &trial.item {
                 OpenItem::Answer(question) => {
                     let mark = OpenItem::Mark {
@@ -179,7 +178,7 @@ impl Experiment for OpenSetup<'_> {
                     };
                     Some(ExpectedRequest {
                         model: 0,
-                        text_tokens: text_tokens(&prompt(question, ANSWER)),
+                        text_tokens: text_tokens(&mark_prompt(question, ANSWER)),
                         reply_tokens: mark.reply_tokens(),
                     })
                 }

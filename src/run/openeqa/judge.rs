@@ -1,4 +1,4 @@
-//! The flags of the judge ([`JudgeArgs`]), and the judge with its endpoint and key ([`Judge`]).
+//! The flags of the judge ([`JudgeArgs`]), and the resolved judge with its endpoint and key ([`Judge`]).
 
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -48,12 +48,12 @@ pub(super) struct Judge {
     pub(super) model: ModelName,
     /// The endpoint; `None` if the model is built in.
     pub(super) server: Option<Arc<Server>>,
-    /// The parameters of a request; the name of the model is filled in later.
+    /// Parameters of a request; the name of the model is set later.
     pub(super) parameters: Parameters,
 }
 
 impl Judge {
-    /// Goes on with a run with these columns: a token limit that has grown since does not make other marks.
+    /// Takes over the parameters of a stored run with these columns, if only the token limit has grown: this does not change marks.
     pub(super) fn continue_from(&mut self, columns: &Columns) {
         let ModelName::Remote(id) = &self.model else {
             return;
@@ -70,15 +70,18 @@ impl Judge {
 }
 
 impl JudgeArgs {
-    /// The judge with the key of its endpoint; `None` without `--judge`. The key of one endpoint is never sent to another.
+    /// Resolves the judge and the key of its endpoint; `None` without `--judge`. The key of one endpoint is never sent to another.
+    ///
+    /// # Errors
+    /// If the judge cannot answer open questions, or its endpoint or key is invalid.
     pub(super) fn resolve(self, job: &JobArgs, seed: Option<u64>) -> Result<Option<Judge>> {
         let Some(model) = self.judge else {
             return Ok(None);
         };
-        let of_judge = |e: crate::error::Error| e.at("the judge");
-        model.require_open_answers().map_err(of_judge)?;
+        let at_judge = |e: crate::error::Error| e.at("the judge");
+        model.require_open_answers().map_err(at_judge)?;
         if self.judge_base_url.is_none() && job.access.base_url.is_empty() {
-            model.check_spelling().map_err(of_judge)?;
+            model.check_spelling().map_err(at_judge)?;
         }
         let mut access = job.access.clone();
         let own_access = self.judge_base_url.is_some()
@@ -99,13 +102,13 @@ impl JudgeArgs {
         if job.money.dry_run {
             access = access.without_key();
         }
-        let remote = matches!(model, ModelName::Remote(_));
-        let server = remote
-            .then(|| access.server(job.sending).map(Arc::new))
-            .transpose();
+        let server = match model {
+            ModelName::Remote(_) => Some(Arc::new(access.server(job.sending).map_err(at_judge)?)),
+            _ => None,
+        };
         Ok(Some(Judge {
             model,
-            server: server.map_err(of_judge)?,
+            server,
             parameters: Parameters {
                 temperature: self.judge_temperature,
                 max_tokens: self.judge_max_tokens,

@@ -1,4 +1,4 @@
-//! The trials for the marks of the judge: [`marks`].
+//! The trials of the judge: [`plan_marks`].
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -14,19 +14,19 @@ use crate::runs::predictions::{AnswerState, predictions};
 use crate::types::{Digest, OpenDetail, QuestionId, Record, TrialKey};
 
 /// The prompt that asks the judge to mark an answer.
-pub(super) fn prompt(question: &OpenQuestion, answer: &str) -> Prompt {
+pub(super) fn mark_prompt(question: &OpenQuestion, answer: &str) -> Prompt {
     let extra = question.extra.as_deref();
     Prompt::from_text(judge_prompt(&question.text, &question.answer, extra, answer).into())
 }
 
-/// The key of a mark. The model and condition do not enter it, so the same answer to a question is judged once.
-fn key(judge: &ModelUnderTest, prompt: &Prompt) -> Result<TrialKey> {
+/// The key of a mark. It does not depend on model and condition, so that the same answer to a question is judged once.
+fn mark_key(judge: &ModelUnderTest, prompt: &Prompt) -> Result<TrialKey> {
     let facts = (judge.model.name(), &*judge.digest, &*prompt.before);
     Digest::canonical("darkqa.mark/2", &facts).map(Into::into)
 }
 
 /// The trials for all marks of a run, grouped by walk. Each distinct answer to a question is marked once.
-pub(super) fn marks(
+pub(super) fn plan_marks(
     setup: &OpenSetup<'_>,
     records: &[Record<OpenDetail>],
 ) -> Result<Vec<SourcePlan<OpenItem>>> {
@@ -46,8 +46,8 @@ pub(super) fn marks(
             continue;
         };
         let question = &setup.questions[prediction.question];
-        let prompt = prompt(question, &answer);
-        let key = key(judge, &prompt)?;
+        let prompt = mark_prompt(question, &answer);
+        let key = mark_key(judge, &prompt)?;
         if planned.insert(key) {
             by_walk[setup.walk_of(question)].push(Trial {
                 key,
@@ -60,7 +60,7 @@ pub(super) fn marks(
             });
         }
     }
-    let plan = by_walk
+    Ok(by_walk
         .into_iter()
         .enumerate()
         .map(|(source, trials)| SourcePlan {
@@ -69,6 +69,6 @@ pub(super) fn marks(
                 condition: None,
                 trials,
             }],
-        });
-    Ok(plan.collect())
+        })
+        .collect())
 }

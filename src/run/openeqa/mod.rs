@@ -1,7 +1,7 @@
-//! `openeqa`: open questions about walks through dark houses, and a judge that marks the answers.
+//! `openeqa`: asks open questions about walks through houses in low light, and has a judge mark the answers.
 //!
-//! The models are asked for the answers first, walk by walk. Then the judge is asked for the marks. Both use the engine of
-//! an evaluation. Models, levels, answers of people and judges may be added to a run.
+//! The models are asked for answers first, walk by walk. Then the judge is asked for marks. Both phases use the engine of an evaluation.
+//! Models, levels, human answers and judges may be added to a run later.
 
 mod answers_file;
 mod experiment;
@@ -24,7 +24,7 @@ pub(crate) use settings::OpenEqaArgs;
 use settings::OpenTask;
 use setup::OpenSetup;
 
-/// Asks the questions, writes them as a batch, or writes a study page, as the flags decide.
+/// Asks the questions, writes or submits them as a batch, or writes a study page, depending on the flags.
 ///
 /// # Errors
 /// If nothing can be asked, or no further trial could succeed. Replies that have arrived stay stored.

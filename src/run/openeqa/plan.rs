@@ -1,4 +1,4 @@
-//! The trials for the answers: [`answers`].
+//! The trials of the models: [`plan_answers`].
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::images::trials::{Prompt, SourcePlan, Trial, TrialGroup};
 use crate::types::{Condition, Digest, View};
 
 /// The trials of all answers, grouped by walk: first those without images, then those of each condition.
-pub(super) fn answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenItem>>> {
+pub(super) fn plan_answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenItem>>> {
     let mut by_walk = BTreeMap::<&str, Vec<&Arc<OpenQuestion>>>::new();
     for question in &setup.questions {
         by_walk.entry(&question.episode).or_default().push(question);
@@ -71,7 +71,7 @@ fn group(
     }))
 }
 
-/// The prompt of a question for a model that sees the walk, or for a blind one.
+/// The prompt of a question, for a model with images or a blind one.
 fn prompt(question: &OpenQuestion, view: View) -> Prompt {
     match view {
         View::Blind => Prompt::from_text(blind(&question.text).into()),

@@ -1,4 +1,4 @@
-//! The selection of questions from a file: [`select`].
+//! Selection of questions from a file: [`select`].
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
@@ -12,7 +12,7 @@ use crate::files::reading;
 use crate::text::words::first_names;
 use crate::types::Decides;
 
-/// Number of names that a message lists.
+/// Maximum number of names in a message.
 pub(super) const MAX_NAMED: usize = 3;
 
 /// The flags that select questions.
@@ -38,12 +38,15 @@ fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
     Ok(name.trim().to_owned())
 }
 
-/// The questions that are asked.
+/// Selects the questions to ask. Warns about ids of the subset that are not in the file.
+///
+/// # Errors
+/// If a split or category is not in the file, or no question is selected.
 pub(super) fn select(
     all: Vec<OpenQuestion>,
     selection: &OpenSelectionArgs,
 ) -> Result<Vec<OpenQuestion>> {
-    let subset = selection.subset.as_deref().map(ids).transpose()?;
+    let subset = selection.subset.as_deref().map(read_ids).transpose()?;
     if let (Some(subset), Some(path)) = (&subset, &selection.subset) {
         let known: BTreeSet<&str> = all.iter().map(|question| &*question.id.0).collect();
         let unknown: Vec<&str> = subset
@@ -68,15 +71,17 @@ pub(super) fn select(
     )?;
     let categories = all.iter().map(|question| &*question.category);
     check_known("--categories", &selection.categories, categories)?;
-    let has = |list: &[String], name: &str| list.is_empty() || list.iter().any(|one| one == name);
-    let questions = all.into_iter().filter(|question| {
-        has(&selection.splits, question.split())
-            && has(&selection.categories, &question.category)
-            && subset
-                .as_ref()
-                .is_none_or(|subset| subset.contains(&question.id.0))
-    });
-    let questions: Vec<OpenQuestion> = questions
+    let allows =
+        |list: &[String], name: &str| list.is_empty() || list.iter().any(|one| one == name);
+    let questions: Vec<OpenQuestion> = all
+        .into_iter()
+        .filter(|question| {
+            allows(&selection.splits, question.split())
+                && allows(&selection.categories, &question.category)
+                && subset
+                    .as_ref()
+                    .is_none_or(|subset| subset.contains(&question.id.0))
+        })
         .take(selection.limit.map_or(usize::MAX, usize::from))
         .collect();
     if questions.is_empty() {
@@ -93,8 +98,7 @@ fn check_known<'a>(
     known: impl Iterator<Item = &'a str>,
 ) -> Result<()> {
     let known: BTreeSet<&str> = known.collect();
-    let mut wanted = names.iter();
-    match wanted.find(|name| !known.contains(&***name)) {
+    match names.iter().find(|name| !known.contains(&***name)) {
         None => Ok(()),
         Some(missing) => {
             let known: Vec<&str> = known.into_iter().collect();
@@ -104,8 +108,8 @@ fn check_known<'a>(
     }
 }
 
-/// The ids in a file, a JSON array.
-fn ids(path: &Path) -> Result<BTreeSet<String>> {
+/// Reads question ids from a file with a JSON array.
+fn read_ids(path: &Path) -> Result<BTreeSet<String>> {
     let text = reading::bytes(path)?;
     serde_json::from_slice(&text).map_err(|e| {
         let problem = format!("{e}; a JSON array of question ids expected");

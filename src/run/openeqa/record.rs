@@ -1,4 +1,4 @@
-//! The subject of a trial ([`OpenItem`]): an open question, or an answer to be marked; and the record of either.
+//! The subject of a trial ([`OpenItem`]), which is an open question or an answer to mark, and its record.
 
 use std::sync::Arc;
 
@@ -11,12 +11,12 @@ use crate::types::{ExposureFacts, OpenDetail, Record, Step, WalkFacts};
 /// The subject of one trial.
 #[derive(Debug, Clone)]
 pub(crate) enum OpenItem {
-    /// An open question to a model.
+    /// An open question for a model.
     Answer(Arc<OpenQuestion>),
-    /// An answer for the judge to mark.
+    /// An answer for the judge.
     Mark {
         question: Arc<OpenQuestion>,
-        /// The answer as the judge sees it.
+        /// The answer as shown to the judge.
         answer: Arc<str>,
     },
 }
@@ -66,7 +66,7 @@ impl Item for OpenItem {
                 (None, OpenDetail { judged, ..detail })
             }
             Self::Answer(_) => {
-                let images = facts(&stimulus.images);
+                let images = walk_facts(&stimulus.images);
                 let detail = detail(question, Step::Answer);
                 (stimulus.condition.clone(), OpenDetail { images, ..detail })
             }
@@ -89,8 +89,8 @@ pub(super) fn detail(question: &OpenQuestion, step: Step) -> OpenDetail {
     }
 }
 
-/// The facts of all images of a stimulus together; `None` without images.
-fn facts(images: &[Arc<Payload>]) -> Option<WalkFacts> {
+/// Facts about all images of a stimulus together; `None` without images.
+fn walk_facts(images: &[Arc<Payload>]) -> Option<WalkFacts> {
     let first = images.first()?.facts();
     Some(WalkFacts {
         images: images.len(),

@@ -70,7 +70,7 @@ pub(crate) struct OpenEqaArgs {
     pub job: JobArgs,
 }
 
-/// The sampling seed that is sent to servers; `None` if none is sent.
+/// The sampling seed sent to servers; `None` to send none.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SamplingSeed(Option<u64>);
 
@@ -82,16 +82,16 @@ pub(crate) struct AnswersFile {
     pub path: PathBuf,
 }
 
-/// The settings of an evaluation by open questions, validated.
+/// Validated settings of an evaluation by open questions.
 #[derive(Debug)]
 pub(super) struct OpenEqa {
     pub(super) questions: PathBuf,
     pub(super) chosen: OpenSelectionArgs,
     pub(super) walk: Walk,
-    /// The rule by which images are read.
+    /// Rule for decoding images.
     pub(super) rule: ReadingRule,
     pub(super) answers: Vec<AnswersFile>,
-    /// The judge; `None` if the answers are not marked.
+    /// `None` if the answers are not marked.
     pub(super) judge: Option<Judge>,
     pub(super) protocol: Protocol,
     pub(super) task: OpenTask,
@@ -101,19 +101,19 @@ pub(super) struct OpenEqa {
 /// The task of the command.
 #[derive(Debug)]
 pub(super) enum OpenTask {
-    /// Ask the remaining trials; with `--dry-run` print the estimate of their cost.
+    /// Ask the remaining trials, or with `--dry-run` print an estimate.
     Run,
     /// Write the remaining trials as files of a Batch API.
     Batch(BatchFileArgs),
     /// Ask the remaining trials in batches.
     BatchRun(BatchFileArgs, BatchRunArgs),
-    /// Write a page on which people answer, into this folder.
+    /// Write a page for human answers into this folder.
     Study(PathBuf),
 }
 
 impl OpenEqaArgs {
-    /// A flag shared with an evaluation, with the default and help text of this command. The defaults are those of upstream,
-    /// and the levels those of the paper's table.
+    /// Adapts the default and help text of a flag shared with an evaluation to this command. The defaults are those of upstream, the levels
+    /// those of the paper's table.
     #[must_use]
     pub(crate) fn own(arg: Arg) -> Arg {
         match arg.get_id().as_str() {
@@ -135,7 +135,7 @@ impl OpenEqaArgs {
         }
     }
 
-    /// The settings, after reading the files and environment variables that the flags name.
+    /// Validates the flags, and reads the files and environment variables that they name.
     ///
     /// # Errors
     /// [`Error::Usage`], which names the flag with the invalid value.

@@ -15,25 +15,25 @@ use crate::images::frames::{Source, WalkFolder};
 use crate::images::progress::Progress;
 use crate::images::recipes::Recipe;
 use crate::images::trials::{check_enhanced, conditions};
-use crate::runs::part::part;
+use crate::runs::shard_sources::shard_questions;
 use crate::text::words::{counted, first_names};
 use crate::types::manifests::PartPlace;
 use crate::types::{Condition, FrameId, OpenDetail, QuestionId, Record, View};
 use darkqa_enhance::ModelFile;
 
-/// All data and models of an evaluation by open questions, opened and checked. Nothing is asked or written yet.
+/// Data and models of an evaluation by open questions, opened and checked. Nothing has been asked or written yet.
 pub(super) struct OpenSetup<'a> {
     pub(super) config: &'a OpenEqa,
-    /// The questions that are asked, in the order of the file.
+    /// The questions to ask, in the order of the file.
     pub(super) questions: Vec<Arc<OpenQuestion>>,
-    /// The place of each question among all that are selected, for models that are asked the first ones alone.
+    /// Position of each question among all selected ones, for models that are asked only the first few.
     pub(super) question_places: HashMap<QuestionId, usize>,
-    /// The index of each question in the file.
+    /// Index of each question in the file.
     pub(super) file_places: HashMap<QuestionId, usize>,
     pub(super) walks: WalkFolder,
-    /// The walks in the order in which questions name them.
+    /// The walks in the order of their first question.
     pub(super) sources: Vec<Source>,
-    /// Place of the walks among those of the whole run; `None` if this is the whole run.
+    /// Position of the walks within the whole run; `None` if this is the whole run.
     pub(super) part: Option<PartPlace>,
     pub(super) conditions: Vec<Condition>,
     pub(super) models: Vec<ModelUnderTest>,
@@ -44,7 +44,7 @@ pub(super) struct OpenSetup<'a> {
 }
 
 impl<'a> OpenSetup<'a> {
-    /// Opens the questions, the walks and the models. The files of the enhancers are read but not yet loaded.
+    /// Opens the questions, the walks and the models. Also returns the files of the enhancers, which are read but not yet loaded.
     pub(super) fn open(config: &'a OpenEqa, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
         let all = openeqa::read_questions(&config.questions)?;
@@ -54,12 +54,13 @@ impl<'a> OpenSetup<'a> {
         let ids = selected.iter().map(|question| question.id.clone());
         let question_places = ids.zip(0..).collect();
         let walk = |question: &OpenQuestion| question.episode.clone();
-        let (questions, part) = part(selected, job.shard, walk, |_| String::new(), |_| 1)?;
+        let (questions, part) =
+            shard_questions(selected, job.shard, walk, |_| String::new(), |_| 1)?;
         let models = models::open_all(&job.ask, &[], |name| {
             models::open(name, None, &Parameters::new(String::new()))
         })?;
-        let judge = config.judge.as_ref().map(judge).transpose()?;
-        // If no model or person sees a frame, none is read and no enhancer is opened.
+        let judge = config.judge.as_ref().map(open_judge).transpose()?;
+        // Without models or people that see frames, no frame is read and no enhancer is opened.
         let shows_frames = matches!(config.task, OpenTask::Study(_)) || job.shows_images();
         let files = if shows_frames {
             job.enhancers()?
@@ -74,7 +75,7 @@ impl<'a> OpenSetup<'a> {
             recipe
         };
         let walks = WalkFolder::new(&config.walk, config.rule);
-        let names = names(&questions);
+        let names = walk_names(&questions);
         let (sources, conditions) = if shows_frames {
             let sources = walks.inspect(&names, &config.walk, progress);
             warn_of_unseen(&sources, &questions)?;
@@ -103,23 +104,21 @@ impl<'a> OpenSetup<'a> {
             recipe,
             file_answers: Vec::new(),
         };
-        setup.file_answers = setup.answers_of_files()?;
+        setup.file_answers = setup.read_answers()?;
         Ok((setup, files))
     }
 
     /// The index in `sources` of the walk of a question.
     pub(super) fn walk_of(&self, question: &OpenQuestion) -> usize {
-        let place = self
-            .sources
+        self.sources
             .iter()
-            .position(|source| source.name.0 == question.episode);
-        place.unwrap_or_default()
+            .position(|source| source.name.0 == question.episode)
+            .unwrap_or_default()
     }
 
-    /// The answers from all `--answers` files.
-    fn answers_of_files(&self) -> Result<Vec<Record<OpenDetail>>> {
-        let models = self.models.iter();
-        let mut names: BTreeSet<&str> = models.map(|model| &*model.name).collect();
+    /// Reads the answers in all `--answers` files.
+    fn read_answers(&self) -> Result<Vec<Record<OpenDetail>>> {
+        let mut names: BTreeSet<&str> = self.models.iter().map(|model| &*model.name).collect();
         let mut all = Vec::new();
         for file in &self.config.answers {
             if !names.insert(&file.name) {
@@ -136,15 +135,15 @@ impl<'a> OpenSetup<'a> {
     }
 }
 
-fn judge(config: &Judge) -> Result<ModelUnderTest> {
+fn open_judge(config: &Judge) -> Result<ModelUnderTest> {
     let server = config.server.as_ref();
     let endpoint = server.map(|server| models::endpoint(server)).transpose()?;
     let model = models::open(&config.model, endpoint.as_ref(), &config.parameters)?;
     ModelUnderTest::new(model, View::Blind, server)
 }
 
-/// The distinct walks of the questions, in order of first use.
-fn names(questions: &[OpenQuestion]) -> Vec<String> {
+/// The distinct walks of the questions, in the order of their first question.
+fn walk_names(questions: &[OpenQuestion]) -> Vec<String> {
     let mut seen = BTreeSet::new();
     questions
         .iter()
@@ -153,7 +152,7 @@ fn names(questions: &[OpenQuestion]) -> Vec<String> {
         .collect()
 }
 
-/// Warns of the walks that have fewer frames than are shown: each image of a request is sent and paid for.
+/// Warns of walks with fewer frames than `--num-frames`, because repeated frames are sent and paid for several times.
 fn warn_of_repeated(sources: &[Source]) {
     let short: Vec<&Source> = sources
         .iter()
@@ -178,7 +177,10 @@ fn warn_of_repeated(sources: &[Source]) {
     }
 }
 
-/// Warns of the walks that cannot be shown; an error if none can be shown.
+/// Warns of walks that cannot be shown.
+///
+/// # Errors
+/// If no walk can be shown.
 fn warn_of_unseen(sources: &[Source], questions: &[OpenQuestion]) -> Result<()> {
     let missing: BTreeMap<&str, &str> = sources
         .iter()

@@ -1,11 +1,11 @@
-//! The study page of open questions: each person sees each walk in one condition only.
+//! The study page for open questions, on which each person sees each walk in one condition only.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use super::setup::OpenSetup;
 use crate::engine::experiment::Experiment as _;
-use crate::engine::limit;
+use crate::engine::image_limit;
 use crate::engine::pipeline;
 use crate::error::Result;
 use crate::files::write;
@@ -23,7 +23,7 @@ use crate::types::manifests::Status;
 use crate::types::{Condition, Digest};
 use darkqa_enhance::ModelFile;
 
-/// Writes the page and its images. Each image is the file that a model would be sent. The page has no true answers.
+/// Writes the page and its images. Each image has the same bytes as in a request to a model. The page contains no true answers.
 ///
 /// # Errors
 /// If a frame cannot be computed or a file cannot be written.
@@ -35,7 +35,7 @@ pub(super) fn pack(
 ) -> Result<Outcome> {
     let settings = setup.settings();
     let mut enhancers = OpenEnhancers::load(files, &settings.loading)?;
-    let limit = limit(settings);
+    let limit = image_limit(settings);
     let timings = Timings::default();
     let images = settings.images.open(settings.access)?;
     let mut pipeline = pipeline(setup, enhancers.take()?, limit, &timings);
@@ -53,11 +53,11 @@ pub(super) fn pack(
         let shown = workers.install(|| pipeline.images(walk, &conditions))?;
         let mut shots = Vec::new();
         for (condition, mut payloads) in conditions.iter().zip(shown) {
-            // A frame that repeats the one before it is shown once.
+            // Consecutive repetitions of a frame are shown once.
             payloads.dedup_by(|next, previous| Arc::ptr_eq(next, previous));
             let mut names = Vec::with_capacity(payloads.len());
             for (place, payload) in payloads.iter().enumerate() {
-                let name = image(&walk.name.0, condition, place, payload);
+                let name = image_name(&walk.name.0, condition, place, payload);
                 write(&folder.join(&name), payload.file())?;
                 names.push(name);
             }
@@ -101,7 +101,7 @@ pub(super) fn pack(
 }
 
 /// The file name of an image, which does not reveal the level.
-fn image(walk: &str, condition: &Condition, place: usize, payload: &Payload) -> String {
+fn image_name(walk: &str, condition: &Condition, place: usize, payload: &Payload) -> String {
     let digest = Digest::from_parts([walk.as_bytes(), condition.to_string().as_bytes()]);
     let ending = if payload.facts().format == "png" {
         "png"

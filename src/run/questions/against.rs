@@ -1,4 +1,4 @@
-//! `questions --against`: how the frames look, beside those of another set.
+//! `questions --against`: compares the look of the frames with that of another set.
 
 use rayon::prelude::*;
 
@@ -12,10 +12,10 @@ use crate::types::FrameId;
 use darkqa_questions::appearance::FrameAppearance;
 use darkqa_questions::colors::Palette;
 
-/// The frames of two sets beside each other.
+/// Compares the frames of two sets.
 ///
 /// # Errors
-/// If a set has no images, or one of them cannot be read: left out, it would change what is compared.
+/// If a set has no images, or an image cannot be read: leaving it out would bias the comparison.
 pub(super) fn compare(
     sets: [&Dataset; 2],
     palette: &Palette,

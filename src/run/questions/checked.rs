@@ -1,4 +1,4 @@
-//! The check of questions by people: the page, and the verdicts that it saves.
+//! Check of questions by people: writes the page ([`write_review`]), and reads the verdicts that it saves ([`read_verdicts`]).
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -23,7 +23,7 @@ struct CheckedLine {
     /// Name of the person; empty in files without names.
     #[serde(default)]
     person: String,
-    /// The person's answer before the true one was shown; `None` in files of verdicts alone.
+    /// The person's finding before the true answer was shown; `None` in files with verdicts only.
     #[serde(default)]
     found: Option<Found>,
     #[serde(default)]
@@ -74,12 +74,12 @@ enum Decision {
     Reject,
 }
 
-/// The verdicts in files. If several lines of a person are about one question, the last one counts. A question is rejected if any
-/// person rejects it.
+/// Reads the verdicts in files. If a person has several lines about a question, the last one counts. A question is rejected if any person
+/// rejects it.
 ///
 /// # Errors
-/// If a line is not a verdict; the error names the file and the line.
-pub(super) fn verdicts(files: &[PathBuf]) -> Result<Verdicts> {
+/// If a line is not a verdict; names the file and the line.
+pub(super) fn read_verdicts(files: &[PathBuf]) -> Result<Verdicts> {
     let mut rejections: BTreeSet<(QuestionId, String)> = BTreeSet::new();
     let mut verdicts = Verdicts::default();
     for path in files {
@@ -100,18 +100,18 @@ pub(super) fn verdicts(files: &[PathBuf]) -> Result<Verdicts> {
 }
 
 /// Writes the page on which people check all questions.
-pub(super) fn review(
+pub(super) fn write_review(
     path: &Path,
     dataset: &Dataset,
     frames: &[FrameStatistics],
     questions: &[GeneratedQuestion],
 ) -> Result<()> {
-    // The parent of a bare file name is empty, which stands for the folder in which the command runs.
-    let parent = path
+    // The parent of a bare file name is empty, which means the working directory.
+    let folder = path
         .parent()
-        .filter(|parent| !parent.as_os_str().is_empty());
-    let folder = parent.unwrap_or(Path::new("."));
-    // Links lead out of the folder as it is on disk, so it must be there before they are made.
+        .filter(|parent| !parent.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    // Relative links depend on the canonical path of the folder, so it must exist before they are made.
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
     let items = questions.iter().filter_map(|generated| {
         let frame = &generated.question.frame;
@@ -142,7 +142,7 @@ fn link(from: &Path, to: &Path) -> String {
     up.chain(down).collect::<Vec<_>>().join("/")
 }
 
-/// A name, percent-encoded as a part of a link (RFC 3986, section 2.3).
+/// Percent-encodes a name for a link (RFC 3986, section 2.3).
 fn escaped(name: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
     name.bytes()
@@ -174,14 +174,11 @@ mod tests {
         ]
         .map(|(id, verdict)| format!(r#"{{"id":"{id}","verdict":"{verdict}","frame":"x"}}"#));
         fs::write(&path, lines.join("\n\n")).unwrap();
-        let found = verdicts(std::slice::from_ref(&path)).unwrap();
+        let found = read_verdicts(std::slice::from_ref(&path)).unwrap();
         assert_eq!(found.rejected, [QuestionId("b".into())].into());
         assert!(found.checks.is_empty());
         fs::write(&path, "\n{\"id\":\"a\",\"verdict\":\"perhaps\"}\n").unwrap();
-        let error = super::verdicts(&[path])
-            .map(|_| ())
-            .unwrap_err()
-            .to_string();
+        let error = read_verdicts(&[path]).map(|_| ()).unwrap_err().to_string();
         assert!(
             error.contains("v.jsonl, line 2: unknown variant `perhaps`"),
             "{error}"
@@ -203,7 +200,7 @@ mod tests {
         let ben = line("ben", "a", "accept", "right") + &line("ben", "b", "accept", "right");
         fs::write(path("anna"), anna).unwrap();
         fs::write(path("ben"), ben).unwrap();
-        let found = verdicts(&[path("anna"), path("ben")]).unwrap();
+        let found = read_verdicts(&[path("anna"), path("ben")]).unwrap();
         assert_eq!(found.rejected, [QuestionId("a".into())].into());
         assert_eq!(found.checks.len(), 4);
         let check = &found.checks[&("anna".to_owned(), QuestionId("a".into()))];

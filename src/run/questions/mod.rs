@@ -1,4 +1,4 @@
-//! `questions`: making multiple-choice questions about frames, by rule.
+//! `questions`: makes multiple-choice questions about frames by rule.
 
 mod against;
 mod checked;
@@ -23,8 +23,8 @@ use crate::images::workers::{ThreadArgs, pool};
 use crate::report;
 use crate::report::questions::against::LookComparison;
 use crate::runs::Outcome;
-use crate::runs::part_args::{keep_part, part_of};
 use crate::runs::shard::Shard;
+use crate::runs::shard_args::{keep_shard, shard_from_flag};
 use crate::types::shell_word;
 use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
 use darkqa_questions::balance::BalanceMode;
@@ -38,7 +38,7 @@ use darkqa_questions::summary::QuestionSummary;
 use darkqa_questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
 
 use statistics_cache::StatisticsCache;
-use statistics_file::{parts_beside, statistics_path};
+use statistics_file::{shard_files, statistics_path};
 
 /// The flags of `questions`.
 #[derive(Debug, Args)]
@@ -123,7 +123,7 @@ fn family(name: &str) -> Result<Family, String> {
 /// The folder of frames.
 ///
 /// # Errors
-/// If there are several: a run takes one folder with the questions about it. The error names the command that joins them.
+/// If several are named, because a run takes only one. The message names the command that joins them.
 fn folder(args: &QuestionsArgs) -> Result<&Path> {
     match &*args.data {
         [folder] => Ok(folder),
@@ -141,16 +141,16 @@ fn folder(args: &QuestionsArgs) -> Result<&Path> {
     }
 }
 
-/// The flags, and the tables of rules and colours that they name.
-struct QuestionMaking<'a> {
+/// The flags, with the rules and colours read from the files that they name.
+struct QuestionSettings<'a> {
     args: &'a QuestionsArgs,
     rules: Rules,
     palette: Palette,
 }
 
-impl<'a> QuestionMaking<'a> {
+impl<'a> QuestionSettings<'a> {
     fn read(args: &'a QuestionsArgs) -> Result<Self> {
-        let palette = read(args.colors.as_deref(), Palette::parse)?;
+        let palette = read_table(args.colors.as_deref(), Palette::parse)?;
         Ok(Self {
             args,
             rules: rules(args.rules.as_deref())?,
@@ -158,7 +158,7 @@ impl<'a> QuestionMaking<'a> {
         })
     }
 
-    /// The families that are asked for; all that are made by rule, if none is named.
+    /// The families to make; all families of the paper if no flag names any.
     fn families(&self) -> BTreeSet<Family> {
         if self.args.families.is_empty() {
             Family::PAPER.into_iter().collect()
@@ -167,8 +167,8 @@ impl<'a> QuestionMaking<'a> {
         }
     }
 
-    /// The frames beside those of the other set that the flags name; `None` if they name none.
-    fn compared(&self, dataset: &Dataset, progress: &Progress) -> Result<Option<LookComparison>> {
+    /// The comparison with the set of `--against`; `None` without the flag.
+    fn comparison(&self, dataset: &Dataset, progress: &Progress) -> Result<Option<LookComparison>> {
         let args = self.args;
         let Some(folder) = &args.against else {
             return Ok(None);
@@ -179,7 +179,8 @@ impl<'a> QuestionMaking<'a> {
     }
 }
 
-fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T>> {
+/// Reads and parses a file; `None` if none was named.
+fn read_table<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T>> {
     let Some(path) = path else {
         return Ok(None);
     };
@@ -189,14 +190,12 @@ fn read<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Option<T
         .map_err(|e| e.at(path.display().to_string()))
 }
 
-/// Makes the questions and writes them.
-///
-/// If one frame fails, the error is logged and counted, and the others continue.
+/// Makes the questions and writes them. If a frame fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
 /// If there are no frames or no classes, or a file cannot be written.
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
-    let making = &QuestionMaking::read(args)?;
+    let settings = &QuestionSettings::read(args)?;
     let folder = folder(args)?;
     let dataset = Dataset::from_frames(folder, &args.folders.root.data_root)?;
     let dataset = dataset.with_rule(args.folders.decode.rule());
@@ -204,18 +203,18 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
         Error::data(folder.display(), problem)
     })?;
-    let shard = part_of(args.shard.as_deref())?;
-    let (frames, failed) = measured(making, (&dataset, labels), shard, progress)?;
+    let shard = shard_from_flag(args.shard.as_deref())?;
+    let (frames, failed) = measure_frames(settings, &dataset, labels, shard, progress)?;
     if shard.is_part() {
-        return Ok(part_measured(args, shard, frames.len(), failed));
+        return Ok(shard_outcome(args, shard, frames.len(), failed));
     }
-    let verdicts = checked::verdicts(&args.verdicts)?;
+    let verdicts = checked::read_verdicts(&args.verdicts)?;
     let request = QuestionRequest {
         dataset: dataset.title(),
         labels,
-        rules: &making.rules,
-        palette: &making.palette,
-        families: making.families(),
+        rules: &settings.rules,
+        palette: &settings.palette,
+        families: settings.families(),
         room_source: args.room,
         balance: args.balance,
         rejected: verdicts.rejected,
@@ -234,20 +233,20 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         write(path, &lines(candidates)?)?;
     }
     let summary = QuestionSummary::new(&frames, &generated, &request, failed);
-    let compared = making.compared(&dataset, progress)?;
-    let json = report::questions::json(&summary, &verdicts.checks, compared.as_ref())?;
+    let comparison = settings.comparison(&dataset, progress)?;
+    let json = report::questions::json(&summary, &verdicts.checks, comparison.as_ref())?;
     if let Some(folder) = &args.stats {
         write_statistics(folder, &summary, &json)?;
     }
     if let Some(page) = &args.review {
-        checked::review(page, &dataset, &frames, &generated.asked)?;
+        checked::write_review(page, &dataset, &frames, &generated.asked)?;
     }
-    warn(&generated, making);
+    warn(&generated, settings);
     let status = Outcome::complete_if(failed == 0);
     if args.json {
         return Ok(Outcome::text(status, json));
     }
-    let looks = compared
+    let looks = comparison
         .as_ref()
         .map_or_else(String::new, LookComparison::table);
     let table = report::questions::table(&summary);
@@ -256,7 +255,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
     Ok(Outcome::wrote(&args.out, status, output))
 }
 
-/// Writes the statistics into a folder in every form.
+/// Writes the statistics into a folder as JSON, CSV and SVG.
 fn write_statistics(folder: &Path, summary: &QuestionSummary, json: &str) -> Result<()> {
     let csv = report::questions::csv(summary)?;
     let figure = report::questions::figure::figure(summary)?;
@@ -266,14 +265,14 @@ fn write_statistics(folder: &Path, summary: &QuestionSummary, json: &str) -> Res
 }
 
 /// Warns of results that are valid but probably not intended.
-fn warn(generated: &Generated, making: &QuestionMaking<'_>) {
+fn warn(generated: &Generated, settings: &QuestionSettings<'_>) {
     for uneven in &generated.uneven {
         tracing::warn!("{uneven}");
     }
     let closest = generated.counts.get(&Family::Closest);
     let scale = closest.and_then(|tally| tally.rejections.get(&Reason::Scale));
     if let Some(frames) = scale {
-        let measure = &making.rules.book().measure;
+        let measure = &settings.rules.book().measure;
         tracing::warn!(
             "{frames} frames have a median depth outside {}–{} mm, which no room has, so no questions about depth are made; is their depth_scale right?",
             measure.least_median_depth_mm,
@@ -282,8 +281,8 @@ fn warn(generated: &Generated, making: &QuestionMaking<'_>) {
     }
 }
 
-/// The outcome of a call that measured a part. Questions are balanced over all frames, so that it makes none.
-fn part_measured(args: &QuestionsArgs, shard: Shard, frames: usize, failed: usize) -> Outcome {
+/// The outcome of a command with `--shard`, which measures frames but makes no questions, because these are balanced over all frames.
+fn shard_outcome(args: &QuestionsArgs, shard: Shard, frames: usize, failed: usize) -> Outcome {
     let path = statistics_path(&args.out, shard);
     let status = Outcome::complete_if(failed == 0);
     let output = format!(
@@ -293,33 +292,40 @@ fn part_measured(args: &QuestionsArgs, shard: Shard, frames: usize, failed: usiz
     Outcome::wrote(path, status, output)
 }
 
-/// The statistics of the frames of a part, and the number of frames that failed. Only frames that are not in the cache are measured.
-fn measured(
-    making: &QuestionMaking<'_>,
-    (dataset, labels): (&Dataset, &Labels),
+/// The statistics of the frames of a shard, and the number of failed frames. Frames in the cache are not measured again.
+fn measure_frames(
+    settings: &QuestionSettings<'_>,
+    dataset: &Dataset,
+    labels: &Labels,
     shard: Shard,
     progress: &Progress,
 ) -> Result<(Vec<FrameStatistics>, usize)> {
-    let out = &making.args.out;
-    let cache = StatisticsCache::open(&statistics_path(out, shard), &parts_beside(out)?)?;
-    let workers = pool(making.args.threads.threads)?;
-    let (mut names, tally): (Vec<&FrameId>, _) =
-        (dataset.frames().collect(), InputTally::default());
-    keep_part(&mut names, shard)?;
+    let out = &settings.args.out;
+    let cache = StatisticsCache::open(&statistics_path(out, shard), &shard_files(out)?)?;
+    let workers = pool(settings.args.threads.threads)?;
+    let mut names: Vec<&FrameId> = dataset.frames().collect();
+    keep_shard(&mut names, shard)?;
     let bar = progress.bar("frames", names.len());
-    let context = context(making, labels);
+    let measuring = Measuring {
+        settings,
+        dataset,
+        labels,
+        context: context_digest(settings, labels),
+        cache: &cache,
+        tally: InputTally::default(),
+    };
     let results: Vec<Option<FrameStatistics>> = workers.install(|| {
         names
             .par_iter()
             .map(|name| {
-                let found = measure_frame(making, dataset, labels, (&cache, &tally), context, name);
+                let found = measuring.measure_frame(name);
                 bar.inc();
                 found.map_err(|e| tracing::error!("{e}")).ok()
             })
             .collect()
     });
     drop(bar);
-    tally.warn();
+    measuring.tally.warn();
     let failed = results.iter().filter(|result| result.is_none()).count();
     let frames: Vec<FrameStatistics> = results.into_iter().flatten().collect();
     if frames.is_empty() {
@@ -332,12 +338,12 @@ fn measured(
     Ok((frames, failed))
 }
 
-/// The digest of everything that decides the statistics, except the frame.
-fn context(making: &QuestionMaking<'_>, labels: &Labels) -> Digest {
+/// Digest of everything except the frame that determines the statistics.
+fn context_digest(settings: &QuestionSettings<'_>, labels: &Labels) -> Digest {
     let version = statistics::VERSION.to_le_bytes();
     let parts = [
-        making.rules.measure_digest(),
-        making.palette.digest(),
+        settings.rules.measure_digest(),
+        settings.palette.digest(),
         labels.digest(),
     ];
     Digest::from_parts(
@@ -347,39 +353,46 @@ fn context(making: &QuestionMaking<'_>, labels: &Labels) -> Digest {
     )
 }
 
-fn measure_frame(
-    making: &QuestionMaking<'_>,
-    dataset: &Dataset,
-    labels: &Labels,
-    (cache, tally): (&StatisticsCache, &InputTally),
+/// The inputs and the cache for measuring frames.
+struct Measuring<'a> {
+    settings: &'a QuestionSettings<'a>,
+    dataset: &'a Dataset,
+    labels: &'a Labels,
+    /// From [`context_digest`].
     context: Digest,
-    name: &FrameId,
-) -> Result<FrameStatistics> {
-    let files = dataset.files(name)?;
-    tally.add(name, &files.note());
-    let content = files.digest()?;
-    let parts = [
-        &context.as_bytes()[..],
-        content.as_bytes(),
-        name.0.as_bytes(),
-    ];
-    let key = Digest::from_parts(parts);
-    let found = if let Some(found) = cache.get(key) {
-        found
-    } else {
-        let frame = files.decode()?;
-        let found = measure(&frame, labels, &making.rules, &making.palette, key)?;
-        cache.add(&found)?;
-        found
-    };
-    let unknown = unknown_labels(&found);
-    if making.args.strict && !unknown.is_empty() {
-        let problem = format_args!(
-            "its semantic map has the numbers {unknown:?}, which are not in classes.json"
-        );
-        return Err(Error::data(format_args!("frame {:?}", name.0), problem));
+    cache: &'a StatisticsCache,
+    tally: InputTally,
+}
+
+impl Measuring<'_> {
+    /// The statistics of a frame, from the cache or measured.
+    fn measure_frame(&self, name: &FrameId) -> Result<FrameStatistics> {
+        let files = self.dataset.files(name)?;
+        self.tally.add(name, &files.note());
+        let content = files.digest()?;
+        let key = Digest::from_parts([
+            &self.context.as_bytes()[..],
+            content.as_bytes(),
+            name.0.as_bytes(),
+        ]);
+        let found = if let Some(found) = self.cache.get(key) {
+            found
+        } else {
+            let frame = files.decode()?;
+            let QuestionSettings { rules, palette, .. } = self.settings;
+            let found = measure(&frame, self.labels, rules, palette, key)?;
+            self.cache.add(&found)?;
+            found
+        };
+        let unknown = unknown_labels(&found);
+        if self.settings.args.strict && !unknown.is_empty() {
+            let problem = format_args!(
+                "its semantic map has the numbers {unknown:?}, which are not in classes.json"
+            );
+            return Err(Error::data(format_args!("frame {:?}", name.0), problem));
+        }
+        Ok(found)
     }
-    Ok(found)
 }
 
 /// A question as a line of the output file, with the keys in this order.

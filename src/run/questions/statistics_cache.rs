@@ -1,7 +1,7 @@
-//! The cache of the statistics of frames, in a file next to the questions: [`StatisticsCache`].
+//! Cache of frame statistics in a file next to the questions: [`StatisticsCache`].
 //!
-//! The file has one line per frame. A line is added as soon as its frame is measured, so that an interrupted command
-//! continues there. At the end the file is rewritten in the order of the frames.
+//! The file has one line per frame. Each line is added as soon as its frame is measured, so that an interrupted command can continue. At the
+//! end the file is rewritten in the order of the frames.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -15,7 +15,7 @@ use crate::files::write;
 use crate::types::Digest;
 use darkqa_questions::statistics::FrameStatistics;
 
-/// The statistics of frames, by the digest of everything that decides them.
+/// Frame statistics, by the digest of everything that determines them.
 pub(super) struct StatisticsCache {
     path: PathBuf,
     known: HashMap<Digest, FrameStatistics>,
@@ -23,19 +23,22 @@ pub(super) struct StatisticsCache {
 }
 
 impl StatisticsCache {
-    /// Reads the file if it exists, and those of parts, which other calls wrote. A broken line, as the last one of an interrupted
-    /// command, is ignored: its frame is measured again.
-    pub(super) fn open(path: &Path, parts: &[PathBuf]) -> Result<Self> {
+    /// Reads the file, if it exists, and the files of shards. Broken lines, such as the last one of an interrupted command, are ignored:
+    /// their frames are measured again.
+    pub(super) fn open(path: &Path, shard_files: &[PathBuf]) -> Result<Self> {
         let mut known = HashMap::new();
-        for part in parts {
-            read(part, &mut known)?;
+        for file in shard_files {
+            read(file, &mut known)?;
         }
         let end = read(path, &mut known)?;
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
         }
-        let file = OpenOptions::new().create(true).append(true).open(path);
-        let mut file = file.map_err(|e| Error::file(path, "write", e))?;
+        let mut file = OpenOptions::new()
+            .create(true)
+            .append(true)
+            .open(path)
+            .map_err(|e| Error::file(path, "write", e))?;
         if end == FileEnd::Broken {
             // The next line must not continue a half-written one.
             file.write_all(b"\n")
@@ -69,16 +72,16 @@ impl StatisticsCache {
     }
 }
 
-/// How the lines of a file of statistics are.
+/// State of the lines of a file of statistics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FileEnd {
-    /// Each is complete, or there is no file.
+    /// All lines are complete, or the file does not exist.
     Complete,
-    /// One is no statistics: an interrupted command was writing it.
+    /// A line cannot be parsed, because a command was interrupted while writing it.
     Broken,
 }
 
-/// Adds the statistics in a file, if it exists, to those that are known.
+/// Adds the statistics in a file, if it exists, to `known`.
 fn read(path: &Path, known: &mut HashMap<Digest, FrameStatistics>) -> Result<FileEnd> {
     let file = match reading::open(path) {
         Ok(file) => file,

@@ -1,4 +1,4 @@
-//! The files of the statistics of frames, next to the questions: [`statistics_path`], [`parts_beside`].
+//! Paths of the files with frame statistics, next to the questions: [`statistics_path`], [`shard_files`].
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,24 +6,24 @@ use std::path::{Path, PathBuf};
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
 
-/// How the name of each file ends.
-const ENDING: &str = ".statistics.jsonl";
+/// Suffix of the file names.
+const SUFFIX: &str = ".statistics.jsonl";
 
-/// The file of a part; that of all frames for the whole.
+/// The file of a shard, or of all frames.
 pub(super) fn statistics_path(out: &Path, shard: Shard) -> PathBuf {
     let stem = stem(out);
     out.with_file_name(if shard.is_part() {
-        format!("{stem}.{}{ENDING}", shard.folder())
+        format!("{stem}.{}{SUFFIX}", shard.folder())
     } else {
-        format!("{stem}{ENDING}")
+        format!("{stem}{SUFFIX}")
     })
 }
 
-/// The files of parts that exist, of any divisions, in order.
+/// The existing files of shards, of any number of shards, sorted.
 ///
 /// # Errors
 /// If the folder cannot be read.
-pub(super) fn parts_beside(out: &Path) -> Result<Vec<PathBuf>> {
+pub(super) fn shard_files(out: &Path) -> Result<Vec<PathBuf>> {
     let folder = match out.parent() {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
@@ -31,17 +31,17 @@ pub(super) fn parts_beside(out: &Path) -> Result<Vec<PathBuf>> {
     if !folder.exists() {
         return Ok(Vec::new());
     }
-    let begin = format!("{}.shard-", stem(out));
-    let mut parts = Vec::new();
+    let prefix = format!("{}.shard-", stem(out));
+    let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))? {
         let path = entry.map_err(|e| Error::file(folder, "read", e))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        if name.starts_with(&begin) && name.ends_with(ENDING) {
-            parts.push(path);
+        if name.starts_with(&prefix) && name.ends_with(SUFFIX) {
+            files.push(path);
         }
     }
-    parts.sort();
-    Ok(parts)
+    files.sort();
+    Ok(files)
 }
 
 fn stem(out: &Path) -> String {

@@ -1,4 +1,4 @@
-//! The first pass over the pairs: which of them are pairs ([`check`]). Nothing is compared before it has ended.
+//! Checks which pairs can be compared, before any is compared: [`check`].
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::types::{FrameId, Pixels};
 use darkqa_score::photographs::realism::scene::{MIN_CORRELATION, SceneMatch};
 use darkqa_score::photographs::realism::{exposure_drop, same_size};
 
-/// Exposure drop in EV, up or down, below which a pair is hardly one in normal and low light (chosen).
+/// Absolute exposure drop in EV below which the images of a pair have nearly the same light (chosen).
 const SMALL_DROP: f32 = 0.5;
 
 /// A pair that can be compared.
@@ -25,38 +25,39 @@ pub(super) struct CheckedPair<'a> {
     pub scene: SceneMatch,
 }
 
-/// The light of a pair.
+/// Exposure drop and scene of a pair.
 struct PairLight {
+    /// Exposure drop in EV, as set or estimated.
     drop: f32,
-    /// Drop by the mean light of both images, in EV; `None` if one is black.
+    /// Exposure drop in EV estimated from the mean light of both images; `None` if one is black.
     estimated: Option<f32>,
     scene: SceneMatch,
 }
 
-/// The images of a pair: in normal light, which keeps its depth because it is made dark, and in low light. What their files state of
-/// their pixels is added to `tally`.
+/// Loads the images of a pair: in normal light at full bit depth, because it will be darkened, and in low light at 8 bits. The notes of
+/// the image files are added to `tally`.
 pub(super) fn load(
     args: &RealismArgs,
     pair: &Pair,
     tally: Option<&InputTally>,
 ) -> Result<(Pixels, Rgb)> {
-    let opened = |path: &Path| {
+    let open = |path: &Path| {
         let file = ImageFile::open(path, args.decode.rule())?;
         if let Some(tally) = tally {
             tally.add(&FrameId(path.display().to_string()), &file.note());
         }
         Ok(file)
     };
-    let normal = opened(&pair.normal)?.pixels()?;
-    let low = opened(&pair.low)?.decode()?;
+    let normal = open(&pair.normal)?.pixels()?;
+    let low = open(&pair.low)?.decode()?;
     same_size(&normal.codes(), &low)?;
     Ok((normal, low))
 }
 
-/// The pairs that can be compared, and the others by name. Each that is left out is logged with its reason.
+/// The pairs that can be compared, and the names of the others. Each pair left out is logged with the reason.
 ///
 /// # Errors
-/// If more than half of the pairs are swapped: then the folders are.
+/// If more than half of the pairs are swapped, because then the folders probably are.
 pub(super) fn check<'a>(
     args: &RealismArgs,
     pairs: &'a [Pair],
@@ -64,7 +65,9 @@ pub(super) fn check<'a>(
     workers: &PairWorkers<'_>,
 ) -> Result<(Vec<CheckedPair<'a>>, LeftOut)> {
     let tally = InputTally::default();
-    let lights = workers.map("pairs checked", pairs, |_, pair| light(args, pair, &tally));
+    let lights = workers.map("pairs checked", pairs, |_, pair| {
+        measure_light(args, pair, &tally)
+    });
     tally.warn();
     refuse_swapped_folders(args, place, &lights)?;
     if let Some(ev) = args.ev.filter(|ev| ev.abs() < SMALL_DROP) {
@@ -107,7 +110,7 @@ pub(super) fn check<'a>(
     Ok((checked, left_out))
 }
 
-fn light(args: &RealismArgs, pair: &Pair, tally: &InputTally) -> Result<PairLight> {
+fn measure_light(args: &RealismArgs, pair: &Pair, tally: &InputTally) -> Result<PairLight> {
     let (normal, low) = load(args, pair, Some(tally))?;
     let normal = normal.codes();
     let estimated = exposure_drop(&normal, &low);
@@ -123,13 +126,13 @@ fn light(args: &RealismArgs, pair: &Pair, tally: &InputTally) -> Result<PairLigh
 }
 
 impl PairLight {
-    /// Whether the low-light image is as bright as the other one, or brighter, and `--ev` does not state that this is meant.
+    /// True if the low-light image is at least as bright as the other one, unless `--ev` states so.
     fn is_swapped(&self, args: &RealismArgs) -> bool {
         let is_meant = args.ev.is_some_and(|drop| drop <= 0.0);
         !is_meant && self.estimated.is_some_and(|drop| drop <= 0.0)
     }
 
-    /// Logs what may make the comparison of a pair worthless.
+    /// Warns about reasons why the comparison of a pair may be meaningless.
     fn warn(&self, args: &RealismArgs, name: &str) {
         if args.ev.is_none() && self.drop.abs() < SMALL_DROP {
             tracing::warn!(
@@ -145,7 +148,7 @@ impl PairLight {
     }
 }
 
-/// Refuses folders most of whose pairs are swapped.
+/// Returns an error if most pairs are swapped.
 fn refuse_swapped_folders(
     args: &RealismArgs,
     place: &Path,
@@ -163,8 +166,10 @@ fn refuse_swapped_folders(
     if 2 * swapped.len() <= known.len() {
         return Ok(());
     }
-    let is_brighter = |light: &&&PairLight| light.estimated.is_some_and(|drop| drop < 0.0);
-    let how = if swapped.iter().any(is_brighter) {
+    let how = if swapped
+        .iter()
+        .any(|light| light.estimated.is_some_and(|drop| drop < 0.0))
+    {
         "brighter than"
     } else {
         "as bright as"

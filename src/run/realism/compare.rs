@@ -1,4 +1,4 @@
-//! Comparing each pair with its synthetic images ([`compare`]).
+//! Compares each pair with its synthetic images: [`compare`].
 
 use super::check::{CheckedPair, load};
 use super::fit::fitted_camera;
@@ -15,19 +15,19 @@ use darkqa_score::photographs::realism::{
     CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison, psnr,
 };
 
-/// The maximum number of pairs whose crops are shown (chosen).
-const MOST_CROPS: usize = 8;
+/// Maximum number of pairs whose crops are shown (chosen).
+const MAX_CROPS: usize = 8;
 
 /// The comparison of a pair, with the data for the figures.
 pub(super) struct PairWork {
     pub compared: PairComparison,
-    /// The residuals of the real image, and of those with noise.
+    /// Residuals of the real image, then of the images with noise.
     pub residuals: Vec<Residuals>,
-    /// The real image, the one by exposure alone and those with noise; `None` if no crops are shown.
+    /// The real image, the image with the exposure drop alone, then the images with noise; `None` if no crops are shown.
     pub images: Option<Vec<Rgb>>,
 }
 
-/// The comparisons of all pairs, and the names of those that failed. A failure is logged.
+/// The comparisons of all pairs, and the names of those that failed. Failures are logged.
 pub(super) fn compare(
     args: &RealismArgs,
     sensor: &SensorSettings,
@@ -36,7 +36,7 @@ pub(super) fn compare(
     workers: &PairWorkers<'_>,
 ) -> (Vec<PairWork>, Vec<String>) {
     let compared = workers.map("pairs", pairs, |index, checked| {
-        compare_pair(args, sensor, checked, fits, index < MOST_CROPS)
+        compare_pair(args, sensor, checked, fits, index < MAX_CROPS)
     });
     let (mut works, mut failed) = (Vec::new(), Vec::new());
     for (work, checked) in compared.into_iter().zip(pairs) {
@@ -51,7 +51,7 @@ pub(super) fn compare(
     (works, failed)
 }
 
-/// The ways of making noise for a pair: each noise profile with the given camera, and with the fitted one.
+/// The noise methods for a pair: each noise profile with the given camera, and with the fitted one.
 fn methods(
     sensor: &SensorSettings,
     fits: &[ReadingFit],
@@ -82,16 +82,16 @@ fn compare_pair(
     sensor: &SensorSettings,
     checked: &CheckedPair<'_>,
     fits: &[ReadingFit],
-    shown: bool,
+    with_images: bool,
 ) -> Result<PairWork> {
     let (normal, real) = load(args, checked.pair, None)?;
     let drop = f64::from(checked.drop);
     let exposure = expose_by(&normal, drop);
     let key = NoiseKey::new(sensor.seed, &FrameId(checked.pair.name.clone()));
-    let of_real = Residuals::new(&real, &exposure)?;
-    let measured = |image: &Rgb| -> Result<(ImageComparison, Residuals)> {
+    let real_residuals = Residuals::new(&real, &exposure)?;
+    let compare_image = |image: &Rgb| -> Result<(ImageComparison, Residuals)> {
         let residuals = Residuals::new(image, &exposure)?;
-        let kl = |rule| divergence(&of_real, &residuals, args.kl_bins, rule);
+        let kl = |rule| divergence(&real_residuals, &residuals, args.kl_bins, rule);
         let comparison = ImageComparison {
             psnr: psnr(&real, image)?,
             ssim: ssim(&real, image)?,
@@ -100,34 +100,34 @@ fn compare_pair(
         };
         Ok((comparison, residuals))
     };
-    let (of_exposure, _) = measured(&exposure)?;
+    let (exposure_comparison, _) = compare_image(&exposure)?;
     let (mut noise, mut residuals, mut images) = (Vec::new(), Vec::new(), Vec::new());
     for (method, synthesis) in methods(sensor, fits, &checked.pair.name)? {
         let state = synthesis.state_by(&key, drop);
-        let take = |terms: &[Term]| {
+        let render = |terms: &[Term]| {
             let (amplify, tone) = (synthesis.amplify, synthesis.tone);
             let headroom = synthesis.headroom_ev(drop);
             Negative::with_state(&normal, &key, &state, amplify, tone, terms, headroom)
                 .develop_by(drop)
         };
-        let (noisy, clean) = (take(&Term::ALL), take(&[]));
-        let (image, of_noise) = measured(&noisy)?;
+        let (noisy, clean) = (render(&Term::ALL), render(&[]));
+        let (image, noise_residuals) = compare_image(&noisy)?;
         noise.push(NoiseComparison {
             method,
             image,
             clean_psnr: psnr(&real, &clean)?,
         });
-        residuals.push(of_noise);
+        residuals.push(noise_residuals);
         images.push(noisy);
     }
-    residuals.insert(0, of_real.clone());
-    let images = shown.then(|| [vec![real, exposure.clone()], images].concat());
+    residuals.insert(0, real_residuals.clone());
+    let images = with_images.then(|| [vec![real, exposure.clone()], images].concat());
     Ok(PairWork {
         compared: PairComparison {
             pair: checked.pair.name.clone(),
             drop: checked.drop,
             scene: checked.scene,
-            exposure: of_exposure,
+            exposure: exposure_comparison,
             noise,
         },
         residuals,

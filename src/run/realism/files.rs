@@ -1,5 +1,5 @@
-//! The files that `realism` leaves: the numbers of each pair, the summary, the figures ([`write_files`]), the fitted gains and
-//! their cameras ([`write_fits`]).
+//! The output files of `realism`: numbers of each pair, summary and figures ([`write_files`]), fitted gains and camera files
+//! ([`write_fits`]).
 
 use std::fs;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub(super) fn write_files(out: &Path, works: &[PairWork], summary: &RealismSumma
     let compared: Vec<&PairComparison> = works.iter().map(|work| &work.compared).collect();
     write(&out.join("pairs.csv"), &report::pairs(&compared)?)?;
     write(&out.join("summary.json"), summary.json().as_bytes())?;
-    let pooled = pooled(works);
+    let pooled = pool_residuals(works);
     write(
         &out.join("residuals_by_code.csv"),
         &report::by_code(&pooled)?,
@@ -38,12 +38,13 @@ pub(super) fn write_files(out: &Path, works: &[PairWork], summary: &RealismSumma
     write(&out.join("crops.png"), &png(&report::crops(crops))?)
 }
 
-/// The residuals of all pairs together.
-fn pooled(works: &[PairWork]) -> PooledResiduals {
+/// The residuals of all pairs, pooled.
+fn pool_residuals(works: &[PairWork]) -> PooledResiduals {
     let sum = |index: usize| {
         let mut sum = Residuals::default();
-        let residuals = works.iter().filter_map(|work| work.residuals.get(index));
-        residuals.for_each(|residuals| sum.add(residuals));
+        for residuals in works.iter().filter_map(|work| work.residuals.get(index)) {
+            sum.add(residuals);
+        }
         sum
     };
     let noise = works.iter().take(1).flat_map(|work| &work.compared.noise);
@@ -56,8 +57,8 @@ fn pooled(works: &[PairWork]) -> PooledResiduals {
     }
 }
 
-/// Writes the fitted gains of each pair, and a camera file for each noise profile with fitted pairs. `fitted.toml` is the only
-/// one; of several, each has the name of its reading.
+/// Writes the fitted gains of each pair, and a camera file for each noise profile with fitted pairs: `fitted.toml` if there is one noise
+/// profile, else `fitted-PROFILE.toml`.
 pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ReadingFit]) -> Result<()> {
     if fits.is_empty() {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Fitting the gain of the sensor to pairs ([`fit`]), and the camera of the fitted gains ([`fitted_camera`]).
+//! Fits the gain of the sensor to pairs ([`fit`]), and makes the camera with fitted gains ([`fitted_camera`]).
 
 use super::check::{CheckedPair, load};
 use super::settings::RealismArgs;
@@ -13,10 +13,10 @@ use darkqa_score::photographs::realism::gain::{
 };
 use darkqa_score::photographs::realism::smooth::SmoothBlocks;
 
-/// The fits of all pairs, noise profile by noise profile. A pair that cannot be read is logged and left out.
+/// The fits to all pairs, one for each noise profile. Pairs that cannot be read are left out.
 ///
 /// # Errors
-/// If the camera takes none of the gains of the fit.
+/// If the camera does not accept the gains of the fit.
 pub(super) fn fit(
     args: &RealismArgs,
     sensor: &SensorSettings,
@@ -33,19 +33,26 @@ pub(super) fn fit(
         let (normal, low) = load(args, checked.pair, None).ok()?;
         Some(fit_pair(sensor.seed, &readings, checked, &normal, &low))
     });
-    let by_reading = readings.iter().enumerate().map(|(index, reading)| {
-        let of_pairs = pairs.iter().zip(&fits).filter_map(|(checked, fits)| {
-            Some(PairFit {
-                pair: checked.pair.name.clone(),
-                fit: *fits.as_ref()?.get(index)?,
-            })
-        });
-        ReadingFit::new(reading.name.clone(), reading.ratio(), of_pairs.collect())
-    });
-    Ok(by_reading.collect())
+    Ok(readings
+        .iter()
+        .enumerate()
+        .map(|(index, reading)| {
+            let pair_fits = pairs
+                .iter()
+                .zip(&fits)
+                .filter_map(|(checked, fits)| {
+                    Some(PairFit {
+                        pair: checked.pair.name.clone(),
+                        fit: *fits.as_ref()?.get(index)?,
+                    })
+                })
+                .collect();
+            ReadingFit::new(reading.name.clone(), reading.ratio(), pair_fits)
+        })
+        .collect())
 }
 
-/// A noise profile with the camera in the middle of its ranges, at each gain of the ladder.
+/// A noise profile with a camera at the middle of its ranges, for each gain of the ladder.
 struct FitReading {
     name: ReadingName,
     ladder: [Synthesis; LADDER_STEPS],
@@ -70,7 +77,7 @@ impl FitReading {
         })
     }
 
-    /// The ratio r, if it does not follow from the light.
+    /// The light ratio r; `None` if it depends on the exposure drop.
     fn ratio(&self) -> Option<f64> {
         let [synthesis, ..] = &self.ladder;
         let is_free = synthesis.coupling == Coupling::Independent;
@@ -78,7 +85,7 @@ impl FitReading {
     }
 }
 
-/// State of a camera in the middle of its ranges, which is the same for all frames.
+/// The state of a camera at the middle of its ranges, which is the same for all frames.
 fn fixed_state(synthesis: &Synthesis, drop_ev: f64) -> CameraState {
     synthesis.state_by(&NoiseKey::new(0, &FrameId(String::new())), drop_ev)
 }
@@ -91,7 +98,7 @@ fn fit_pair(
     normal: &Pixels,
     low: &Rgb,
 ) -> Vec<GainFit> {
-    // Other draws than those of the comparison: the noise of a synthetic low-light image of the same name must not be met again.
+    // The key differs from that of the comparison, so that fit and comparison do not share noise.
     let key = NoiseKey::new(seed, &FrameId(format!("fit of {}", checked.pair.name)));
     let drop = f64::from(checked.drop);
     let smooth = SmoothBlocks::new(&normal.codes(), drop);
@@ -102,7 +109,7 @@ fn fit_pair(
             let mut raw = None;
             let curves = reading.ladder.each_ref().map(|synthesis| {
                 let state = fixed_state(synthesis, drop);
-                // The colours of the camera, and so the image without noise, are the same at all gains.
+                // The clean RAW image is the same at all gains, because the colours of the camera are.
                 let headroom = synthesis.headroom_ev(drop);
                 let raw = raw.get_or_insert_with(|| CleanRaw::new(normal, state.clone(), headroom));
                 let negative = raw.negative(&key, &state, synthesis.amplify, synthesis.tone);

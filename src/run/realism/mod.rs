@@ -1,9 +1,9 @@
-//! `realism`: comparing the synthesis with real pairs of images in normal and low light, as the paper does on LLRGBD-real
-//! (DarkQA, Table I), and fitting the sensor's gain to them (`--fit`).
+//! `realism`: compares the synthesis with real pairs of images in normal and low light, as the paper does on LLRGBD-real (DarkQA, Table I),
+//! and fits the sensor's gain to them (`--fit`).
 //!
-//! The image in normal light is made as dark as its partner, by exposure drop alone and with sensor noise. Both results
-//! are compared with the real image. A residual is the difference from the clean image after the exposure drop. The
-//! residuals of the exposure drop alone are 0, so its divergence depends only on how empty bins are counted.
+//! The image in normal light is made as dark as its partner, by exposure drop alone and with sensor noise. Both results are compared with
+//! the real image. A residual is the difference from the clean image after the exposure drop. The residuals of the exposure drop alone
+//! are 0, so its divergence depends only on the treatment of empty bins.
 
 mod check;
 mod compare;
@@ -28,9 +28,7 @@ use darkqa_light::SensorSettings;
 use darkqa_score::photographs::realism::PairComparison;
 use darkqa_score::photographs::realism::gain::ReadingFit;
 
-/// Compares all pairs.
-///
-/// If one pair fails, the error is logged and counted, and the others continue.
+/// Compares all pairs. If one fails, the error is logged and counted, and the others continue.
 ///
 /// # Errors
 /// If there is no pair, none can be compared, most are swapped, or a file cannot be written.

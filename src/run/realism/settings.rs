@@ -10,8 +10,8 @@ use crate::types::Decides;
 use darkqa_light::SensorArgs;
 use darkqa_score::photographs::realism::residual::{Bins, EmptyBins};
 
-/// The minimum and maximum of `--ev`, in EV.
-const DROPS: [f32; 2] = [-20.0, 20.0];
+/// Minimum and maximum of `--ev`, in EV.
+const DROP_RANGE: [f32; 2] = [-20.0, 20.0];
 
 /// The flags of `realism`.
 #[derive(Debug, Args)]
@@ -63,10 +63,11 @@ pub(crate) struct RealismArgs {
     pub threads: ThreadArgs,
 }
 
-/// The exposure drop in a text, in EV.
+/// Parses an exposure drop in EV.
 fn drop_ev(text: &str) -> Result<f32, String> {
-    let [least, most] = DROPS;
-    let ev = text.parse().ok();
-    let ev = ev.filter(|ev| (least..=most).contains(ev));
-    ev.ok_or_else(|| format!("a number from {least} to {most} expected"))
+    let [min, max] = DROP_RANGE;
+    text.parse()
+        .ok()
+        .filter(|ev| (min..=max).contains(ev))
+        .ok_or_else(|| format!("a number from {min} to {max} expected"))
 }

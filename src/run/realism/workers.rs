@@ -1,18 +1,18 @@
-//! The threads that work on the pairs: [`PairWorkers`].
+//! Threads that process the pairs: [`PairWorkers`].
 
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::images::progress::Progress;
 
-/// Threads that work on the pairs, with the display of their progress.
+/// Threads that process the pairs, with a progress bar.
 pub(super) struct PairWorkers<'a> {
     pub pool: ThreadPool,
     pub progress: &'a Progress,
 }
 
 impl PairWorkers<'_> {
-    /// Applies `work` to each item and its index, and returns the results in the order of the items. `what` names them in the progress.
+    /// Applies `work` to each item and its index, and returns the results in order. `what` is the name of the items in the progress bar.
     pub(super) fn map<I: Sync, T: Send>(
         &self,
         what: &'static str,

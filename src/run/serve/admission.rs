@@ -1,4 +1,4 @@
-//! The requests that are answered: those of programs on this machine, and of no page of another site: [`admit`].
+//! Admission of requests from programs on this machine, but not from web pages of other sites: [`admit`].
 
 use std::future::poll_fn;
 use std::pin::Pin;
@@ -9,17 +9,17 @@ use hyper::{HeaderMap, Method, Request, StatusCode, Uri, header};
 
 use super::completion::RequestFault;
 
-/// The maximum size of a request in bytes (chosen).
-const LARGEST: usize = 64 << 20;
-/// How long a client may take for the body of a request. Chosen.
-const BODY_TIME: Duration = Duration::from_mins(1);
-/// The names of this machine for itself.
+/// Maximum size of a request body, in bytes (chosen).
+const MAX_BODY: usize = 64 << 20;
+/// Maximum time for receiving the body of a request (chosen).
+const BODY_TIMEOUT: Duration = Duration::from_mins(1);
+/// Host names of the loopback interface.
 const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "[::1]"];
 
 /// Checks the headers of a request to this port.
 ///
-/// A page in a browser may send requests here: its own name then stands in `Host` if it has a name that leads to this machine (DNS
-/// rebinding), and else in `Origin`; and without asking first it can send no JSON.
+/// A web page in a browser may send requests to loopback. If its domain resolves to this machine (DNS rebinding), `Host` has that domain;
+/// otherwise `Origin` has the site of the page. Without a CORS preflight, a page cannot send JSON.
 ///
 /// # Errors
 /// 421 for another host, 403 for a page of another site, 415 for a body that is not JSON.
@@ -29,7 +29,7 @@ pub(super) fn admit(request: &Request<Incoming>, port: u16) -> Result<(), Reques
         .uri()
         .authority()
         .map(|authority| authority.as_str().to_owned())
-        .or_else(|| text(headers, header::HOST));
+        .or_else(|| header_text(headers, header::HOST));
     let is_here = host.as_deref().is_some_and(|host| is_here(host, port));
     if !is_here {
         let message = format!("the host is neither 127.0.0.1:{port} nor localhost:{port}");
@@ -40,7 +40,7 @@ pub(super) fn admit(request: &Request<Incoming>, port: u16) -> Result<(), Reques
         let message = "requests from pages of other sites are not answered";
         return Err(RequestFault::new(StatusCode::FORBIDDEN, message));
     }
-    let kind = text(headers, header::CONTENT_TYPE).unwrap_or_default();
+    let kind = header_text(headers, header::CONTENT_TYPE).unwrap_or_default();
     let kind = kind.split(';').next().unwrap_or_default().trim();
     if request.method() == Method::POST && !kind.eq_ignore_ascii_case("application/json") {
         let message = "the header Content-Type: application/json is missing";
@@ -60,29 +60,33 @@ pub(super) async fn body(body: Incoming) -> Result<Vec<u8>, RequestFault> {
     let too_large = || {
         let message = format!(
             "the body is incomplete, or has more than {} MiB",
-            LARGEST >> 20
+            MAX_BODY >> 20
         );
         RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
     };
-    // What the client says of its length.
-    if body.size_hint().lower() > LARGEST as u64 {
+    // Check the announced length first.
+    if body.size_hint().lower() > MAX_BODY as u64 {
         return Err(too_large());
     }
-    let read = tokio::time::timeout(BODY_TIME, whole(body)).await;
-    let read = read.map_err(|_| {
-        let message = format!("the body did not arrive within {} s", BODY_TIME.as_secs());
-        RequestFault::new(StatusCode::REQUEST_TIMEOUT, message)
-    })?;
-    read.ok_or_else(too_large)
+    tokio::time::timeout(BODY_TIMEOUT, read_all(body))
+        .await
+        .map_err(|_| {
+            let message = format!(
+                "the body did not arrive within {} s",
+                BODY_TIMEOUT.as_secs()
+            );
+            RequestFault::new(StatusCode::REQUEST_TIMEOUT, message)
+        })?
+        .ok_or_else(too_large)
 }
 
 /// All bytes of a body; `None` if it is too large or breaks off.
-async fn whole(mut body: Incoming) -> Option<Vec<u8>> {
+async fn read_all(mut body: Incoming) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
     while let Some(frame) = poll_fn(|context| Pin::new(&mut body).poll_frame(context)).await {
-        // A frame without data is of trailers, which are ignored.
+        // A frame without data contains trailers, which are ignored.
         let data = frame.ok()?.into_data().unwrap_or_default();
-        if bytes.len() + data.len() > LARGEST {
+        if bytes.len() + data.len() > MAX_BODY {
             return None;
         }
         bytes.extend_from_slice(&data);
@@ -90,20 +94,21 @@ async fn whole(mut body: Incoming) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<String> {
+/// The value of a header; `None` if it is missing, repeated or not text.
+fn header_text(headers: &HeaderMap, name: header::HeaderName) -> Option<String> {
     let mut values = headers.get_all(name).into_iter();
     let first = values.next()?.to_str().ok()?.to_owned();
     values.next().is_none().then_some(first)
 }
 
-/// Whether a host with its port is this server.
+/// True if a host with a port is this server.
 fn is_here(host: &str, port: u16) -> bool {
     LOOPBACK
         .iter()
         .any(|name| host.eq_ignore_ascii_case(&format!("{name}:{port}")))
 }
 
-/// Whether an origin is a page of this machine, on any port.
+/// True if an origin is a page from this machine, on any port.
 fn is_local_page(origin: &str) -> bool {
     let Ok(origin) = origin.parse::<Uri>() else {
         return false;

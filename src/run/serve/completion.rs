@@ -1,14 +1,14 @@
-//! The response, a [`Completion`] or a [`RequestFault`], in OpenAI's format.
+//! Responses in OpenAI's format: [`Completion`] and [`RequestFault`].
 
 use hyper::header::{CONTENT_TYPE, HeaderValue};
 use hyper::{Response, StatusCode};
 use jiff::Timestamp;
 use serde_json::{Value, json};
 
-/// The content type of a response that is one JSON value.
+/// Content type of a JSON response.
 const JSON: &str = "application/json";
 
-/// A response with a body of a content type.
+/// A response with a body of the content type `kind`.
 fn response(status: StatusCode, kind: &'static str, body: String) -> Response<String> {
     let mut response = Response::new(body);
     *response.status_mut() = status;
@@ -17,7 +17,7 @@ fn response(status: StatusCode, kind: &'static str, body: String) -> Response<St
     response
 }
 
-/// The form of a response: one JSON body or a stream of events.
+/// Form of a response: a single JSON body or a stream of events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ReplyForm {
     Whole,
@@ -94,7 +94,7 @@ impl RequestFault {
         }
     }
 
-    /// The same error, with the name of the wrong parameter and a code.
+    /// Adds the name of the invalid parameter and an error code.
     pub(super) fn at(self, parameter: &'static str, code: &'static str) -> Self {
         Self {
             parameter: Some(parameter),
@@ -121,7 +121,7 @@ impl From<RequestFault> for Response<String> {
     }
 }
 
-/// The response with the list of models.
+/// The response that lists the models.
 pub(super) fn models<'a>(names: impl Iterator<Item = &'a str>) -> Response<String> {
     let models = names.map(
         |name| json!({"id": name, "object": "model", "created": 0, "owned_by": "darkqa-eval"}),

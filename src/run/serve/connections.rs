@@ -1,4 +1,4 @@
-//! The connections of the server, with bounds on their number and on how long a client may take: [`answer_until`].
+//! Connections of the server, with limits for their number and for the time of clients: [`answer_until`].
 
 use std::convert::Infallible;
 use std::future::Future;
@@ -13,16 +13,16 @@ use hyper_util::server::graceful::GracefulShutdown;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 
-/// The connections that are open at once; further ones wait. Chosen.
-const CONNECTIONS: usize = 64;
-/// How long a client may take for the headers of a request, and how long a connection may stay open without one. Chosen.
-const HEADER_TIME: Duration = Duration::from_secs(10);
-/// How long requests may still take after the end. Chosen.
-const LAST_TIME: Duration = Duration::from_secs(10);
-/// The pause after a connection could not be taken, as when no file is left. Chosen.
-const PAUSE: Duration = Duration::from_millis(100);
+/// Maximum number of open connections; further ones wait (chosen).
+const MAX_CONNECTIONS: usize = 64;
+/// Maximum time for receiving the headers of a request, which also limits idle connections (chosen).
+const HEADER_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time for finishing open requests after `end` (chosen).
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(10);
+/// Pause after a connection could not be accepted, for example because no file descriptor is free (chosen).
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Answers requests until `end`, and then those that have begun.
+/// Answers requests until `end`, then finishes the open ones.
 pub(super) async fn answer_until<S>(
     listener: TcpListener,
     service: S,
@@ -33,32 +33,32 @@ pub(super) async fn answer_until<S>(
         + Send
         + 'static,
 {
-    let free = Arc::new(Semaphore::new(CONNECTIONS));
+    let free = Arc::new(Semaphore::new(MAX_CONNECTIONS));
     let open = GracefulShutdown::new();
     let mut end = std::pin::pin!(end);
     loop {
-        let taken = async {
-            let place = Arc::clone(&free).acquire_owned().await;
-            (place, listener.accept().await)
+        let next = async {
+            let permit = Arc::clone(&free).acquire_owned().await;
+            (permit, listener.accept().await)
         };
-        let (place, accepted) = tokio::select! {
+        let (permit, accepted) = tokio::select! {
             () = &mut end => break,
-            taken = taken => taken,
+            next = next => next,
         };
         let Ok((stream, _)) = accepted else {
-            tokio::time::sleep(PAUSE).await;
+            tokio::time::sleep(ACCEPT_PAUSE).await;
             continue;
         };
         let connection = http1::Builder::new()
             .timer(TokioTimer::new())
-            .header_read_timeout(HEADER_TIME)
+            .header_read_timeout(HEADER_TIMEOUT)
             .serve_connection(TokioIo::new(stream), service.clone());
         let connection = open.watch(connection);
         tokio::spawn(async move {
-            // A client that breaks off or sends no HTTP has itself alone to tell.
+            // Errors such as a broken connection or invalid HTTP concern only the client.
             let _ = connection.await;
-            drop(place);
+            drop(permit);
         });
     }
-    let _ = tokio::time::timeout(LAST_TIME, open.shutdown()).await;
+    let _ = tokio::time::timeout(SHUTDOWN_TIMEOUT, open.shutdown()).await;
 }

@@ -1,15 +1,14 @@
-//! `serve`: the built-in models at an OpenAI-compatible endpoint on loopback, for trying clients and for CI without keys.
+//! `serve`: serves the built-in models at an OpenAI-compatible endpoint on loopback, for testing clients and for CI without keys.
 //!
-//! `POST /v1/chat/completions` takes a multiple-choice question with or without an image and answers with a letter; `GET
-//! /v1/models` lists the models. The observer must know which frame an image shows, and finds it by the image alone
-//! (`recognise`). Only requests of programs on this machine are answered, and of no page of another site (`admission`). Any key is
-//! accepted, and nothing is charged or stored.
+//! `POST /v1/chat/completions` takes a multiple-choice question with or without an image and answers with a letter; `GET /v1/models` lists
+//! the models. The observer must know which frame an image shows, and finds it by the image alone ([`frame_matcher`]). Only programs on
+//! this machine are answered, not web pages of other sites ([`admission`]). Any key is accepted, and nothing is charged or stored.
 
 mod admission;
 mod completion;
 mod connections;
-mod puzzle;
-mod recognise;
+mod frame_matcher;
+mod parsed_question;
 mod request;
 
 use std::convert::Infallible;
@@ -39,14 +38,14 @@ use darkqa_questions::rules::Rules;
 
 use admission::{admit, body};
 use completion::{Completion, RequestFault};
-use puzzle::Puzzle;
-use recognise::FrameMatcher;
+use frame_matcher::FrameMatcher;
+use parsed_question::ParsedQuestion;
 use request::ServedQuestion;
 
-/// The requests that are answered at once; further ones wait. Chosen.
-const AT_ONCE: usize = 16;
+/// Maximum number of requests answered in parallel; further ones wait (chosen).
+const MAX_PARALLEL: usize = 16;
 
-/// The paths of the server.
+// Paths of the server.
 const MODELS: &str = "/v1/models";
 const COMPLETIONS: &str = "/v1/chat/completions";
 
@@ -69,13 +68,13 @@ pub(crate) struct ServeArgs {
 
 /// The state that all requests share.
 struct ServerState {
-    likenesses: FrameMatcher,
-    /// The models by their names at this endpoint. They differ from `--model observer`, which runs without an endpoint.
+    frame_matcher: FrameMatcher,
+    /// The models, by their names at this endpoint. The names differ from `observer` and `random`, which run without an endpoint.
     models: [(&'static str, Model); 2],
-    /// Places for requests that are answered.
-    places: Semaphore,
-    /// Whether an image has come that shows no frame.
-    met_unknown: AtomicBool,
+    /// Permits for answering requests.
+    permits: Semaphore,
+    /// True after the first image that shows no frame.
+    has_seen_unknown: AtomicBool,
 }
 
 /// Answers requests until the process is interrupted.
@@ -83,25 +82,24 @@ struct ServerState {
 /// # Errors
 /// If the frames cannot be read, or another process uses the port.
 pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
-    // A port that is taken is an error before any frame is drawn.
+    // Bind first, so that a used port is reported before any frame is drawn.
     let listener = bind(args.port)?;
     let dataset = Arc::new(Dataset::open_without_questions(
         &args.data,
         &args.root.data_root,
     )?);
     let prior = Random { seed: args.seed };
-    let observer = Observer::open(&dataset, &args.data, &[], Rules::built_in()?);
-    let observer = observer.map_err(|e| e.usage_at("--data"))?;
+    let observer = Observer::open(&dataset, &args.data, &[], Rules::built_in()?)
+        .map_err(|e| e.usage_at("--data"))?;
     let models = [
         ("darkqa-observer", Model::Local(observer.model(None, prior))),
         ("darkqa-random", Model::Random(prior)),
     ];
-    let likenesses = FrameMatcher::new(&dataset, progress)?;
     let state = Arc::new(ServerState {
-        likenesses,
+        frame_matcher: FrameMatcher::new(&dataset, progress)?,
         models,
-        places: Semaphore::new(AT_ONCE),
-        met_unknown: AtomicBool::new(false),
+        permits: Semaphore::new(MAX_PARALLEL),
+        has_seen_unknown: AtomicBool::new(false),
     });
     let runtime = runtime::Builder::new_multi_thread()
         .enable_all()
@@ -111,16 +109,17 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
     Ok(Outcome::text(Status::Complete, String::new()))
 }
 
-/// A listener at a port of this machine.
+/// A non-blocking listener at a loopback port.
 fn bind(port: u16) -> Result<TcpListener> {
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
-    let listener = TcpListener::bind(address);
-    let listener = listener.and_then(|listener| listener.set_nonblocking(true).map(|()| listener));
-    listener.map_err(|e| {
-        let problem =
-            format!("cannot listen at {address}: {e}; --port N takes another port, 0 any free one");
-        Error::usage("--port", problem)
-    })
+    TcpListener::bind(address)
+        .and_then(|listener| listener.set_nonblocking(true).map(|()| listener))
+        .map_err(|e| {
+            let problem = format!(
+                "cannot listen at {address}: {e}; --port N takes another port, 0 any free one"
+            );
+            Error::usage("--port", problem)
+        })
 }
 
 async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progress) -> Result<()> {
@@ -132,7 +131,7 @@ async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progr
         "models: {}; no key is needed; Ctrl-C ends it",
         names.join(", ")
     ));
-    // A client may wait for the address on standard output. A closed output is ignored.
+    // A client may wait for the address on standard output. Ignore a closed output.
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "http://{address}/v1").and_then(|()| out.flush());
     drop(out);
@@ -149,7 +148,7 @@ async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progr
     Ok(())
 }
 
-/// Answers a request if it may be answered.
+/// Answers a request, if it is admitted.
 async fn respond(
     state: &ServerState,
     request: Request<Incoming>,
@@ -159,9 +158,9 @@ async fn respond(
     match (request.method(), request.uri().path()) {
         (&Method::GET | &Method::HEAD, MODELS) => Ok(completion::models(state.names())),
         (&Method::POST, COMPLETIONS) => {
-            // Before a place is taken: a slow client holds none.
+            // Read the body before taking a permit, so that a slow client does not block others.
             let body = body(request.into_body()).await?;
-            let _place = state.places.acquire().await;
+            let _permit = state.permits.acquire().await;
             Ok(state.answer(&body).await?.into())
         }
         (_, path) => {
@@ -181,7 +180,7 @@ impl ServerState {
     }
 
     async fn answer(&self, body: &[u8]) -> Result<Completion, RequestFault> {
-        let request = ServedQuestion::read(body)?;
+        let request = ServedQuestion::parse(body)?;
         let model = self.models.iter().find(|(name, _)| *name == request.model);
         let (_, model) = model.ok_or_else(|| {
             let names: Vec<&str> = self.names().collect();
@@ -192,26 +191,27 @@ impl ServerState {
             );
             RequestFault::new(StatusCode::NOT_FOUND, message).at("model", "model_not_found")
         })?;
-        let puzzle = Puzzle::read(&request.text)?;
+        let parsed = ParsedQuestion::parse(&request.text)?;
         let frame = request
             .image
             .as_ref()
-            .and_then(|(image, _)| self.likenesses.best_match(image));
-        if request.image.is_some() && frame.is_none() && !self.met_unknown.swap(true, Relaxed) {
+            .and_then(|(image, _)| self.frame_matcher.best_match(image));
+        if request.image.is_some() && frame.is_none() && !self.has_seen_unknown.swap(true, Relaxed)
+        {
             tracing::warn!(
                 "an image shows none of the {} frames of --data: about such images the observer guesses, too",
-                self.likenesses.len()
+                self.frame_matcher.len()
             );
         }
-        let words = Digest::from_bytes(request.text.as_bytes()).to_string();
+        let text_digest = Digest::from_bytes(request.text.as_bytes()).to_string();
         let image = request.image.as_ref().map(|(_, payload)| payload);
         let images = image.map(std::slice::from_ref);
-        let seen = image.map_or_else(String::new, |image| image.facts().digest.to_string());
+        let image_digest = image.map_or_else(String::new, |image| image.facts().digest.to_string());
         let question = Question {
-            id: QuestionId(format!("{words} {seen}")),
+            id: QuestionId(format!("{text_digest} {image_digest}")),
             family: Family::Other(String::new()),
-            text: puzzle.question,
-            choices: Choices::new(puzzle.choices, 0)
+            text: parsed.question,
+            choices: Choices::new(parsed.choices, 0)
                 .map_err(|e| RequestFault::new(StatusCode::BAD_REQUEST, e.to_string()))?,
             group: None,
             evidence: serde_json::Value::Null,

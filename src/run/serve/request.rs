@@ -1,4 +1,4 @@
-//! The question of a request: [`ServedQuestion`].
+//! Parses a request: [`ServedQuestion`].
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::picture::{ImageFile, ReadingRule};
 use crate::picture::{Payload, PayloadFormat};
 use crate::types::Rgb;
 
-/// The fields of a request that are used. Other fields are ignored.
+/// The used fields of a request. Other fields are ignored.
 #[derive(Deserialize)]
 struct ChatBody {
     model: String,
@@ -46,7 +46,7 @@ struct ImageLink {
     url: String,
 }
 
-/// The question of a request: a model, the text and the image.
+/// Model, text and image of a request.
 pub(super) struct ServedQuestion {
     pub(super) model: String,
     /// The texts of all messages, joined.
@@ -57,12 +57,15 @@ pub(super) struct ServedQuestion {
 }
 
 impl ServedQuestion {
-    /// The question in the body of a request.
-    pub(super) fn read(body: &[u8]) -> Result<Self, RequestFault> {
+    /// Parses the body of a request.
+    ///
+    /// # Errors
+    /// 400 if the body is not a chat completion, a message has several images, or an image cannot be decoded.
+    pub(super) fn parse(body: &[u8]) -> Result<Self, RequestFault> {
         let wrong = |message: String| RequestFault::new(StatusCode::BAD_REQUEST, message);
         let body: ChatBody = serde_json::from_slice(body)
             .map_err(|e| wrong(format!("the request is not a valid chat completion: {e}")))?;
-        let (mut text, mut image, mut most) = (String::new(), None, 0);
+        let (mut text, mut image, mut max_images) = (String::new(), None, 0);
         let mut append = |words: &str| {
             text.push_str(words);
             text.push('\n');
@@ -72,8 +75,11 @@ impl ServedQuestion {
                 None => {}
                 Some(Content::Text(words)) => append(&words),
                 Some(Content::Parts(parts)) => {
-                    let is_image = |part: &&Part| matches!(part, Part::ImageUrl { .. });
-                    most = most.max(parts.iter().filter(is_image).count());
+                    let images = parts
+                        .iter()
+                        .filter(|part| matches!(part, Part::ImageUrl { .. }))
+                        .count();
+                    max_images = max_images.max(images);
                     for part in parts {
                         match part {
                             Part::Text { text } => append(&text),
@@ -83,14 +89,15 @@ impl ServedQuestion {
                 }
             }
         }
-        if most > 1 {
-            let message = format!("a message shows {most} images, and these models look at one");
+        if max_images > 1 {
+            let message =
+                format!("a message shows {max_images} images, and these models look at one");
             return Err(wrong(message).at("image_url", "invalid_image_url"));
         }
         Ok(Self {
             model: body.model,
             text,
-            image: image.map(|url| pixels(&url)).transpose()?,
+            image: image.map(|url| decode_data_url(&url)).transpose()?,
             form: if body.stream == Some(true) {
                 ReplyForm::Stream
             } else {
@@ -100,20 +107,20 @@ impl ServedQuestion {
     }
 }
 
-/// The pixels of a data URL, and the payload for the model.
-fn pixels(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
+/// Decodes the image of a data URL; also returns the payload for the model.
+fn decode_data_url(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
     let wrong = |message: String| {
         RequestFault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
     };
-    let data = url
+    let (_, data) = url
         .strip_prefix("data:image/")
-        .and_then(|rest| rest.split_once(";base64,"));
-    let (_, data) = data.ok_or_else(|| {
-        wrong(
-            "only data URLs are accepted: data:image/png;base64,… or data:image/jpeg;base64,…"
-                .to_owned(),
-        )
-    })?;
+        .and_then(|rest| rest.split_once(";base64,"))
+        .ok_or_else(|| {
+            wrong(
+                "only data URLs are accepted: data:image/png;base64,… or data:image/jpeg;base64,…"
+                    .to_owned(),
+            )
+        })?;
     let bytes = STANDARD
         .decode(data)
         .map_err(|e| wrong(format!("the image is not base64: {e}")))?;

@@ -1,4 +1,4 @@
-//! An item of a run with the replies to it, as text: [`ShownItem`].
+//! A question of a run with the replies to it, as text: [`ShownItem`].
 
 use std::fmt::Write;
 
@@ -9,20 +9,20 @@ use crate::types::manifests::RunManifest;
 use crate::types::questions::letter;
 use crate::types::{Condition, Digest, FrameId, OpenDetail, Record, RunQuestion};
 
-/// The reply of one model to the item, in one condition.
+/// The reply of a model to the item in a condition.
 pub(super) struct ShownAnswer {
     pub(super) model: String,
     pub(super) condition: Option<Condition>,
-    /// The outcome of the trial, in the words of the report.
+    /// Outcome of the trial, in the words of the report.
     pub(super) outcome: String,
     pub(super) reply: String,
-    /// The frame or walk that was shown.
+    /// The frame or walk shown.
     pub(super) shown: FrameId,
-    /// The digest of the image that was sent, or of all images of a walk.
+    /// Digest of the image sent, or of all images of a walk.
     pub(super) sent: Option<Digest>,
 }
 
-/// The item and the replies to it.
+/// A question and the replies to it.
 pub(super) struct ShownItem {
     pub(super) source: FrameId,
     pub(super) text: String,
@@ -87,7 +87,7 @@ fn choice_answer(record: &Record) -> ShownAnswer {
         model: record.model.clone(),
         condition: record.condition.clone(),
         outcome: outcome_words::outcome(record),
-        reply: reply(record),
+        reply: reply_excerpt(record),
         shown: record.detail.shown().clone(),
         sent: record.detail.sent(),
     }
@@ -114,14 +114,14 @@ fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
             (None, Some(_)) => "marked".to_owned(),
             (None, None) => "answered".to_owned(),
         },
-        reply: reply(record),
+        reply: reply_excerpt(record),
         shown: FrameId(record.detail.episode.clone()),
         sent: record.detail.images.as_ref().map(|images| images.digest),
     }
 }
 
-/// The head of the reply; of a refusal, or of what the error states, if there is none.
-fn reply<D>(record: &Record<D>) -> String {
+/// The first 200 characters of the reply, of the refusal, or of the error.
+fn reply_excerpt<D>(record: &Record<D>) -> String {
     let text = record.text_or_error().unwrap_or_default();
     text.chars().take(200).collect()
 }

@@ -14,8 +14,8 @@ use crate::error::{Error, Result};
 use crate::files::write;
 use crate::picture::Payload;
 use crate::runs::Outcome;
-use crate::runs::rebuild::ImageRebuilder;
-use crate::runs::run_parts::any_run;
+use crate::runs::image_rebuilder::ImageRebuilder;
+use crate::runs::sharded_run::open_any_run;
 use crate::types::{Condition, Digest, FrameId};
 
 use item::{ShownAnswer, ShownItem, read};
@@ -32,7 +32,7 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     }
     let folder = args.run.clone();
     let name = args.question_id();
-    let (manifest, item) = read(any_run(&folder)?, name)?;
+    let (manifest, item) = read(open_any_run(&folder)?, name)?;
     let Some(item) = item else {
         let problem = format!(
             "no question {name:?} in this run; report.html and questions.jsonl have their ids"

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::runs::rebuild::RebuildArgs;
+use crate::runs::image_rebuilder::RebuildArgs;
 use crate::types::{Condition, Decides};
 
 /// The flags of `show`.

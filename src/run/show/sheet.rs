@@ -1,4 +1,4 @@
-//! `show --sheet`: one item over the levels and the curves of its run, as one picture: [`sheet`].
+//! `show --sheet`: draws the images of one item at all levels, and the curves of its run, as one picture: [`sheet`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -14,18 +14,18 @@ use crate::images::notes::montage;
 use crate::picture::{Payload, PayloadFormat};
 use crate::run_reports::story_curves;
 use crate::runs::Outcome;
-use crate::runs::rebuild::ImageRebuilder;
-use crate::runs::run_parts::choice_run;
+use crate::runs::image_rebuilder::ImageRebuilder;
+use crate::runs::sharded_run::open_choice_run;
 use crate::types::degradations::Kind;
 use crate::types::manifests::{RunManifest, Status};
 use crate::types::{AxisLevel, Condition, Record, Rgb, TrialOutcome, Variant};
 use darkqa_score::subject::is_control;
 
-/// Draws the picture and writes it. The outcome states which conditions are left out, and which images are not those that were sent.
+/// Draws and writes the picture. The outcome lists the conditions left out, and the images that differ from those sent.
 ///
 /// # Errors
-/// If the folder holds no run of questions with choices, the run has no dark images, it did not ask the item with images, or an
-/// image cannot be made again.
+/// If the folder has no run of questions with choices, the run has no degraded images, it did not ask the item with images, or an image
+/// cannot be rebuilt.
 pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
     let format = format(path)?;
     let item = SheetItem::read(args)?;
@@ -34,7 +34,7 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
     let cell = |condition: &Condition| -> Option<Result<StoryCell>> {
         let image = images.get(condition)?;
         let marks = item.marks(condition);
-        Some(picture(image).map(|image| StoryCell { image, marks }))
+        Some(cell_image(image).map(|image| StoryCell { image, marks }))
     };
     let drawn = rows.iter().map(|(name, conditions)| {
         let cells = conditions
@@ -54,14 +54,14 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
     });
     write(path, Payload::encode(&picture, format)?.file())?;
     let left_out = item
-        .asked()
+        .asked_conditions()
         .filter(|condition| !images.contains_key(condition));
     let changed = images
         .iter()
         .filter(|(condition, image)| item.is_changed(condition, image));
-    let changed = names(changed.map(|(condition, _)| condition));
+    let changed = condition_names(changed.map(|(condition, _)| condition));
     let drawn = format!("{}: the item over the levels\n", path.display());
-    let left_out = names(left_out).map(|names| format!("not drawn: {names}\n"));
+    let left_out = condition_names(left_out).map(|names| format!("not drawn: {names}\n"));
     let note = changed.as_ref().map(|names| {
         format!(
             "NOT the bytes that were sent: {names}; the data, an enhancer or this program has changed since the run\n"
@@ -77,8 +77,8 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
     ))
 }
 
-/// The image of a cell; several stand beside each other.
-fn picture(images: &[Arc<Payload>]) -> Result<Rgb> {
+/// The image of a cell; several images are placed side by side.
+fn cell_image(images: &[Arc<Payload>]) -> Result<Rgb> {
     let mut images: Vec<Rgb> = images
         .iter()
         .map(|image| image.decode())
@@ -89,20 +89,20 @@ fn picture(images: &[Arc<Payload>]) -> Result<Rgb> {
     }
 }
 
-/// Conditions as a list of names; `None` if there are none.
-fn names<'a>(conditions: impl Iterator<Item = &'a Condition>) -> Option<String> {
+/// The names of conditions, joined by commas; `None` if there are none.
+fn condition_names<'a>(conditions: impl Iterator<Item = &'a Condition>) -> Option<String> {
     let names: BTreeSet<String> = conditions.map(ToString::to_string).collect();
     let names: Vec<String> = names.into_iter().collect();
     (!names.is_empty()).then(|| names.join(", "))
 }
 
-/// The name of each row of images, and the condition of each of its columns; `None` where the item was not asked.
+/// The name of each row of images, and the condition of each column; `None` if the item was not asked in it.
 type SheetRows = Vec<(String, Vec<Option<Condition>>)>;
 
-/// An item of a run, with what the picture needs of the run.
+/// An item, with the data of its run that the picture needs.
 struct SheetItem {
     manifest: RunManifest,
-    /// The records of the item with images, at least one.
+    /// The records of the item with images; not empty.
     records: Vec<Record>,
     /// The question, and its choices in one line.
     question: Vec<String>,
@@ -112,7 +112,7 @@ struct SheetItem {
 
 impl SheetItem {
     fn read(args: &ShowArgs) -> Result<Self> {
-        let run = choice_run(&args.run, "--sheet draws questions with choices")?;
+        let run = open_choice_run(&args.run, "--sheet draws questions with choices")?;
         let run =
             run.with_truths("--sheet draws accuracy; leave it out to see the images and replies")?;
         let problem = |problem: String| Error::Run {
@@ -139,7 +139,7 @@ impl SheetItem {
         let conditions = records
             .iter()
             .filter_map(|record| record.condition.as_ref());
-        // The picture has one axis, that of the curves.
+        // The picture shows only the axis of the curves.
         let axis = curves.variant.kind.map(Kind::axis);
         let levels = conditions
             .map(Condition::level)
@@ -153,14 +153,14 @@ impl SheetItem {
         })
     }
 
-    /// The conditions that the item was asked in.
-    fn asked(&self) -> impl Iterator<Item = &Condition> {
+    /// The conditions in which the item was asked.
+    fn asked_conditions(&self) -> impl Iterator<Item = &Condition> {
         self.records
             .iter()
             .filter_map(|record| record.condition.as_ref())
     }
 
-    /// The rows of the picture: raw, and with each enhancer with which the item was asked.
+    /// The rows of the picture: raw images, and images by each enhancer with which the item was asked.
     fn rows(&self) -> SheetRows {
         let row = |name: String, enhancer: Option<_>| {
             let conditions = self.levels.iter().map(|level| {
@@ -170,7 +170,7 @@ impl SheetItem {
                         && condition.enhancer.as_ref() == enhancer
                         && (variant == self.curves.variant || variant == Variant::NONE)
                 };
-                self.asked().find(fits).cloned()
+                self.asked_conditions().find(fits).cloned()
             });
             (name, conditions.collect())
         };
@@ -180,30 +180,33 @@ impl SheetItem {
             .enhancers
             .iter()
             .map(|name| row(format!("+ {name}"), Some(name)));
-        let is_asked = |(_, conditions): &(String, Vec<Option<Condition>>)| {
-            conditions.iter().any(Option::is_some)
-        };
-        let enhanced = enhanced.filter(is_asked);
-        std::iter::once(raw).chain(enhanced).collect()
+        std::iter::once(raw)
+            .chain(
+                enhanced.filter(|(_, conditions): &(String, Vec<Option<_>>)| {
+                    conditions.iter().any(Option::is_some)
+                }),
+            )
+            .collect()
     }
 
-    /// The images of each condition of the rows, made again.
+    /// Rebuilds the images of all conditions in the rows.
     fn images(
         &self,
         args: &ShowArgs,
         rows: &SheetRows,
     ) -> Result<BTreeMap<Condition, Vec<Arc<Payload>>>> {
-        let conditions = rows
+        let conditions: Vec<Condition> = rows
             .iter()
-            .flat_map(|(_, conditions)| conditions.iter().flatten());
-        let conditions: Vec<Condition> = conditions.cloned().collect();
+            .flat_map(|(_, conditions)| conditions.iter().flatten())
+            .cloned()
+            .collect();
         let rebuild = args.rebuild.clone();
         let mut rebuilder = ImageRebuilder::open(rebuild, &self.manifest, &args.run, &conditions)?;
         let images = rebuilder.images(&self.records[0].detail.frame, &conditions)?;
         Ok(conditions.into_iter().zip(images).collect())
     }
 
-    /// Whether the images are others than were sent.
+    /// True if the rebuilt images differ from those sent.
     fn is_changed(&self, condition: &Condition, images: &[Arc<Payload>]) -> bool {
         let now = Payload::joint_digest(images);
         self.records
@@ -215,7 +218,7 @@ impl SheetItem {
             })
     }
 
-    /// The mark of each model in a condition; of several replies of one model the first counts.
+    /// The mark of each model in a condition, from its first reply.
     fn marks(&self, condition: &Condition) -> Vec<(String, StoryMark)> {
         let mut marks: Vec<(String, StoryMark)> = Vec::new();
         for record in &self.records {
@@ -236,7 +239,7 @@ impl SheetItem {
     }
 }
 
-/// The format of a picture by the extension of its name: PNG, or JPEG of a quality at which letters stay clean (chosen).
+/// The format for a file extension: PNG, or JPEG at a quality that keeps text sharp (chosen).
 fn format(path: &Path) -> Result<PayloadFormat> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let format = match &*extension.to_ascii_lowercase() {

@@ -1,4 +1,4 @@
-//! `study`: asking people the questions of a run.
+//! `study`: collects human answers to the questions of a run.
 
 mod pack;
 mod read;

@@ -1,4 +1,4 @@
-//! `study pack`: writing a page on which people answer the questions of a run.
+//! `study pack`: writes a page on which people answer the questions of a run.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -12,7 +12,7 @@ use crate::images::progress::Progress;
 use crate::picture::Payload;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::runs::Outcome;
-use crate::runs::rebuild::{ImageRebuilder, RebuildArgs};
+use crate::runs::image_rebuilder::{ImageRebuilder, RebuildArgs};
 use crate::runs::stored::StoredRun;
 use crate::text::words::counted;
 use crate::types::manifests::Status;
@@ -40,10 +40,10 @@ pub(crate) struct PackArgs {
     pub rebuild: RebuildArgs,
 }
 
-/// Writes the page and its images. Each image is the file that the models were sent.
+/// Writes the page and its images. Each image has the same bytes as the one sent to the models.
 ///
 /// # Errors
-/// If the run stores no questions, or its data or enhancers are not found.
+/// If the run has no questions about images, its data or enhancers are missing, or an image differs from the one sent.
 pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     let StoredRun {
         manifest,
@@ -60,24 +60,23 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     if questions.is_empty() || conditions.is_empty() {
         return Err(wrong("this run has no questions about images".to_owned()));
     }
-    let shown = first_order(&trials);
-    let chosen = chosen(questions, args.items.map_or(usize::MAX, usize::from));
+    let first_orders = first_orders(&trials);
     let mut frames = BTreeMap::<FrameId, Vec<RunQuestion>>::new();
-    for question in chosen {
+    for question in choose_questions(questions, args.items.map_or(usize::MAX, usize::from)) {
         frames
             .entry(question.frame.clone())
             .or_default()
             .push(question);
     }
-    let sent = sent(&trials);
+    let sent = sent_digests(&trials);
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &args.run, &conditions)?;
     let bar = progress.bar("images", frames.len() * conditions.len());
     let (mut asked, mut images) = (Vec::new(), 0);
     for (number, (frame, questions)) in frames.into_iter().enumerate() {
         let mut shots = Vec::new();
         let rebuilt = rebuilder.images(&frame, &conditions)?;
-        for (condition, shown) in conditions.iter().zip(&rebuilt) {
-            let now = Payload::joint_digest(shown);
+        for (condition, payloads) in conditions.iter().zip(&rebuilt) {
+            let now = Payload::joint_digest(payloads);
             if let Some(sent) = sent.get(&(frame.clone(), condition.clone()))
                 && now.is_some_and(|now| now != *sent)
             {
@@ -89,8 +88,8 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
             // The name does not reveal the level.
             let name = Digest::from_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
             let stem = format!("images/{}", &name.to_string()[..16]);
-            let names = shown.iter().enumerate().map(|(place, image)| {
-                let place = match shown.len() {
+            let names = payloads.iter().enumerate().map(|(place, image)| {
+                let place = match payloads.len() {
                     1 => String::new(),
                     _ => format!("-{}", place + 1),
                 };
@@ -102,15 +101,20 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
                 condition: condition.to_string(),
                 images: names.collect::<Result<_>>()?,
             });
-            images += shown.len();
+            images += payloads.len();
             bar.inc();
         }
-        asked.extend(questions.into_iter().map(|question| StudyQuestion {
-            frame: number,
-            choices: shown.get(&question.id).cloned().unwrap_or(question.choices),
-            id: question.id.0,
-            text: question.text,
-            shots: shots.clone(),
+        asked.extend(questions.into_iter().map(|question| {
+            StudyQuestion {
+                frame: number,
+                choices: first_orders
+                    .get(&question.id)
+                    .cloned()
+                    .unwrap_or(question.choices),
+                id: question.id.0,
+                text: question.text,
+                shots: shots.clone(),
+            }
         }));
     }
     drop(bar);
@@ -130,6 +134,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
     ))
 }
 
+/// The conditions of the run with images, limited to the `wanted` ones if there are any.
 fn conditions(trials: &Trials<ChoiceDetail>, wanted: &[Condition]) -> Result<Vec<Condition>> {
     let asked: BTreeSet<Condition> = trials
         .asked()
@@ -148,7 +153,7 @@ fn conditions(trials: &Trials<ChoiceDetail>, wanted: &[Condition]) -> Result<Vec
 }
 
 /// The choices of each question, in the first order in which they were shown.
-fn first_order(trials: &Trials<ChoiceDetail>) -> BTreeMap<QuestionId, Vec<String>> {
+fn first_orders(trials: &Trials<ChoiceDetail>) -> BTreeMap<QuestionId, Vec<String>> {
     let mut orders = BTreeMap::new();
     for trial in trials.iter() {
         orders
@@ -158,16 +163,16 @@ fn first_order(trials: &Trials<ChoiceDetail>) -> BTreeMap<QuestionId, Vec<String
     orders
 }
 
-/// The `count` questions whose ids have the lowest digests.
-fn chosen(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
+/// Chooses the `count` questions whose ids have the lowest digests.
+fn choose_questions(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
     questions
         .sort_by_cached_key(|question| *Digest::from_bytes(question.id.0.as_bytes()).as_bytes());
     questions.truncate(count);
     questions
 }
 
-/// The digest of what was sent, by frame and condition.
-fn sent(trials: &Trials<ChoiceDetail>) -> BTreeMap<(FrameId, Condition), Digest> {
+/// The digest of the images sent, by frame and condition.
+fn sent_digests(trials: &Trials<ChoiceDetail>) -> BTreeMap<(FrameId, Condition), Digest> {
     trials
         .iter()
         .filter_map(|trial| {

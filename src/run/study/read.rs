@@ -1,4 +1,4 @@
-//! `study read`: reading the answers of people into a run in which they take the place of a model.
+//! `study read`: imports human answers into a run in which people are listed like a model.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
@@ -12,11 +12,10 @@ use serde_json::{Value, json};
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::run_reports::choice;
-use crate::runs::record_table;
-use crate::runs::stored::StoredRun;
-
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
+use crate::runs::record_table;
+use crate::runs::stored::StoredRun;
 use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifests::{Counts, RunManifest, Status};
@@ -57,17 +56,17 @@ struct AnswerLine {
     answer: Option<String>,
 }
 
-/// The numbers of lines by outcome.
+/// Counts of the imported and rejected lines.
 #[derive(Debug, Default)]
 struct AnswerCounts {
     answers: usize,
-    /// Questions or conditions that the run did not ask.
+    /// Items that the run did not ask.
     unknown: BTreeSet<String>,
-    /// Answers that are no choice of their question, each in words.
+    /// Descriptions of answers that are not a choice of their question.
     no_choice: Vec<String>,
 }
 
-/// Maximum number of answers that a warning lists one by one.
+/// Maximum number of answers listed in a warning.
 const MAX_LISTED: usize = 10;
 
 /// An answer with its place in the files.
@@ -78,27 +77,27 @@ struct PlacedAnswer<'a> {
     answer: AnswerLine,
 }
 
-/// Imports answers. Reading a file again changes nothing, and further files add to the run. A later answer of a person to
-/// the same question in the same condition replaces the earlier one.
+/// Imports answers. Importing a file again changes nothing, and further files add to the run. A later answer of a person to the same
+/// question in the same condition replaces the earlier one.
 ///
 /// # Errors
-/// If the folder holds no run, a line is not an answer, or the run asked nothing that is in the files.
+/// If the folder has no run, a line is not an answer, or no answer is to an item of the run.
 pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let instead = "openeqa --answers NAME=FILE reads what people answered";
     let asked_run = StoredRun::open_choices(&args.run, instead)?
         .with_truths("what people answer is scored by them")?;
-    let asked = asked(&asked_run.trials);
+    let asked = trials_by_item(&asked_run.trials);
     let mut counts = AnswerCounts::default();
     let mut lines = Vec::new();
     for path in &args.files {
-        lines.extend(answers(path)?);
+        lines.extend(read_answers(path)?);
     }
-    // Checked before the folder is created, so that files of another study leave no empty run.
+    // Checked before the folder is created, so that files of another study do not leave an empty run.
     let known: Vec<(TrialRef<'_>, PlacedAnswer<'_>)> = lines
         .into_iter()
         .filter_map(|line| {
             let answer = &line.answer;
-            let (question, condition) = (name(&answer.question), answer.condition.clone());
+            let (question, condition) = (value_text(&answer.question), answer.condition.clone());
             let place = (&QuestionId(question), &condition.parse::<Condition>().ok()?);
             let trial = asked.get(&place).copied();
             if trial.is_none() {
@@ -121,37 +120,38 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
         counts.answers += 1;
         let asked = asked_run.record(asked)?;
         let record = people.record(&asked, &line.answer, &args.name)?;
-        counts.no_choice.extend(no_choice(&line, &record));
+        counts.no_choice.extend(no_choice_problem(&line, &record));
         if people.is_new(&record) {
             store.append(&record)?;
             people.add(record);
         }
     }
     store.sync()?;
-    warn_about(&counts.no_choice);
+    warn_of_no_choice(&counts.no_choice);
     let mut run = StoredRun::reread(&args.out, people_manifest)?;
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.count(Counts::new(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;
-    record_table::update(&args.out, args.show.table())?;
+    record_table::update(&args.out, args.show.record_table())?;
     if !args.show.format().is_json() {
         outcome.output.insert_str(0, &summary(&counts));
     }
     Ok(outcome)
 }
 
-fn answers(path: &Path) -> Result<Vec<PlacedAnswer<'_>>> {
-    let lines = reading::json_lines(path)?.into_iter();
-    let placed = |(line, answer)| PlacedAnswer {
-        file: path,
-        line,
-        answer,
-    };
-    Ok(lines.map(placed).collect())
+fn read_answers(path: &Path) -> Result<Vec<PlacedAnswer<'_>>> {
+    Ok(reading::json_lines(path)?
+        .into_iter()
+        .map(|(line, answer)| PlacedAnswer {
+            file: path,
+            line,
+            answer,
+        })
+        .collect())
 }
 
-/// An answer that is no choice of its question, in words; `None` if it is one, or if the person could not answer.
-fn no_choice(line: &PlacedAnswer<'_>, record: &Record) -> Option<String> {
+/// Describes an answer that is not a choice of its question; `None` if it is one, or if the person could not tell.
+fn no_choice_problem(line: &PlacedAnswer<'_>, record: &Record) -> Option<String> {
     let why = record.detail.strict?.why?;
     let found = line.answer.answer.as_deref().unwrap_or_default();
     let choices = record.detail.choices.join(", ");
@@ -161,8 +161,8 @@ fn no_choice(line: &PlacedAnswer<'_>, record: &Record) -> Option<String> {
     })
 }
 
-/// Warns about answers that are no choice. They count as wrong, as those of a model do.
-fn warn_about(answers: &[String]) {
+/// Warns about answers that are not a choice. Like those of a model, they count as wrong.
+fn warn_of_no_choice(answers: &[String]) {
     let count = answers.len();
     if count == 0 {
         return;
@@ -180,15 +180,17 @@ fn warn_about(answers: &[String]) {
     tracing::warn!("{text}");
 }
 
-/// A name, which may be written as a number.
-fn name(value: &Value) -> String {
+/// The text of a string or a number.
+fn value_text(value: &Value) -> String {
     value
         .as_str()
         .map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// One trial of each question and condition that was asked with an image.
-fn asked(trials: &Trials<ChoiceDetail>) -> HashMap<(&QuestionId, &Condition), TrialRef<'_>> {
+/// The first trial with an image of each question and condition.
+fn trials_by_item(
+    trials: &Trials<ChoiceDetail>,
+) -> HashMap<(&QuestionId, &Condition), TrialRef<'_>> {
     let mut asked = HashMap::new();
     for trial in trials.iter() {
         if let Some(condition) = trial.condition() {
@@ -198,7 +200,7 @@ fn asked(trials: &Trials<ChoiceDetail>) -> HashMap<(&QuestionId, &Condition), Tr
     asked
 }
 
-/// The manifest of the people's run. Its images are those of the run that the questions came from.
+/// The manifest of the run of human answers. Its images are those of the run that the questions came from.
 fn people_manifest(run: &RunManifest, args: &ReadArgs) -> RunManifest {
     let identity = [
         ("--model", json!([args.name])),
@@ -227,9 +229,11 @@ fn people_manifest(run: &RunManifest, args: &ReadArgs) -> RunManifest {
     }
 }
 
-/// The answers so far. The first person to answer an item gets its first turn, so people and models are compared by item.
+/// The stored human answers. The first person to answer an item gets repeat 0, the next repeat 1, so that people and models are compared
+/// by item.
 struct People {
     answers: HashMap<TrialKey, Record>,
+    /// The next free repeat of each item.
     next: HashMap<(QuestionId, Option<Condition>), u32>,
 }
 
@@ -250,7 +254,7 @@ impl People {
 
     /// The record of an answer.
     fn record(&mut self, asked: &Record, line: &AnswerLine, name: &str) -> Result<Record> {
-        let person = self::name(&line.person);
+        let person = value_text(&line.person);
         let place = asked
             .condition
             .as_ref()
@@ -263,10 +267,10 @@ impl People {
             .entry((asked.question.clone(), asked.condition.clone()))
             .or_default();
         let stored = self.answers.get(&key);
-        let turn = stored.map_or(*next, |stored| stored.detail.repeat);
-        *next = (*next).max(turn + 1);
+        let repeat = stored.map_or(*next, |stored| stored.detail.repeat);
+        *next = (*next).max(repeat + 1);
         let detail = ChoiceDetail {
-            repeat: turn,
+            repeat,
             observed: None,
             options: None,
             ..asked.detail.clone()
@@ -289,7 +293,7 @@ impl People {
         Ok(answered)
     }
 
-    /// Whether a record is not stored yet as it is.
+    /// True if a record is not stored yet, or differs from the stored one.
     fn is_new(&self, record: &Record) -> bool {
         self.answers.get(&record.key) != Some(record)
     }

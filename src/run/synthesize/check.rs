@@ -1,4 +1,4 @@
-//! `synthesize check`: holding images to the digests in their JSON files.
+//! `synthesize check`: compares images with the digests in their JSON files.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -13,16 +13,16 @@ use crate::images::stored::OutputFile;
 use crate::runs::Outcome;
 use crate::text::words::first_names;
 
-/// The schemas of JSON files that vouch for an image. Other JSON files of the folder are left alone.
+/// Schemas of JSON files with the digest of an image. Other JSON files are ignored.
 const SCHEMAS: [&str; 3] = ["darkqa.image/1", "darkqa.image/2", "darkqa.sheet/1"];
 
-/// The most images without a JSON file that are named; chosen.
+/// Maximum number of images without a JSON file that are named; chosen.
 const MAX_NAMED: usize = 3;
 
-/// Checks all JSON files of a folder against their images, and that each image has one. Nothing is changed.
+/// Checks that each image in a folder has a JSON file and the digest in it. Nothing is changed.
 ///
 /// # Errors
-/// If the folder cannot be read, or no JSON file of an image is in it.
+/// If the folder cannot be read, or has no JSON file of an image.
 pub(super) fn check(folder: &Path) -> Result<Outcome> {
     let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
     let files: std::io::Result<Vec<PathBuf>> = entries.map(|entry| Ok(entry?.path())).collect();
@@ -38,7 +38,7 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
         .iter()
         .filter(|file| file.extension().is_some_and(|end| end == "json"))
     {
-        match vouched_image(file) {
+        match read_output(file) {
             Ok(Some(output)) => {
                 unknown.remove(&output.file);
                 match check_image(file, &output) {
@@ -51,7 +51,7 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
             }
             Ok(None) => {}
             Err(e) => {
-                // Its image has a JSON file, which cannot vouch for it.
+                // The image has a JSON file, although an unusable one.
                 unknown.retain(|image| Path::new(image).file_stem() != file.file_stem());
                 tracing::error!("{e}");
                 wrong += 1;
@@ -80,27 +80,27 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
     ))
 }
 
-/// The part of a JSON file that is checked. All schemas share it.
+/// The fields of a JSON file that are checked, in all schemas.
 #[derive(Deserialize)]
-struct Vouched {
+struct SidecarOutput {
     schema: String,
     output: Option<OutputFile>,
 }
 
-/// The image that a JSON file vouches for; `None` for a JSON file of something else.
+/// Reads the file name and digest of the image of a JSON file; `None` for a JSON file with another schema.
 ///
 /// # Errors
-/// If the JSON file has no digest of its image, or names one outside of its folder.
-fn vouched_image(file: &Path) -> Result<Option<OutputFile>> {
+/// If the JSON file has no digest of its image, or names an image outside of its folder.
+fn read_output(file: &Path) -> Result<Option<OutputFile>> {
     let text = reading::text(file)?;
-    let Ok(vouched) = serde_json::from_str::<Vouched>(&text) else {
+    let Ok(sidecar) = serde_json::from_str::<SidecarOutput>(&text) else {
         return Ok(None);
     };
-    if !SCHEMAS.contains(&&*vouched.schema) {
+    if !SCHEMAS.contains(&&*sidecar.schema) {
         return Ok(None);
     }
     let wrong = |problem: &str| Err(Error::data(file.display(), problem));
-    let Some(output) = vouched.output else {
+    let Some(output) = sidecar.output else {
         return wrong(
             "has no digest of its image: an older version wrote it; run `synthesize` again to add it",
         );
@@ -111,7 +111,7 @@ fn vouched_image(file: &Path) -> Result<Option<OutputFile>> {
     Ok(Some(output))
 }
 
-/// Holds one image to the digest in its JSON file.
+/// Compares an image with the digest in its JSON file.
 ///
 /// # Errors
 /// If the image is missing or has other bytes.

@@ -1,4 +1,4 @@
-//! `synthesize`: writing low-light versions of images, the same as an evaluation of the same folder would send.
+//! `synthesize`: writes low-light versions of images, identical to those that an evaluation of the same folder would send.
 
 mod check;
 mod sheet;
@@ -22,7 +22,7 @@ use crate::images::stored::{ImageCounts, ImageOutcome, Placed, Refusals, Sidecar
 use crate::images::timings::Timings;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::runs::Outcome;
-use crate::runs::part_args::{PartArgs, keep_part};
+use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::text::words::counted;
 use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 use darkqa_light::{LightArgs, LightSettings, NoiseKey};
@@ -99,7 +99,7 @@ pub(crate) struct SynthesizeArgs {
     pub folders: FolderArgs,
     /// The part of the frames.
     #[command(flatten)]
-    pub part: PartArgs,
+    pub part: ShardArgs,
     /// The number of threads.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -145,15 +145,15 @@ fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
         &args.folders.root.data_root,
         args.folders.decode.rule(),
     )?;
-    keep_part(&mut frames.entries, args.part.resolve()?)?;
+    keep_shard(&mut frames.entries, args.part.resolve()?)?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
-    let (files, tally) = (files(&making), InputTally::default());
+    let (files, tally) = (output_files(&making), InputTally::default());
     let bar = progress.bar("images", frames.entries.len() * files.len());
     let counts: Vec<ImageCounts> = workers.install(|| {
         let entries = frames.entries.par_iter();
         entries
-            .map(|entry| write_files(&making, &frames, entry, &files, (&bar, &tally)))
+            .map(|entry| write_files(&making, &frames, entry, &files, &bar, &tally))
             .collect()
     });
     drop(bar);
@@ -169,7 +169,7 @@ fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     Ok(outcome(total, out, frames.entries.len()))
 }
 
-/// The outcome of a call that made images of frames.
+/// The outcome of a command that made images of frames.
 fn outcome(counts: ImageCounts, out: &Path, frames: usize) -> Outcome {
     Outcome::wrote(
         out,
@@ -184,7 +184,7 @@ fn outcome(counts: ImageCounts, out: &Path, frames: usize) -> Outcome {
     )
 }
 
-/// The content of one output file of a frame: an image in a degradation (`None` for the clean frame), or a figure.
+/// Content of an output file of a frame: an image with a degradation (`None` for the untouched frame), or a figure.
 #[derive(Debug, Clone)]
 enum FrameFile {
     Image(Option<Degradation>),
@@ -192,7 +192,7 @@ enum FrameFile {
 }
 
 /// The output files of each frame.
-fn files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
+fn output_files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
     if let Some(sheet) = making.args.sheet {
         return vec![FrameFile::Sheet(sheet)];
     }
@@ -210,7 +210,8 @@ fn write_files(
     frames: &Inputs,
     entry: &InputFrame,
     files: &[FrameFile],
-    (bar, tally): (&StepBar, &InputTally),
+    bar: &StepBar,
+    tally: &InputTally,
 ) -> ImageCounts {
     let mut counts = ImageCounts::default();
     let frames = OneFrame { frames, entry };
@@ -236,8 +237,8 @@ fn write_files(
             return counts;
         }
     }
-    // What is wrong with the input is wrong with each of its images, and is said once.
-    let mut said = BTreeSet::new();
+    // A problem of the input recurs for each of its images, but is logged once.
+    let mut logged = BTreeSet::new();
     for file in files {
         let outcome = match file {
             FrameFile::Image(degradation) => work.image(degradation.as_ref()),
@@ -250,7 +251,7 @@ fn write_files(
                 }
             }
             Err(e) => {
-                if said.insert(e.to_string()) {
+                if logged.insert(e.to_string()) {
                     tracing::error!("{e}");
                 }
                 counts.failed += 1;
@@ -261,7 +262,7 @@ fn write_files(
     counts
 }
 
-/// One frame of the inputs. A frame of another input may have the same name.
+/// A single frame of the inputs, because frames of different inputs may have the same name.
 struct OneFrame<'a> {
     frames: &'a Inputs,
     entry: &'a InputFrame,
@@ -307,7 +308,7 @@ impl SynthesisWork<'_> {
     }
 }
 
-/// Makes the image of a JSON file again.
+/// Makes the image of a JSON file again, with the settings in it.
 fn replay(args: &ReplayArgs) -> Result<Outcome> {
     let input = std::slice::from_ref(&args.input);
     let rule = args.folders.decode.rule();

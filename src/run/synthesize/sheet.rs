@@ -1,4 +1,4 @@
-//! The figures of `synthesize --sheet`: [`Sheet`], with what they are made from, [`SheetRecipe`]. They are drawn by
+//! The figures of `synthesize --sheet` ([`Sheet`]) and the facts that determine them ([`SheetRecipe`]). They are drawn by
 //! [`crate::drawing::sheet`].
 
 use std::fmt;
@@ -38,20 +38,20 @@ impl fmt::Display for Sheet {
     }
 }
 
-/// Everything that decides a figure.
+/// All facts that determine a figure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct SheetRecipe {
     sheet: Sheet,
-    /// The version of the drawing, [`sheet::VERSION`].
+    /// Version of the drawing, [`sheet::VERSION`].
     drawing: u32,
     frame: String,
-    /// The digest of the image that the figure is of.
+    /// Digest of the input image.
     source: String,
-    /// The degradations that may be shown.
+    /// Degradations that may be shown.
     images: Vec<String>,
-    /// The versions of all kinds of degradation.
+    /// Versions of all kinds of degradation.
     synthesis: Vec<u32>,
-    /// The settings of the kinds: seed, noise profiles, automatic exposure and motion.
+    /// Settings of the kinds: seed, noise profiles, automatic exposure and motion.
     light: Value,
 }
 
@@ -84,27 +84,28 @@ impl SheetRecipe {
 }
 
 impl Sheet {
-    /// The figure of a frame.
+    /// Draws the figure of a frame.
     pub(super) fn draw(self, frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         match self {
-            Self::Levels => levels(frame, light),
-            Self::Noise => terms(frame, light),
+            Self::Levels => draw_levels(frame, light),
+            Self::Noise => draw_terms(frame, light),
         }
     }
 }
 
-/// Describes how the images were made: camera and seed, gain and light ratio in each noise profile, and the flags of further variants.
-fn foot(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) -> String {
+/// The footer of a figure: camera and seed, gain and light ratio in each noise profile, and the flags of further variants.
+fn footer(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) -> String {
     let has = |test: fn(Kind) -> bool| degradations.iter().any(|how| test(how.kind()));
     let mut facts = Vec::new();
     if has(Kind::has_noise) {
-        facts.push(camera(light));
+        facts.push(camera_and_seed(light));
     }
     if has(Kind::has_readings) {
         let key = NoiseKey::new(light.kinds.sensor.seed, frame);
         let readings = light.kinds.sensor.readings.iter();
         facts.extend(
-            readings.map(|(name, synthesis)| format!("{name}: {}", state(synthesis, &key))),
+            readings
+                .map(|(name, synthesis)| format!("{name}: {}", gain_and_ratio(synthesis, &key))),
         );
     }
     if has(|kind| kind == Kind::Auto) {
@@ -117,7 +118,7 @@ fn foot(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) ->
 }
 
 /// Camera and seed in words.
-fn camera(light: &LightSettings) -> String {
+fn camera_and_seed(light: &LightSettings) -> String {
     let camera = light
         .kinds
         .sensor
@@ -131,7 +132,7 @@ fn camera(light: &LightSettings) -> String {
 }
 
 /// Gain and light ratio of a frame in words.
-fn state(synthesis: &Synthesis, key: &NoiseKey) -> String {
+fn gain_and_ratio(synthesis: &Synthesis, key: &NoiseKey) -> String {
     if synthesis.draws == Draws::Fresh {
         return "K and r drawn for each level".to_owned();
     }
@@ -144,38 +145,38 @@ fn state(synthesis: &Synthesis, key: &NoiseKey) -> String {
     format!("K {:.2}, {ratio}", state.system_gain)
 }
 
-/// The figure of a frame at each level, in each variant.
-fn levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
+/// Draws a frame at each level, in each variant.
+fn draw_levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
     let degradations: Vec<Degradation> = light.degradations().into_iter().flatten().collect();
     let mut blocks = Vec::new();
     for axis in Axis::ALL {
         let on_axis = degradations.iter().filter(|how| how.kind().axis() == axis);
-        let mut of_rows: Vec<(Variant, Vec<&Degradation>)> = Vec::new();
+        let mut by_variant: Vec<(Variant, Vec<&Degradation>)> = Vec::new();
         for how in on_axis {
-            let row = Variant::from(Some(how));
-            match of_rows.iter_mut().find(|(other, _)| *other == row) {
+            let variant = Variant::from(Some(how));
+            match by_variant.iter_mut().find(|(other, _)| *other == variant) {
                 Some((_, all)) => all.push(how),
-                None => of_rows.push((row, vec![how])),
+                None => by_variant.push((variant, vec![how])),
             }
         }
-        let Some((_, first)) = of_rows.first() else {
+        let Some((_, first)) = by_variant.first() else {
             continue;
         };
         let levels = first
             .iter()
             .map(|how| AxisLevel::from(Some(*how)))
             .collect();
-        let rows = of_rows
+        let rows = by_variant
             .into_iter()
-            .map(|(row, all)| {
+            .map(|(variant, all)| {
                 let images = all.into_iter().map(|how| {
                     let dark_ev = frame.applied(how)?.drop_ev();
                     let image = Rgb::clone(frame.degraded(Some(how))?);
                     Ok(LevelImage { image, dark_ev })
                 });
-                let name = match row.kind {
+                let name = match variant.kind {
                     Some(Kind::Exposure) => "EV".to_owned(),
-                    _ => row.kind_and_reading(),
+                    _ => variant.kind_and_reading(),
                 };
                 let images = images.collect::<Result<_>>()?;
                 Ok(LevelRow { name, images })
@@ -183,12 +184,12 @@ fn levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
             .collect::<Result<_>>()?;
         blocks.push(LevelBlock { levels, rows });
     }
-    let foot = foot(light, frame.frame(), &degradations);
-    Ok(sheet::levels(frame.clean()?, &blocks, &foot))
+    let footer = footer(light, frame.frame(), &degradations);
+    Ok(sheet::levels(frame.clean()?, &blocks, &footer))
 }
 
-/// The figure of the noise terms of a frame, at the darkest level asked for. The level matters if each has its own negative.
-fn terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
+/// Draws the noise terms of a frame at the darkest requested level. The level matters if each level has its own negative.
+fn draw_terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
     let mut levels = light
         .levels
         .iter()
@@ -223,16 +224,17 @@ fn terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         signals.push(signal(name.to_owned(), with_terms(&[term]) - &clean));
     }
     signals.push(signal("noisy RAW".to_owned(), with_terms(&Term::ALL)));
-    let foot = format!(
+    let footer = format!(
         "{}; {}: K {:.2}, r {:.0}",
-        camera(light),
+        camera_and_seed(light),
         synthesis.name(),
         state.system_gain,
         state.ratio
     );
-    Ok(sheet::noise(&signals, &foot))
+    Ok(sheet::noise(&signals, &footer))
 }
 
+/// The samples of a RAW image in ADU.
 fn adu(raw: &Bayer, range: f32) -> Array2<f32> {
     Array2::from_shape_fn((raw.height(), raw.width()), |(row, column)| {
         raw.sample(row, column) * range

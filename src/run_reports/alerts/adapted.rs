@@ -1,9 +1,9 @@
-//! The line about requests that were changed because a server refused a field: [`adaptation_alerts`].
+//! Alerts about requests that were changed because a server refused a field: [`adaptation_alerts`].
 
 use serde_json::Value;
 
 use crate::run_reports::join::JoinedRun;
-use crate::run_reports::settings::listed;
+use crate::run_reports::settings::joined_with_and;
 use crate::runs::renamed::ADAPTED_FOR;
 use crate::text::alert::{Alert, AlertKind};
 
@@ -27,7 +27,7 @@ pub(super) fn adaptation_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
             };
             let text = format!(
                 "Requests to {model} were changed{place}, because the server refused what was sent first: {}.",
-                listed(&changes)
+                joined_with_and(&changes)
             );
             alerts.push(Alert::new(AlertKind::Parameters, text));
         }

@@ -1,4 +1,4 @@
-//! The line about models whose probabilities were asked for and not stated: [`confidence_alerts`].
+//! Alerts about models whose replies lack the requested probabilities: [`confidence_alerts`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use crate::run_reports::join::JoinedRun;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::{ChoiceDetail, TrialRef, Trials};
 
-/// One alert for each model that was asked with `--request probabilities` and has no reply with any.
+/// One alert for each model that was asked with `--request probabilities` and none of whose replies has probabilities.
 pub(super) fn confidence_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let asked: BTreeSet<&String> = runs
         .iter()

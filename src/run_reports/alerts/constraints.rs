@@ -1,4 +1,4 @@
-//! The line about replies that do not keep the constraint that was asked for: [`constraint_alerts`].
+//! Alerts about replies that do not follow the requested constraint: [`constraint_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -7,8 +7,8 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::plural;
 use crate::types::{ChoiceDetail, Trials};
 
-/// One alert for each model that was asked with `--request constrain` and has replies of another form. A reply that keeps it is stored as its
-/// letter alone.
+/// One alert for each model that was asked with `--request constrain` and has replies of another form. A reply that follows the
+/// constraint is stored as a single letter.
 pub(super) fn constraint_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let constrained: BTreeMap<&String, &str> = runs
         .iter()

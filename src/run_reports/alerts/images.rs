@@ -1,4 +1,4 @@
-//! Models whose replies do not depend on the image: [`image_alerts`].
+//! Alerts about models whose replies do not depend on the image: [`image_alerts`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -8,10 +8,10 @@ use crate::types::{Digest, QuestionId, RunQuestion, SetLight};
 use darkqa_score::answers::{Independence, LitReply};
 use darkqa_score::subject::without_run;
 
-/// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Photographs taken in the dark
-/// do not show that.
+/// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Returns none for photographs
+/// taken in the dark, where a model may see nothing.
 pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
-    if combined.set().light == SetLight::Dark {
+    if combined.photographed_set().light == SetLight::Dark {
         return Vec::new();
     }
     let questions: HashMap<&QuestionId, &RunQuestion> = combined
@@ -20,7 +20,7 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
         .map(|question| (&question.id, question))
         .collect();
     let mut replies = BTreeMap::<&str, Vec<LitReply>>::new();
-    let built_in = built_in(combined);
+    let built_in = built_in_models(combined);
     for trial in combined.trials.iter() {
         let Some(question) = questions.get(trial.question()) else {
             continue;
@@ -41,8 +41,8 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
         .collect()
 }
 
-/// The names of the models that are asked at no endpoint.
-fn built_in(combined: &Combined) -> BTreeSet<&str> {
+/// Names of the models that need no endpoint.
+fn built_in_models(combined: &Combined) -> BTreeSet<&str> {
     let is_built_in = |model: &str| {
         combined
             .runs

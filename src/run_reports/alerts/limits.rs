@@ -1,4 +1,4 @@
-//! Replies with different token limits, because truncated ones were asked again: [`limit_alerts`].
+//! Alerts about models asked with several token limits, because truncated replies were asked again: [`limit_alerts`].
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::text::words::plural;
 use darkqa_score::answers::record::Detail;
 use darkqa_score::subject::without_run;
 
-/// One line for each model some of whose replies have a larger limit than the first ones, with the number of replies by limit.
+/// One alert for each model asked with more than its first token limit, with the number of replies at each limit.
 pub(super) fn limit_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, BTreeMap<Option<u32>, usize>>::new();
     for trial in joined.trials.iter().filter(|trial| trial.has_reply()) {
@@ -31,7 +31,7 @@ pub(super) fn limit_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     }).collect()
 }
 
-/// The token limit with which the runs of a model began, in words.
+/// The first token limit of a model in its runs, as text.
 fn first_limit(runs: &[JoinedRun], model: &str) -> String {
     runs.iter()
         .filter_map(|run| {

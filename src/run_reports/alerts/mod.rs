@@ -1,4 +1,4 @@
-//! The lines above a report: what differs between its runs, and the faults of its numbers ([`alerts`]).
+//! Alerts above a report: differences between its runs, and faults of its numbers ([`alerts`]).
 
 mod adapted;
 mod confidence;
@@ -53,8 +53,11 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     ));
     alerts.extend(questions::repeat_alert(combined));
     alerts.extend(questions::item_alerts(findings));
-    let clusters = (findings.grid.clusters, findings.unit);
-    alerts.extend(cluster_alerts(combined, clusters));
+    alerts.extend(cluster_alerts(
+        combined,
+        findings.grid.clusters,
+        findings.unit,
+    ));
     alerts.extend(set_alert(findings.set));
     alerts.extend(many_models_alert(findings));
     alerts.extend(
@@ -79,28 +82,27 @@ pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'
         &combined.runs,
         &combined.trials,
     ));
-    let clusters = (found.grid.clusters, found.unit);
-    alerts.extend(cluster_alerts(combined, clusters));
+    alerts.extend(cluster_alerts(combined, found.grid.clusters, found.unit));
     alerts.extend(set_alert(found.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
 }
 
-/// Models that are too many to be compared with each other.
+/// The alert that there are too many models to compare them with each other.
 fn many_models_alert(findings: &Findings<'_>) -> Option<Alert> {
     let text = "Too many models to compare them with each other: no pair of them is tested, and none is called best. Reports of fewer \
                 models do both.";
     (!compares_models(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
 }
 
-/// Alerts that the photographs were taken in the dark.
+/// The alert that the photographs of the set were taken in the dark.
 fn set_alert(set: PhotographedSet) -> Option<Alert> {
-    let notice = set.notice();
-    notice.map(|text| Alert::new(AlertKind::Pairs, text))
+    set.notice().map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
-/// Too few clusters for good intervals (none, without replies, needs no remark), questions about one frame alone, and frames without the scenes that their names suggest.
-fn cluster_alerts(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -> Vec<Alert> {
+/// Alerts about too few clusters for reliable intervals, questions about a single frame, and frames without the scenes that their names
+/// suggest. A report without replies has no clusters and gets no alert about them.
+fn cluster_alerts(combined: &Combined, clusters: usize, unit: ClusterUnit) -> Vec<Alert> {
     let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
     let few = if clusters == 0 {
         None
@@ -121,7 +123,7 @@ fn cluster_alerts(combined: &Combined, (clusters, unit): (usize, ClusterUnit)) -
         .collect()
 }
 
-/// Scenes that the names of the frames suggest and no question names, or frames without a scene beside others that have one.
+/// The sentence about scenes that frame names suggest but no question states, or about frames without a scene if other frames have one.
 fn unnamed_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
     let in_scenes: BTreeSet<&FrameId> = combined
         .questions
@@ -150,7 +152,7 @@ fn unnamed_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<St
     })
 }
 
-/// The alerts that follow from manifests and the questions asked, of runs of either kind.
+/// Alerts based on manifests and questions, for runs of either kind.
 pub(super) fn run_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = progress_alerts(&joined.runs);
     alerts.extend(cost_alerts(&joined.runs));
@@ -184,7 +186,7 @@ fn cost_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
         .collect()
 }
 
-/// Alerts about joining the runs: models that stand apart, and runs that add nothing to the others.
+/// Alerts about joining the runs: models listed under several names, models left out, and runs that add no replies.
 pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts: Vec<Alert> = joined
         .runs
@@ -204,8 +206,8 @@ pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts
 }
 
-/// Folders that were named more than once: their names, and how many times.
-pub(super) fn named_again(folders: &[(String, usize)]) -> Vec<Alert> {
+/// Alerts about folders that were named more than once on the command line; takes each name with its number of times.
+pub(super) fn duplicate_folder_alerts(folders: &[(String, usize)]) -> Vec<Alert> {
     folders
         .iter()
         .map(|(name, times)| {
@@ -219,7 +221,7 @@ pub(super) fn named_again(folders: &[(String, usize)]) -> Vec<Alert> {
         .collect()
 }
 
-/// Alerts about changes to the images of the runs when they were read.
+/// Alerts about changes made to the images of the runs when they were read.
 fn input_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut lines = BTreeMap::<String, Vec<&str>>::new();
     for run in runs {
@@ -244,7 +246,7 @@ fn progress_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
         .filter(|run| run.manifest.status != Status::Complete)
         .map(|run| {
             let (status, counts) = (run.manifest.status, run.manifest.counts);
-            // A run that is merged of some of its parts has answers to all of their trials.
+            // A run merged from some of its shards has answers to all of their trials.
             let rest = if counts.answered < counts.trials {
                 " The same command asks the rest."
             } else {

@@ -1,15 +1,15 @@
-//! Models of one name that stand apart, and why: [`model_alerts`].
+//! Alerts about models that a report lists under several names, with the reason: [`model_alerts`].
 
 use std::collections::BTreeMap;
 
-use super::words::names;
+use super::words::run_names;
 use crate::run_reports::join::{Joined, JoinedRun};
-use crate::run_reports::models::ModelApart;
-use crate::run_reports::settings::{Setting, listed};
+use crate::run_reports::model_names::SplitModel;
+use crate::run_reports::settings::{Setting, joined_with_and};
 use crate::text::alert::{Alert, AlertKind};
 use darkqa_score::answers::record::Detail;
 
-/// The fields of a built-in model in a manifest, in words.
+/// Manifest fields of a built-in model, and their names in a sentence.
 const FIELDS: [(&str, &str); 3] = [
     ("random", "its seed"),
     ("script", "its file"),
@@ -19,14 +19,20 @@ const FIELDS: [(&str, &str); 3] = [
 /// The field that holds the digest of everything that decides the replies of a built-in model.
 const DIGEST: &str = "digest";
 
-/// A line for all models that stand apart for one reason in the same runs.
+/// One alert for all models that are split for the same reason in the same runs.
 pub(super) fn model_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
-    let runs = names(&joined.runs);
-    let mut by_reason = BTreeMap::<(String, Vec<&str>), Vec<&ModelApart>>::new();
-    for apart in &joined.models.apart {
-        let suffixes = apart.names.iter().map(|name| &name[apart.model.len()..]);
-        let same = (reason(apart, &runs), suffixes.collect());
-        by_reason.entry(same).or_default().push(apart);
+    let runs = run_names(&joined.runs);
+    let mut by_reason = BTreeMap::<(String, Vec<&str>), Vec<&SplitModel>>::new();
+    for split in &joined.model_names.split {
+        let suffixes = split
+            .names
+            .iter()
+            .map(|name| &name[split.model.len()..])
+            .collect();
+        by_reason
+            .entry((reason(split, &runs), suffixes))
+            .or_default()
+            .push(split);
     }
     by_reason
         .into_iter()
@@ -37,26 +43,25 @@ pub(super) fn model_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         .collect()
 }
 
-/// The models of each run whose replies are not shown.
+/// Alerts about the models of each run whose replies are left out.
 pub(super) fn left_out_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
-    let left = runs.iter().filter(|run| !run.left_out.is_empty());
-    left.map(|run| {
+    runs.iter().filter(|run| !run.left_out.is_empty()).map(|run| {
         let names: Vec<&String> = run.left_out.iter().collect();
         let are = if names.len() == 1 { "is" } else { "are" };
         let text = format!(
             "{} {are} left out of {}: the file of models has no such model any more, or has it with other settings; report --all shows \
              all.",
-            listed(&names),
+            joined_with_and(&names),
             run.name
         );
         Alert::new(AlertKind::Models, text)
     }).collect()
 }
 
-/// The sentence about models that stand apart, with the names of the first.
-fn stand_apart(models: &[&ModelApart]) -> String {
-    let names: Vec<&String> = models.iter().map(|apart| &apart.model).collect();
-    let (all, apart) = (listed(&names), listed(&models[0].names));
+/// The sentence about split models, with the names of the first one.
+fn stand_apart(models: &[&SplitModel]) -> String {
+    let names: Vec<&String> = models.iter().map(|split| &split.model).collect();
+    let (all, apart) = (joined_with_and(&names), joined_with_and(&models[0].names));
     if models.len() == 1 {
         format!("{all} stands apart as {apart}")
     } else {
@@ -64,14 +69,14 @@ fn stand_apart(models: &[&ModelApart]) -> String {
     }
 }
 
-/// Why a model stands apart.
-fn reason(apart: &ModelApart, runs: &[String]) -> String {
-    let mut reasons: Vec<String> = settings(&apart.differences)
+/// The reason why a model is split: the settings that differ, and the replies or trials that do.
+fn reason(split: &SplitModel, runs: &[String]) -> String {
+    let mut reasons: Vec<String> = named_settings(&split.differences)
         .iter()
         .map(|setting| setting.words(runs))
         .collect();
-    let overlap = apart.overlap();
-    let up_to = if apart.names.len() > 2 { "up to " } else { "" };
+    let overlap = split.overlap();
+    let up_to = if split.names.len() > 2 { "up to " } else { "" };
     if overlap.other_replies > 0 {
         reasons.push(format!(
             "{up_to}{} of {} replies to the same trials differ",
@@ -92,20 +97,20 @@ fn reason(apart: &ModelApart, runs: &[String]) -> String {
     reasons.join("; ")
 }
 
-/// The settings that differ, in words. Where others explain it, the digest is left out.
-fn settings(differences: &[Setting]) -> Vec<Setting> {
-    let is_digest = |setting: &&Setting| setting.flag == DIGEST;
-    let is_explained = differences.iter().any(|setting| !is_digest(&setting));
-    let told = differences
+/// The settings that differ, with manifest fields replaced by their names in a sentence. The digest is left out if other settings
+/// explain it.
+fn named_settings(differences: &[Setting]) -> Vec<Setting> {
+    let is_explained = differences.iter().any(|setting| setting.flag != DIGEST);
+    differences
         .iter()
-        .filter(|setting| !(is_explained && is_digest(setting)));
-    let in_words = |flag: &str| {
-        let known = FIELDS.iter().find(|(field, _)| *field == flag);
-        known.map_or(flag, |(_, words)| *words).to_owned()
-    };
-    told.map(|setting| Setting {
-        flag: in_words(&setting.flag),
-        ..setting.clone()
-    })
-    .collect()
+        .filter(|setting| !is_explained || setting.flag != DIGEST)
+        .map(|setting| Setting {
+            flag: FIELDS
+                .iter()
+                .find(|(field, _)| *field == setting.flag)
+                .map_or(&*setting.flag, |(_, words)| *words)
+                .to_owned(),
+            ..setting.clone()
+        })
+        .collect()
 }

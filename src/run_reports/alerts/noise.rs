@@ -1,5 +1,5 @@
-//! The effect of the runs' levels on the signal-to-noise ratio of images with sensor noise, and on their codes: [`noise_alerts`],
-//! [`rounding_alert`].
+//! Alerts about noise profiles with the same signal-to-noise ratio at every level ([`noise_alerts`]), and about levels that leave too few
+//! 8-bit codes ([`rounding_alert`]).
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -11,13 +11,12 @@ use crate::types::degradations::Kind;
 use crate::types::{Condition, Degradation, Severity, TrialRef};
 use darkqa_score::answers::record::Detail;
 
-/// The exposure drop in hundredths of EV above which at most nine codes are left: white has code
-/// 255 · 2^(−EV/2.2) = 8 there.
+/// The exposure drop, in hundredths of EV, above which an image has at most nine codes: white gets code 255 · 2^(−EV/2.2) = 8.
 const FEW_CODES: u16 = 1100;
 
-/// The noise profiles whose levels all have the same signal-to-noise ratio, where a run has several levels with noise.
+/// Alerts about noise profiles whose levels all have the same signal-to-noise ratio, for runs with several levels with noise.
 pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
-    let mut of_draws = BTreeMap::<&str, BTreeSet<&str>>::new();
+    let mut profiles_by_reason = BTreeMap::<&str, BTreeSet<&str>>::new();
     for run in &joined.runs {
         let mut levels = BTreeMap::<String, BTreeSet<Severity>>::new();
         for condition in conditions(joined.trials_of(run)) {
@@ -33,12 +32,14 @@ pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         for (reading, content) in contents {
             let several = levels.get(reading).is_some_and(|levels| levels.len() > 1);
             if several && content["--coupling"] == "independent" {
-                let names = of_draws.entry(same_noise(content)).or_default();
-                names.insert(reading);
+                profiles_by_reason
+                    .entry(same_noise(content))
+                    .or_default()
+                    .insert(reading);
             }
         }
     }
-    of_draws.into_iter().map(|(why, names)| {
+    profiles_by_reason.into_iter().map(|(why, names)| {
         let names: Vec<&str> = names.into_iter().collect();
         let text = format!(
             "With noise ({}) the signal-to-noise ratio is the same at every level: {why}. --profile physical loses photons with the light.",
@@ -48,7 +49,7 @@ pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     }).collect()
 }
 
-/// In which way the levels of a noise profile have the same noise, if its light ratio r does not depend on the level.
+/// The reason why all levels of a noise profile have the same signal-to-noise ratio, if its light ratio r does not depend on the level.
 fn same_noise(reading: &Value) -> &'static str {
     if reading["--draws"] == "shared" {
         "the levels are one noisy image at several brightnesses"
@@ -57,7 +58,7 @@ fn same_noise(reading: &Value) -> &'static str {
     }
 }
 
-/// The levels at which an image has so few codes that their rounding decides.
+/// The alert about levels at which an image has too few codes, so that rounding dominates.
 pub(super) fn rounding_alert<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
     let levels: BTreeSet<Severity> = conditions(joined.trials.iter())
         .into_iter()
@@ -82,7 +83,7 @@ pub(super) fn rounding_alert<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
     Some(Alert::new(AlertKind::Noise, text))
 }
 
-/// The different conditions of some trials.
+/// The distinct conditions of trials.
 fn conditions<'t, D: Detail + 't>(
     trials: impl Iterator<Item = TrialRef<'t, D>>,
 ) -> HashSet<&'t Condition> {

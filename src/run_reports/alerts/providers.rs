@@ -1,4 +1,4 @@
-//! The line about models that a router passed on to several providers: [`provider_alerts`].
+//! Alerts about models that a router served by several providers: [`provider_alerts`].
 
 use std::collections::BTreeMap;
 

@@ -1,10 +1,10 @@
-//! Questions that differ between runs, and models that were not asked the same: [`question_alerts`], [`repeat_alert`], [`item_alerts`].
+//! Alerts about questions that differ between runs or models: [`question_alerts`], [`repeat_alert`], [`item_alerts`].
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use crate::run_reports::combine::Combined;
-use crate::run_reports::join::{Joined, JoinedRun};
-use crate::run_reports::settings::{is_of_people, listed};
+use crate::run_reports::join::Joined;
+use crate::run_reports::settings::{has_human_answers, joined_with_and};
 use crate::text::alert::{Alert, AlertKind};
 use crate::text::words::counted;
 use crate::types::{QuestionId, RunQuestion, TrialRef};
@@ -12,11 +12,11 @@ use darkqa_score::answers::record::Detail;
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::is_control;
 
-/// Differences between the questions of the runs, and between the files that they are about.
+/// Alerts about differences between the questions of the runs, and between their image files.
 pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut asked = Vec::<BTreeMap<&QuestionId, Option<&RunQuestion>>>::new();
     for run in &joined.runs {
-        // A control is shown frames of its own choice, in a shard others than the models.
+        // A control gets its own choice of frames, and in a shard other frames than the models.
         let ids: HashSet<&QuestionId> = joined
             .trials_of(run)
             .filter(|trial| !is_control(trial.model()))
@@ -45,12 +45,12 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             .collect();
         let text = format!(
             "The questions differ: {} share {}.",
-            listed(&counts),
+            joined_with_and(&counts),
             counted(shared.len(), "question")
         );
         alerts.push(Alert::new(AlertKind::Questions, text));
     }
-    // A question is compared with that of the first run that has it.
+    // Each question is compared with the same one in the first run that has it.
     let mut firsts = BTreeMap::<&QuestionId, &RunQuestion>::new();
     let mut pairs = Vec::<(&QuestionId, &RunQuestion, &RunQuestion)>::new();
     for (id, question) in asked.iter().flatten() {
@@ -63,7 +63,7 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             }
         }
     }
-    let differ = |differs: &dyn Fn(&RunQuestion, &RunQuestion) -> bool| {
+    let count = |differs: &dyn Fn(&RunQuestion, &RunQuestion) -> bool| {
         let ids: BTreeSet<&QuestionId> = pairs
             .iter()
             .filter(|(_, one, other)| differs(one, other))
@@ -71,12 +71,12 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             .collect();
         ids.len()
     };
-    let words = differ(&|one, other| one.text != other.text);
+    let words = count(&|one, other| one.text != other.text);
     if words > 0 {
         let text = format!("The words of {} differ.", counted(words, "shared question"));
         alerts.push(Alert::new(AlertKind::Questions, text));
     }
-    let files = differ(&|one, other| one.image.zip(other.image).is_some_and(|(a, b)| a != b));
+    let files = count(&|one, other| one.image.zip(other.image).is_some_and(|(a, b)| a != b));
     if files > 0 {
         let text = format!(
             "The frames of {} are other files under the same names.",
@@ -84,7 +84,7 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         );
         alerts.push(Alert::new(AlertKind::Data, text));
     }
-    let groups = differ(&|one, other| {
+    let groups = count(&|one, other| {
         let groups = one.group.as_ref().zip(other.group.as_ref());
         groups.is_some_and(|(group, other)| group != other)
     });
@@ -98,13 +98,12 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts
 }
 
-/// Runs that asked the same questions a different number of times.
+/// The alert about runs that asked the same questions a different number of times.
 pub(super) fn repeat_alert(combined: &Combined) -> Option<Alert> {
-    let people = |run: &&JoinedRun| !is_of_people(&run.manifest);
     let times: Vec<(&String, u32)> = combined
         .runs
         .iter()
-        .filter(people)
+        .filter(|run| !has_human_answers(&run.manifest))
         .map(|run| {
             let times = combined
                 .trials_of(run)
@@ -123,22 +122,21 @@ pub(super) fn repeat_alert(combined: &Combined) -> Option<Alert> {
             .collect();
         let text = format!(
             "Questions were asked a different number of times: --repeats is {}.",
-            listed(&times)
+            joined_with_and(&times)
         );
         Alert::new(AlertKind::Questions, text)
     })
 }
 
-/// Models that did not answer the same questions.
+/// The alert about models that did not answer the same questions.
 pub(super) fn item_alerts(findings: &Findings<'_>) -> Vec<Alert> {
     let Some(common) = &findings.common else {
         return Vec::new();
     };
-    let short = common
+    let short: Vec<String> = common
         .asked
         .iter()
-        .filter(|asked| asked.questions < common.questions);
-    let short: Vec<String> = short
+        .filter(|asked| asked.questions < common.questions)
         .enumerate()
         .map(|(place, asked)| {
             let blind = if asked.is_blind {
@@ -158,7 +156,7 @@ pub(super) fn item_alerts(findings: &Findings<'_>) -> Vec<Alert> {
     }
     let text = format!(
         "Models were asked different questions: {}. Compare by the {} shared: the second table has them, --common leaves out all others.",
-        listed(&short),
+        joined_with_and(&short),
         common.shared_questions
     );
     vec![Alert::new(AlertKind::Items, text)]

@@ -1,11 +1,11 @@
-//! Replies that were read by another version of the lenient parsing: [`reading_alerts`].
+//! Alerts about replies that were parsed by another version of the lenient rules: [`reading_alerts`].
 
 use crate::run_reports::combine::Combined;
-use crate::run_reports::rereading::LenientChange;
+use crate::run_reports::lenient_change::LenientChange;
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::TrialRef;
 
-/// How the lenient parsing of each run would change by the rules of this version.
+/// One alert for each run whose lenient parsing would change under the rules of this version.
 pub(super) fn reading_alerts(combined: &Combined) -> Vec<Alert> {
     combined
         .runs
@@ -19,7 +19,7 @@ pub(super) fn reading_alerts(combined: &Combined) -> Vec<Alert> {
                 .trials_of(run)
                 .map(TrialRef::text)
                 .map(|place| combined.texts[place.log()].record(place));
-            let text = match change.through(records) {
+            let text = match change.with_records(records) {
                 Ok(change) if change.has_changed() => {
                     format!(
                         "{}: {}. --rescore stores what it reads now.",

@@ -1,15 +1,16 @@
-//! Replies that cannot be counted, or count as wrong: [`reply_alerts`], [`people_alerts`].
+//! Alerts about replies that are not scored, or are scored as wrong: [`reply_alerts`], [`broken_off_alert`], [`people_alerts`].
 
 use std::collections::BTreeMap;
 
 use crate::run_reports::combine::Combined;
-use crate::run_reports::settings::is_of_people;
+use crate::run_reports::settings::has_human_answers;
 use crate::text::alert::{Alert, AlertKind, MAX_UNREAD};
 use crate::text::words::counted;
 use crate::types::{TrialRef, UnreadReason};
 use darkqa_score::accuracies::Health;
 
-/// Replies that could not be read, with what they count as, and trials without a reply.
+/// Alerts about replies that could not be parsed and about failed trials. `unread_as` completes the sentence about the former, for example
+/// with "count as wrong".
 pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, [usize; 3]>::new();
     for health in health {
@@ -26,17 +27,15 @@ pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
                 "{unread} of {replies} replies of {model} ({share:.1} %) could not be read, and {unread_as}."
             );
             alerts.push(Alert::new(AlertKind::Unread, text));
-        } else if let Some(worst) = worst(health, model) {
+        } else if let Some(worst) = worst_condition(health, model) {
             alerts.push(Alert::new(
                 AlertKind::Unread,
-                in_condition(worst, unread_as),
+                unread_in_condition(worst, unread_as),
             ));
         }
         if failed > 0 {
-            let (trials, are) = (
-                counted(failed, "trial"),
-                if failed == 1 { "is" } else { "are" },
-            );
+            let trials = counted(failed, "trial");
+            let are = if failed == 1 { "is" } else { "are" };
             let text = format!("{trials} of {model} failed and {are} not scored.");
             alerts.push(Alert::new(AlertKind::Failed, text));
         }
@@ -44,18 +43,18 @@ pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
     alerts
 }
 
-/// The condition of a model with the largest share of replies that could not be read, if it is above the limit.
-fn worst<'h>(health: &'h [Health], model: &str) -> Option<&'h Health> {
+/// The condition of a model with the largest share of replies that could not be parsed, if the share is above [`MAX_UNREAD`].
+fn worst_condition<'h>(health: &'h [Health], model: &str) -> Option<&'h Health> {
     let share = |health: &Health| health.unreadable() as f64 / health.replies as f64;
-    let above = health
+    health
         .iter()
         .filter(|health| health.subject.model == model)
-        .filter(|health| health.replies > 0 && share(health) > MAX_UNREAD);
-    above.max_by(|a, b| share(a).total_cmp(&share(b)))
+        .filter(|health| health.replies > 0 && share(health) > MAX_UNREAD)
+        .max_by(|a, b| share(a).total_cmp(&share(b)))
 }
 
-/// The replies of a condition that could not be read, and how many of them the lenient parsing reads.
-fn in_condition(health: &Health, unread_as: &str) -> String {
+/// The sentence about the replies of a condition that could not be parsed, with the number that the lenient parsing accepts.
+fn unread_in_condition(health: &Health, unread_as: &str) -> String {
     let unread = health.unreadable();
     let share = 100.0 * unread as f64 / health.replies as f64;
     let lenient = match health.lenient_only {
@@ -71,7 +70,7 @@ fn in_condition(health: &Health, unread_as: &str) -> String {
     )
 }
 
-/// Generations that broke off, by the server's word for the reason.
+/// The alert about generations that broke off, with the number for each `finish_reason` of the server.
 pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
     let mut counts = BTreeMap::<&str, usize>::new();
     for word in combined.trials.iter().filter_map(TrialRef::broken_off) {
@@ -88,21 +87,19 @@ pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
     (!words.is_empty()).then(|| Alert::new(AlertKind::Failed, text))
 }
 
-/// Answers of people that are no choice of their question.
+/// One alert for each run with human answers that are not a choice of their question.
 pub(super) fn people_alerts(combined: &Combined) -> Vec<Alert> {
-    let people = combined
+    combined
         .runs
         .iter()
-        .filter(|run| is_of_people(&run.manifest));
-    people
+        .filter(|run| has_human_answers(&run.manifest))
         .filter_map(|run| {
-            let unread = combined
+            let count = combined
                 .trials_of(run)
-                .filter_map(|trial| trial.strict()?.why);
-            // In runs of earlier versions, who could not tell gave an empty answer.
-            let is_said =
-                |why: &UnreadReason| matches!(why, UnreadReason::Empty | UnreadReason::CannotTell);
-            let count = unread.filter(|why| !is_said(why)).count();
+                .filter_map(|trial| trial.strict()?.why)
+                // In runs of earlier versions, an empty answer means "cannot tell".
+                .filter(|why| !matches!(why, UnreadReason::Empty | UnreadReason::CannotTell))
+                .count();
             let text = format!(
                 "{} of {} of people are not choices of their questions, and count as wrong.",
                 count,

@@ -1,22 +1,24 @@
-//! Servers that differ between runs: [`server_alerts`].
+//! Alerts about servers that differ between runs: [`server_alerts`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::words::{names, sentence};
+use super::words::{difference_sentence, run_names};
 use crate::run_reports::join::Joined;
-use crate::run_reports::settings::{Settings, address, differing, is_of_people, listed};
+use crate::run_reports::settings::{
+    Settings, base_url, differing_settings, has_human_answers, joined_with_and,
+};
 use crate::text::alert::{Alert, AlertKind};
 use darkqa_score::answers::record::Detail;
 
-/// The names that servers gave for a model, and the addresses, if there are several.
+/// Alerts about models that were served under several names or asked at several base URLs.
 pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
-    let names = names(&joined.runs);
+    let run_names = run_names(&joined.runs);
     let mut served = BTreeMap::<&str, BTreeMap<usize, &BTreeSet<String>>>::new();
     for (index, run) in joined
         .runs
         .iter()
         .enumerate()
-        .filter(|(_, run)| !is_of_people(&run.manifest))
+        .filter(|(_, run)| !has_human_answers(&run.manifest))
     {
         for (model, names) in &run.served {
             served.entry(model).or_default().insert(index, names);
@@ -30,10 +32,10 @@ pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
                 .iter()
                 .map(|(run, served)| {
                     let served: Vec<&String> = served.iter().collect();
-                    format!("{} in {}", listed(&served), names[*run])
+                    format!("{} in {}", joined_with_and(&served), run_names[*run])
                 })
                 .collect();
-            let text = format!("{model} was served as {}.", listed(&runs));
+            let text = format!("{model} was served as {}.", joined_with_and(&runs));
             alerts.push(Alert::new(AlertKind::Served, text));
         }
     }
@@ -44,16 +46,20 @@ pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         .flat_map(BTreeMap::keys)
         .collect();
     for model in models {
-        let addresses = joined.runs.iter().map(|run| {
-            let address = address(&run.manifest, model)?;
-            Some(Settings::from([("--base-url".to_owned(), address)]))
-        });
-        let differing = differing(&addresses.collect::<Vec<_>>());
-        if !differing.is_empty() {
+        let base_urls: Vec<Option<Settings>> = joined
+            .runs
+            .iter()
+            .map(|run| {
+                let base_url = base_url(&run.manifest, model)?;
+                Some(Settings::from([("--base-url".to_owned(), base_url)]))
+            })
+            .collect();
+        let differences = differing_settings(&base_urls);
+        if !differences.is_empty() {
             let what = format!("{model} was asked at several addresses");
             alerts.push(Alert::new(
                 AlertKind::Served,
-                sentence(&what, &differing, &names),
+                difference_sentence(&what, &differences, &run_names),
             ));
         }
     }

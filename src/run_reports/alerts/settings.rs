@@ -1,35 +1,36 @@
-//! Settings that differ between runs: [`setting_alerts`].
+//! Alerts about settings that differ between runs: [`setting_alerts`].
 
 use std::collections::BTreeMap;
 
-use super::words::{names, sentence};
+use super::words::{difference_sentence, run_names};
 use crate::run_reports::join::Joined;
 use crate::run_reports::settings::{
-    ENCODING, Setting, Settings, differing, light, listed, parameter_flags, some, without_repeated,
+    ENCODING, Setting, Settings, differing_settings, identity_fields, joined_with_and,
+    light_settings, remote_model_settings, without_explained,
 };
 use crate::text::alert::{Alert, AlertKind};
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::record::Detail;
 
-/// The flags that decide the orders in which choices are shown.
+/// Flags that determine the orders of choices.
 const ORDERS: [&str; 2] = ["--shuffle-options", "--circular"];
 
-/// Differences between the settings in the manifests.
+/// Alerts about differences between the settings in the manifests.
 pub(super) fn setting_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
-    let names = names(&joined.runs);
+    let names = run_names(&joined.runs);
     let manifests: Vec<&RunManifest> = joined.runs.iter().map(|run| &run.manifest).collect();
-    let of = |read: &dyn Fn(&RunManifest) -> Settings| {
-        let settings = manifests.iter().map(|run| Some(read(run)));
-        differing(&settings.collect::<Vec<_>>())
+    let differing = |settings_of: &dyn Fn(&RunManifest) -> Option<Settings>| {
+        let settings: Vec<_> = manifests.iter().map(|run| settings_of(run)).collect();
+        differing_settings(&settings)
     };
-    let flags = |flags: &'static [&'static str]| of(&move |run| some(run, flags));
-    let (constraints, parameters): (Vec<Setting>, Vec<Setting>) = {
-        let settings = manifests.iter().map(|run| parameter_flags(run));
-        let all = differing(&settings.collect::<Vec<_>>());
-        all.into_iter()
-            .partition(|setting| setting.flag == "--constrain")
-    };
-    let version = of(&|run| Settings::from([("the version".to_owned(), run.version.clone())]));
+    let flags = |flags: &[&str]| differing(&|run| Some(identity_fields(run, flags)));
+    let (constraints, parameters): (Vec<Setting>, Vec<Setting>) = differing(&remote_model_settings)
+        .into_iter()
+        .partition(|setting| setting.flag == "--constrain");
+    let version = differing(&|run| {
+        let version = ("the version".to_owned(), run.version.clone());
+        Some(Settings::from([version]))
+    });
     let rows = [
         (AlertKind::Data, "The data differ", flags(&["--data"])),
         (
@@ -71,22 +72,24 @@ pub(super) fn setting_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts: Vec<Alert> = rows
         .into_iter()
         .filter(|(_, _, settings)| !settings.is_empty())
-        .map(|(kind, what, settings)| Alert::new(kind, sentence(what, &settings, &names)))
+        .map(|(kind, what, settings)| {
+            Alert::new(kind, difference_sentence(what, &settings, &names))
+        })
         .collect();
-    let light = without_repeated(of(&|run| light(run, &manifests)));
+    let light = without_explained(differing(&|run| Some(light_settings(run, &manifests))));
     alerts.extend(light_alerts(joined, &light, &names));
     alerts
 }
 
-/// The settings of the light that differ, and the conditions that are kept apart for it.
+/// Alerts about light settings that differ, and about the conditions that are split because of them.
 fn light_alerts<D: Detail>(joined: &Joined<D>, light: &[Setting], names: &[String]) -> Vec<Alert> {
     let mut alerts = Vec::new();
     let mut sentences = Vec::new();
     if !light.is_empty() {
-        sentences.push(sentence("The light differs", light, names));
+        sentences.push(difference_sentence("The light differs", light, names));
     }
     let mut by_groups = BTreeMap::<_, (Vec<String>, usize, usize)>::new();
-    for split in &joined.lights.split {
+    for split in &joined.image_groups.split_curves {
         let (curves, shared, differing) = by_groups.entry(&split.groups).or_default();
         curves.push(split.curve.name());
         *shared += split.shared;
@@ -99,25 +102,25 @@ fn light_alerts<D: Detail>(joined: &Joined<D>, light: &[Setting], names: &[Strin
             _ => format!("{differing} of {shared} shared images differ"),
         };
         let stand = if curves.len() == 1 { "stands" } else { "stand" };
-        let curves = listed(&curves);
+        let curves = joined_with_and(&curves);
         sentences.push(format!(
             "{curves} {stand} apart as {}: {why}.",
-            listed(&groups)
+            joined_with_and(&groups)
         ));
     }
     if !sentences.is_empty() {
         alerts.push(Alert::new(AlertKind::Light, sentences.join(" ")));
     }
-    if !joined.lights.undigested.is_empty() {
+    if !joined.image_groups.undigested.is_empty() {
         let runs: Vec<&String> = joined
-            .lights
+            .image_groups
             .undigested
             .iter()
             .map(|run| &names[*run])
             .collect();
         let text = format!(
             "The records of {} hold no digests of images: the settings in the manifests decide what was shown.",
-            listed(&runs)
+            joined_with_and(&runs)
         );
         alerts.push(Alert::new(AlertKind::Light, text));
     }

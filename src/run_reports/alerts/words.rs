@@ -1,15 +1,15 @@
-//! Words of alerts: [`names`] and [`sentence`].
+//! Wording that alerts share: [`run_names`] and [`difference_sentence`].
 
 use crate::run_reports::join::JoinedRun;
 use crate::run_reports::settings::Setting;
 
 /// The names of runs.
-pub(super) fn names(runs: &[JoinedRun]) -> Vec<String> {
+pub(super) fn run_names(runs: &[JoinedRun]) -> Vec<String> {
     runs.iter().map(|run| run.name.clone()).collect()
 }
 
-/// The sentence about a difference, with the settings behind it: `The light differs: --seed is 0 in a and 1 in b.`
-pub(super) fn sentence(what: &str, settings: &[Setting], names: &[String]) -> String {
+/// The sentence about a difference, with the settings that cause it: `The light differs: --seed is 0 in a and 1 in b.`
+pub(super) fn difference_sentence(what: &str, settings: &[Setting], names: &[String]) -> String {
     let settings: Vec<String> = settings
         .iter()
         .map(|setting| setting.words(names))

@@ -1,7 +1,6 @@
-//! The site of many runs: [`site`]. Each run has the page of its report, and rows in the table of those that can be compared with it.
+//! A site about many runs: [`site`]. Each run has the page of its report, and rows in a table with the runs that it can be compared with.
 
-mod group;
-mod member;
+mod group_key;
 mod ranking;
 
 use std::collections::BTreeSet;
@@ -11,29 +10,39 @@ use super::combine::{Combined, combine};
 use super::enhancers;
 use super::open;
 use super::own_answers;
-use super::whole_report::shown;
+use super::whole_report::without_hidden_models;
 use crate::error::{Error, Result};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::products::{PAGE, products};
-use crate::report::site::{GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows};
+use crate::report::site::{
+    ChoiceRow, GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows,
+};
 use crate::runs::stored::{AnyRun, StoredRun};
 use crate::types::manifests::RunManifest;
-use crate::types::{ChoiceDetail, OpenDetail, Trials, Truths, Variant};
+use crate::types::{ChoiceDetail, OpenDetail, RunQuestion, Trials, Truths, Variant};
 
-use group::{GroupKey, grouped};
-use member::ChoiceMember;
-use ranking::ranked;
+use group_key::{GroupKey, group_members};
+use ranking::ranked_rows;
 
-/// A run of open questions.
+/// A run of questions with choices: its rows, and the trials by which models are compared.
+struct ChoiceMember {
+    key: GroupKey,
+    run: RunLink,
+    rows: Vec<ChoiceRow>,
+    trials: Trials<ChoiceDetail>,
+    questions: Vec<RunQuestion>,
+}
+
+/// A run of open questions, with its rows.
 struct OpenMember {
     key: GroupKey,
     rows: Vec<OpenRow>,
 }
 
-/// The site of these runs, in their order.
+/// Makes the site of runs, in their order.
 ///
 /// # Errors
-/// If a run has no record or a record is broken.
+/// If a run has no records or a record is broken.
 pub(crate) fn site(runs: Vec<AnyRun>) -> Result<Site> {
     let mut site = Site {
         groups: Vec::new(),
@@ -54,9 +63,9 @@ pub(crate) fn site(runs: Vec<AnyRun>) -> Result<Site> {
             }
         }
     }
-    let groups = grouped(choices, |member| &member.key);
-    add_groups(&mut site, groups, |member| &member.key, ranked);
-    let groups = grouped(open, |member| &member.key);
+    let groups = group_members(choices, |member| &member.key);
+    add_groups(&mut site, groups, |member| &member.key, ranked_rows);
+    let groups = group_members(open, |member| &member.key);
     add_groups(
         &mut site,
         groups,
@@ -69,7 +78,7 @@ pub(crate) fn site(runs: Vec<AnyRun>) -> Result<Site> {
     Ok(site)
 }
 
-/// Adds groups of one kind, each with what differs from the first.
+/// Adds groups of one kind, each with its differences from the first.
 fn add_groups<M>(
     site: &mut Site,
     groups: Vec<Vec<M>>,
@@ -104,15 +113,15 @@ fn add_groups<M>(
     }
 }
 
-/// Adds the page of a run; returns what its rows are made from, or the reason why it has none.
+/// Adds the page of a run. Returns `None` for a run without rows, and then adds it to the other runs with the reason.
 fn add_choices(
     run: StoredRun<ChoiceDetail>,
     link: RunLink,
     site: &mut Site,
 ) -> Result<Option<ChoiceMember>> {
-    let combined = combine(vec![shown(run)?])?;
+    let combined = combine(vec![without_hidden_models(run)?])?;
     if combined.truths() == Truths::Unknown {
-        let page = page_of(own_answers::whole(&combined)?.files)?;
+        let page = page_of(own_answers::whole_report(&combined)?.files)?;
         let why = "nobody knows the true answers to its questions";
         site.others.push((link.clone(), why.to_owned()));
         site.pages.push((link, page));
@@ -121,7 +130,7 @@ fn add_choices(
     let findings = combined.findings();
     let report = ChoiceReport::new(&findings, alerts(&combined, &findings))
         .with_enhancers(&enhancers::rows(&combined.runs));
-    let page = page_of(products(&report, &combined.shown())?)?;
+    let page = page_of(products(&report, &combined.page_inputs())?)?;
     let variant = findings.shown().grid.main_variant();
     let variant = variant.unwrap_or(Variant::NONE);
     let rows = choice_rows(findings.shown(), &variant, &link);
@@ -144,7 +153,7 @@ fn add_choices(
     }))
 }
 
-/// The trials that models are compared by: of raw images at L0 and in the main variant.
+/// The trials by which models are compared: raw images at L0 and in the main variant.
 fn compared_trials(combined: &Combined, variant: &Variant) -> Trials<ChoiceDetail> {
     let trials = combined.trials.iter().filter(|trial| {
         trial.condition().is_some_and(|condition| {
@@ -160,7 +169,7 @@ fn compared_trials(combined: &Combined, variant: &Variant) -> Trials<ChoiceDetai
 }
 
 fn add_open(run: StoredRun<OpenDetail>, link: RunLink, site: &mut Site) -> Result<OpenMember> {
-    let run = shown(run)?;
+    let run = without_hidden_models(run)?;
     let key = GroupKey::from_open(&run)?;
     let scores = open::Scores::new(open::combine(vec![run])?)?;
     let rows = open_rows(scores.summary(), &link);
@@ -170,12 +179,15 @@ fn add_open(run: StoredRun<OpenDetail>, link: RunLink, site: &mut Site) -> Resul
 
 /// The page among the files of a report.
 fn page_of(files: Vec<(String, Vec<u8>)>) -> Result<Vec<u8>> {
-    let page = files.into_iter().find(|(name, _)| name == PAGE);
-    let page = page.ok_or_else(|| Error::data(PAGE, "the report of the run has no page"))?;
-    Ok(page.1)
+    files
+        .into_iter()
+        .find(|(name, _)| name == PAGE)
+        .map(|(_, page)| page)
+        .ok_or_else(|| Error::data(PAGE, "the report of the run has no page"))
 }
 
-/// A run as rows name it. The page's name is that of the run in letters that any address takes, with a number if another run has it.
+/// The link to the page of a run. The file is named after the run, with characters that are safe in URLs, and numbered if the name is
+/// already in `taken`.
 fn link(name: &str, manifest: &RunManifest, taken: &mut BTreeSet<String>) -> RunLink {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     let stem: String = name

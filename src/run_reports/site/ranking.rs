@@ -1,9 +1,9 @@
-//! The ranks of the models of one table: [`ranked`].
+//! Ranks of the models in one table of the site: [`ranked_rows`].
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::member::ChoiceMember;
+use super::ChoiceMember;
 use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::run_reports::combine::clusters;
 use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
@@ -11,10 +11,10 @@ use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::{BestInTheDark, best_in_the_dark, rank_ranges};
 use darkqa_score::grid::Grid;
 
-/// The rows of runs that can be compared, in the order of their ranks. Models are compared by mean accuracy in the dark on the items that all of
-/// them answered at all levels, as in the report; those that stand for comparison only are not.
-pub(super) fn ranked(members: Vec<ChoiceMember>) -> GroupRows {
-    let names = names(&members);
+/// The rows of runs that can be compared, in the order of their ranks. As in the report, models are ranked by mean accuracy in the dark on
+/// the items that all of them answered at all levels. References get no rank.
+pub(super) fn ranked_rows(members: Vec<ChoiceMember>) -> GroupRows {
+    let names = distinct_names(&members);
     let (mut trials, mut questions, mut rows) = (Trials::default(), Vec::new(), Vec::new());
     for member in members {
         let name = |model: &str| names[&(member.run.page.clone(), model.to_owned())].clone();
@@ -31,7 +31,7 @@ pub(super) fn ranked(members: Vec<ChoiceMember>) -> GroupRows {
     }
     let models = rows.iter().filter(|(_, row)| !row.is_reference()).count();
     let (best, unit) = best(&trials, &questions);
-    // References alone are ranked by no test.
+    // A single model needs no comparison with references.
     let best = best.filter(|_| models > 1);
     let ranks: BTreeMap<String, _> = best
         .iter()
@@ -50,8 +50,8 @@ pub(super) fn ranked(members: Vec<ChoiceMember>) -> GroupRows {
     GroupRows::Choices(rows, Ranking { words })
 }
 
-/// The name of each model of each run, by page and model: with the run behind it, if another run has a model of that name.
-fn names(members: &[ChoiceMember]) -> BTreeMap<(String, String), String> {
+/// A distinct name of each model of each run, by page and model: followed by the page if another run has a model of this name.
+fn distinct_names(members: &[ChoiceMember]) -> BTreeMap<(String, String), String> {
     let mut times = BTreeMap::<&str, usize>::new();
     for row in members.iter().flat_map(|member| &member.rows) {
         *times.entry(&row.model).or_default() += 1;
@@ -69,7 +69,7 @@ fn names(members: &[ChoiceMember]) -> BTreeMap<(String, String), String> {
         .collect()
 }
 
-/// The comparison of all models, and the unit that is treated as independent.
+/// The comparison of all models, and the unit treated as independent.
 fn best(
     trials: &Trials<ChoiceDetail>,
     questions: &[RunQuestion],
@@ -82,7 +82,7 @@ fn best(
     )
 }
 
-/// On what the ranks are based.
+/// The paragraph about the basis of the ranks, or the reason why there are none.
 fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
     let Some(best) = best else {
         return match models {

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::places::places;
-use super::row::{Row, Rows, Tabled};
+use super::places::ordered_places;
+use super::row::{Row, Rows, TableDetail};
 use crate::error::Result;
-use crate::runs::stored::manifest;
+use crate::runs::stored::read_run_manifest;
 use crate::store::{LinePlace, RecordLog, each_question};
 use crate::types::Record;
 
@@ -17,7 +17,7 @@ const MAX_RECORDS: usize = 1 << 14;
 const MAX_BYTES: usize = 16 << 20;
 
 /// Rows of a run in order, read in batches to keep the records out of memory.
-pub(super) struct RowBatches<D: Tabled> {
+pub(super) struct RowBatches<D: TableDetail> {
     log: RecordLog,
     rows: Rows<D>,
     /// Places of the records in the log, in the order of the rows.
@@ -26,19 +26,19 @@ pub(super) struct RowBatches<D: Tabled> {
     read: usize,
 }
 
-impl<D: Tabled> RowBatches<D> {
+impl<D: TableDetail> RowBatches<D> {
     /// Opens the run in a folder.
     ///
     /// # Errors
     /// If a line of the run is malformed.
     pub(super) fn open(folder: &Path) -> Result<Self> {
-        let manifest = manifest(folder)?;
+        let manifest = read_run_manifest(folder)?;
         let mut questions = Vec::new();
         each_question(folder, |question| {
             questions.push(question.without_evidence());
         })?;
         Ok(Self {
-            places: places(folder, &manifest, &questions)?,
+            places: ordered_places(folder, &manifest, &questions)?,
             rows: Rows::new(folder, &manifest, &questions)?,
             log: RecordLog::open(folder)?,
             read: 0,

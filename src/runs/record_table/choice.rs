@@ -1,9 +1,11 @@
-//! The table of records of questions with choices.
+//! Table of the records of questions with choices.
 
 use std::path::Path;
 
-use super::common::{column, head, image, last, reply, word};
-use super::row::{Row, SentImage, Tabled};
+use super::common::{
+    column, image_columns, leading_columns, reply_columns, serialized_word, trailing_columns,
+};
+use super::row::{Row, SentImage, TableDetail};
 use crate::error::Result;
 use crate::store::CellKind::{Bool, Int8, Int32, Text};
 use crate::store::Presence::{Always, MayBeNull};
@@ -11,12 +13,12 @@ use crate::store::{Cell, Column};
 use crate::types::manifests::RunManifest;
 use crate::types::{AnswerReading, ChoiceDetail, Record, RunQuestion};
 
-impl Tabled for ChoiceDetail {
+impl TableDetail for ChoiceDetail {
     const TABLE: &'static str = "darkqa.records/1";
 
     type Context = ();
 
-    type Further = ();
+    type Extra = ();
 
     fn columns() -> Vec<Column<Row<Self>>> {
         let own = vec![column("shown_frame", Text, MayBeNull, |row: &Row<Self>| {
@@ -24,12 +26,12 @@ impl Tabled for ChoiceDetail {
             Cell::text(shown.map(|frame| &*frame.0))
         })];
         let parts = [
-            head(),
-            question(),
-            readings(),
-            reply(),
-            image(),
-            last(),
+            leading_columns(),
+            question_columns(),
+            reading_columns(),
+            reply_columns(),
+            image_columns(),
+            trailing_columns(),
             own,
         ];
         parts.into_iter().flatten().collect()
@@ -39,7 +41,7 @@ impl Tabled for ChoiceDetail {
         Ok(())
     }
 
-    fn further((): &(), _record: &Record) -> Option<()> {
+    fn extra((): &(), _record: &Record) -> Option<()> {
         Some(())
     }
 
@@ -64,8 +66,8 @@ impl Tabled for ChoiceDetail {
 
 type ChoiceRow = Row<ChoiceDetail>;
 
-/// The choices, and the true one.
-fn question() -> Vec<Column<ChoiceRow>> {
+/// Columns of the choices and the true choice.
+fn question_columns() -> Vec<Column<ChoiceRow>> {
     vec![
         column("truth", Int8, MayBeNull, |row: &ChoiceRow| {
             Cell::int(row.record.detail.truth)
@@ -77,7 +79,7 @@ fn question() -> Vec<Column<ChoiceRow>> {
             Cell::int(Some(row.record.detail.repeat))
         }),
         column("answer", Text, MayBeNull, |row| {
-            choice(row, row.record.detail.truth)
+            choice_text(row, row.record.detail.truth)
         }),
         column("choices", Text, Always, |row| {
             let choices = serde_json::to_string(&row.record.detail.choices);
@@ -86,8 +88,8 @@ fn question() -> Vec<Column<ChoiceRow>> {
     ]
 }
 
-/// Columns of both readings of the reply.
-fn readings() -> Vec<Column<ChoiceRow>> {
+/// Columns of the strict and the lenient parsing of the reply.
+fn reading_columns() -> Vec<Column<ChoiceRow>> {
     vec![
         column("strict", Int8, MayBeNull, |row: &ChoiceRow| {
             Cell::int(chosen(row.record.detail.strict))
@@ -96,10 +98,10 @@ fn readings() -> Vec<Column<ChoiceRow>> {
             Cell::int(chosen(row.record.detail.lenient))
         }),
         column("predicted", Text, MayBeNull, |row| {
-            choice(row, chosen(row.record.detail.strict))
+            choice_text(row, chosen(row.record.detail.strict))
         }),
         column("predicted_lenient", Text, MayBeNull, |row| {
-            choice(row, chosen(row.record.detail.lenient))
+            choice_text(row, chosen(row.record.detail.lenient))
         }),
         column("right", Bool, MayBeNull, |row| {
             right(row, row.record.detail.strict)
@@ -108,7 +110,7 @@ fn readings() -> Vec<Column<ChoiceRow>> {
             right(row, row.record.detail.lenient)
         }),
         column("outcome", Text, Always, |row| {
-            word(&row.record.detail.outcome)
+            serialized_word(&row.record.detail.outcome)
         }),
         column("why", Text, MayBeNull, |row| why(row.record.detail.strict)),
         column("why_lenient", Text, MayBeNull, |row| {
@@ -122,12 +124,12 @@ fn chosen(reading: Option<AnswerReading>) -> Option<usize> {
 }
 
 /// The text of a choice; null if there is none.
-fn choice(row: &ChoiceRow, index: Option<usize>) -> Cell<'_> {
+fn choice_text(row: &ChoiceRow, index: Option<usize>) -> Cell<'_> {
     let text = index.and_then(|index| row.record.detail.choices.get(index));
     Cell::text(text.map(String::as_str))
 }
 
-/// Whether a reading found the true choice; null if the trial failed, or if nobody knows the true choice.
+/// True if the parsed choice is the true one; null if the trial failed or the true choice is unknown.
 fn right<'r>(row: &ChoiceRow, reading: Option<AnswerReading>) -> Cell<'r> {
     match (reading, row.record.detail.truth) {
         (Some(reading), Some(truth)) => Cell::Bool(reading.chosen == Some(truth)),
@@ -137,5 +139,5 @@ fn right<'r>(row: &ChoiceRow, reading: Option<AnswerReading>) -> Cell<'r> {
 
 fn why<'r>(reading: Option<AnswerReading>) -> Cell<'r> {
     let why = reading.and_then(|reading| reading.why);
-    why.map_or(Cell::Null, |why| word(&why))
+    why.map_or(Cell::Null, |why| serialized_word(&why))
 }

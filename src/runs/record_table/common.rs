@@ -1,15 +1,14 @@
-//! The columns that the tables of both experiments have: [`head`], [`reply`], [`image()`] and [`last`].
+//! Columns in the tables of both experiments: [`leading_columns`], [`reply_columns`], [`image_columns`] and [`trailing_columns`].
 
 use serde::Serialize;
 use serde_json::Value;
 
-use super::row::{Row, Tabled};
+use super::row::{Row, TableDetail};
 use crate::store::CellKind::{Digest, Double, Int16, Int32, Key, LongText, Text};
 use crate::store::Presence::{Always, MayBeNull};
 use crate::store::{Cell, CellKind, Column, Presence};
 use crate::types::{Failure, Finish, Usage};
 
-/// A column.
 pub(super) fn column<R>(
     name: &'static str,
     kind: CellKind,
@@ -24,8 +23,8 @@ pub(super) fn column<R>(
     }
 }
 
-/// A value in the word that it has in records.
-pub(super) fn word<'r>(value: &impl Serialize) -> Cell<'r> {
+/// The text of a value as serialized in records; null if it is not serialized as a string.
+pub(super) fn serialized_word<'r>(value: &impl Serialize) -> Cell<'r> {
     match serde_json::to_value(value) {
         Ok(Value::String(word)) => Cell::Text(word.into()),
         _ => Cell::Null,
@@ -37,7 +36,7 @@ fn double<'r>(number: Option<f64>) -> Cell<'r> {
 }
 
 /// Columns of question, model and condition.
-pub(super) fn head<D: Tabled>() -> Vec<Column<Row<D>>> {
+pub(super) fn leading_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     vec![
         column("key", Key, Always, |row: &Row<D>| {
             Cell::Bytes(row.record.key.as_bytes())
@@ -58,25 +57,27 @@ pub(super) fn head<D: Tabled>() -> Vec<Column<Row<D>>> {
         column("model", Text, Always, |row| {
             Cell::text(Some(&row.record.model))
         }),
-        column("view", Text, Always, |row| word(&row.record.view)),
+        column("view", Text, Always, |row| {
+            serialized_word(&row.record.view)
+        }),
         column("condition", Text, MayBeNull, |row| {
-            Cell::text(row.light.condition.as_deref())
+            Cell::text(row.condition.condition.as_deref())
         }),
         column("level", Text, MayBeNull, |row| {
-            Cell::text(row.light.level.as_deref())
+            Cell::text(row.condition.level.as_deref())
         }),
         column("variant", Text, Always, |row| {
-            Cell::text(Some(&row.light.variant))
+            Cell::text(Some(&row.condition.variant))
         }),
         column("enhancer", Text, MayBeNull, |row| {
-            Cell::text(row.light.enhancer.as_deref())
+            Cell::text(row.condition.enhancer.as_deref())
         }),
-        column("ev", Double, MayBeNull, |row| double(row.light.ev)),
+        column("ev", Double, MayBeNull, |row| double(row.condition.ev)),
     ]
 }
 
 /// Columns of the reply.
-pub(super) fn reply<D: Tabled>() -> Vec<Column<Row<D>>> {
+pub(super) fn reply_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     vec![
         column("reply", LongText, MayBeNull, |row: &Row<D>| {
             Cell::text(row.record.reply.as_deref())
@@ -86,7 +87,9 @@ pub(super) fn reply<D: Tabled>() -> Vec<Column<Row<D>>> {
         }),
         column("failure_kind", Text, MayBeNull, |row| {
             let failure = row.record.failure.as_ref();
-            failure.map_or(Cell::Null, |failure: &Failure| word(&failure.kind))
+            failure.map_or(Cell::Null, |failure: &Failure| {
+                serialized_word(&failure.kind)
+            })
         }),
         column("failure_status", Int16, MayBeNull, |row| {
             let failure = row.record.failure.as_ref();
@@ -98,12 +101,12 @@ pub(super) fn reply<D: Tabled>() -> Vec<Column<Row<D>>> {
         }),
         column("finish", Text, MayBeNull, |row| match &row.record.finish {
             Some(Finish::Other(reason)) => Cell::text(Some(reason)),
-            finish => word(finish),
+            finish => serialized_word(finish),
         }),
         column("served_model", Text, MayBeNull, |row| {
             Cell::text(row.record.served_model.as_deref())
         }),
-        column("via", Text, Always, |row| word(&row.record.via)),
+        column("via", Text, Always, |row| serialized_word(&row.record.via)),
         column("prompt_tokens", Int32, MayBeNull, |row| {
             usage(row, |usage| usage.prompt_tokens)
         }),
@@ -119,12 +122,12 @@ pub(super) fn reply<D: Tabled>() -> Vec<Column<Row<D>>> {
     ]
 }
 
-fn usage<'r, D: Tabled>(row: &Row<D>, tokens: impl Fn(&Usage) -> Option<u64>) -> Cell<'r> {
+fn usage<'r, D: TableDetail>(row: &Row<D>, tokens: impl Fn(&Usage) -> Option<u64>) -> Cell<'r> {
     Cell::int(row.record.usage.as_ref().and_then(tokens))
 }
 
-/// The first image as it was sent.
-pub(super) fn image<D: Tabled>() -> Vec<Column<Row<D>>> {
+/// Columns of the first image sent.
+pub(super) fn image_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     vec![
         column("image_digest", Digest, MayBeNull, |row: &Row<D>| {
             let image = row.record.detail.image();
@@ -145,14 +148,14 @@ pub(super) fn image<D: Tabled>() -> Vec<Column<Row<D>>> {
     ]
 }
 
-/// Columns that few runs fill.
-pub(super) fn last<D: Tabled>() -> Vec<Column<Row<D>>> {
+/// Further columns of condition, tokens and endpoint, which were added later.
+pub(super) fn trailing_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     vec![
         column("reading", Text, MayBeNull, |row: &Row<D>| {
-            Cell::text(row.light.reading.as_deref())
+            Cell::text(row.condition.reading.as_deref())
         }),
         column("severity", Double, MayBeNull, |row| {
-            double(row.light.severity)
+            double(row.condition.severity)
         }),
         column("cached_tokens", Int32, MayBeNull, |row| {
             usage(row, |usage| usage.cached_tokens)

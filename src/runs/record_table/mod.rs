@@ -1,4 +1,4 @@
-//! `records.parquet`: the records of a run as a table for other programs, made from the log, which stays the truth: [`update`].
+//! `records.parquet`, the records of a run as a table for other programs: [`update`] writes it. The log stays the source of truth.
 
 mod batches;
 mod choice;
@@ -12,39 +12,42 @@ use std::path::Path;
 
 use self::batches::RowBatches;
 pub use self::reader::{Records, RunRecord, StoredRun};
-use self::row::Tabled;
+use self::row::TableDetail;
 use crate::error::Result;
 use crate::runs::outcome::RecordTable;
 use crate::runs::stored::ExperimentKind;
 use crate::store::{CREATED_BY, ColumnFile, FileMetadata, LogMark};
 use crate::types::{ChoiceDetail, OpenDetail};
 
-/// The name of the file.
 pub(crate) const RECORDS_PARQUET: &str = "records.parquet";
 
-/// Writes the table of the run in a folder, unless the one that is there is as new as the log. The records are not held in memory.
+/// Writes the table of the run in a folder, unless the existing one is up to date with the log. The records are not kept in memory.
 ///
 /// # Errors
 /// If a record is broken, or the file cannot be written.
 pub(crate) fn update(folder: &Path, table: RecordTable) -> Result<()> {
     match ExperimentKind::read(folder)? {
-        ExperimentKind::Choice => update_of::<ChoiceDetail>(folder, table),
-        ExperimentKind::Open => update_of::<OpenDetail>(folder, table),
+        ExperimentKind::Choice => update_kind::<ChoiceDetail>(folder, table),
+        ExperimentKind::Open => update_kind::<OpenDetail>(folder, table),
     }
 }
 
-fn update_of<D: Tabled>(folder: &Path, table: RecordTable) -> Result<()> {
+fn update_kind<D: TableDetail>(folder: &Path, table: RecordTable) -> Result<()> {
     let path = folder.join(RECORDS_PARQUET);
-    let name = ("darkqa.schema", D::TABLE.to_owned());
-    let pairs = LogMark::read(folder)?.pairs().into_iter().chain([name]);
+    let schema = ("darkqa.schema", D::TABLE.to_owned());
     let metadata = FileMetadata {
         created_by: CREATED_BY.to_owned(),
-        pairs: pairs.map(|(key, value)| (key.to_owned(), value)).collect(),
+        pairs: LogMark::read(folder)?
+            .pairs()
+            .into_iter()
+            .chain([schema])
+            .map(|(key, value)| (key.to_owned(), value))
+            .collect(),
     };
     if FileMetadata::read(&path)?.as_ref() == Some(&metadata) {
         return Ok(());
     }
-    if table == RecordTable::LeftOut {
+    if table == RecordTable::Skip {
         if path.exists() {
             tracing::warn!(
                 "{}: not made from the records as they are now, and left as it is (--no-parquet); report without --no-parquet writes it again",
@@ -56,7 +59,7 @@ fn update_of<D: Tabled>(folder: &Path, table: RecordTable) -> Result<()> {
     write::<D>(folder, &path, &metadata)
 }
 
-fn write<D: Tabled>(folder: &Path, path: &Path, metadata: &FileMetadata) -> Result<()> {
+fn write<D: TableDetail>(folder: &Path, path: &Path, metadata: &FileMetadata) -> Result<()> {
     let mut batches = RowBatches::<D>::open(folder)?;
     let columns = D::columns();
     let mut file = ColumnFile::create(path, &columns, metadata)?;

@@ -1,12 +1,12 @@
-//! The table of records of open questions: a row is an answer, with its mark.
+//! Table of the records of open questions, with one row for each answer and its mark.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::common::{column, head, image, last, reply};
-use super::row::{Row, SentImage, Tabled};
+use super::common::{column, image_columns, leading_columns, reply_columns, trailing_columns};
+use super::row::{Row, SentImage, TableDetail};
 use crate::error::Result;
 use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
 use crate::runs::predictions::{AnswerState, answer_state};
@@ -23,25 +23,25 @@ use darkqa_score::open::AnswerOutcome;
 pub(super) struct Marks {
     judge: Option<String>,
     protocol: Protocol,
-    /// The mark of an answer; `None` if none is read in the judge's reply.
+    /// The mark of each answer; `None` if the judge's reply cannot be parsed.
     by_answer: MarkIndex<Option<i64>>,
 }
 
 /// An answer with its mark.
 pub(super) struct MarkedAnswer {
-    /// The answer that is judged; `None` if the reply has none.
+    /// The text to judge; `None` if the reply has no answer.
     answer: Option<Arc<str>>,
     outcome: AnswerOutcome,
-    /// The judge, if it was asked about the answer.
+    /// The judge, if it marked the answer.
     judge: Option<String>,
 }
 
-impl Tabled for OpenDetail {
+impl TableDetail for OpenDetail {
     const TABLE: &'static str = "darkqa.openeqa-records/1";
 
     type Context = Marks;
 
-    type Further = MarkedAnswer;
+    type Extra = MarkedAnswer;
 
     fn columns() -> Vec<Column<Row<Self>>> {
         let own = vec![
@@ -53,7 +53,14 @@ impl Tabled for OpenDetail {
                 Cell::text(row.record.detail.person.as_deref())
             }),
         ];
-        let parts = [head(), marked(), reply(), image(), last(), own];
+        let parts = [
+            leading_columns(),
+            mark_columns(),
+            reply_columns(),
+            image_columns(),
+            trailing_columns(),
+            own,
+        ];
         parts.into_iter().flatten().collect()
     }
 
@@ -81,8 +88,8 @@ impl Tabled for OpenDetail {
         })
     }
 
-    fn further(context: &Marks, record: &Record<Self>) -> Option<MarkedAnswer> {
-        (record.detail.step == Step::Answer).then(|| context.marked(record))
+    fn extra(context: &Marks, record: &Record<Self>) -> Option<MarkedAnswer> {
+        (record.detail.step == Step::Answer).then(|| context.marked_answer(record))
     }
 
     fn frame(&self) -> &str {
@@ -106,7 +113,7 @@ impl Tabled for OpenDetail {
 
 impl Marks {
     /// The answer of a record, with its mark.
-    fn marked(&self, record: &Record<OpenDetail>) -> MarkedAnswer {
+    fn marked_answer(&self, record: &Record<OpenDetail>) -> MarkedAnswer {
         let unmarked = |outcome| MarkedAnswer {
             answer: None,
             outcome,
@@ -122,8 +129,8 @@ impl Marks {
             AnswerState::Null => return unmarked(AnswerOutcome::Null),
             AnswerState::Text { answer, .. } => answer,
         };
-        let known = self.by_answer.get(&record.question, &answer);
-        let outcome = match known {
+        let mark = self.by_answer.get(&record.question, &answer);
+        let outcome = match mark {
             None => AnswerOutcome::Unjudged,
             Some(None) => AnswerOutcome::Unmarked,
             Some(Some(mark)) => AnswerOutcome::Marked(*mark),
@@ -131,23 +138,23 @@ impl Marks {
         MarkedAnswer {
             answer: Some(answer),
             outcome,
-            judge: self.judge.clone().filter(|_| known.is_some()),
+            judge: self.judge.clone().filter(|_| mark.is_some()),
         }
     }
 }
 
-/// The true answer, the answer that was given, and its mark.
-fn marked() -> Vec<Column<Row<OpenDetail>>> {
+/// Columns of the true answer, the model's answer and its mark.
+fn mark_columns() -> Vec<Column<Row<OpenDetail>>> {
     vec![
         column("answer", Text, MayBeNull, |row: &Row<OpenDetail>| {
             let question = row.question.as_ref();
             Cell::text(question.and_then(|question| question.answer.as_deref()))
         }),
         column("predicted", LongText, MayBeNull, |row| {
-            Cell::text(row.further.answer.as_deref())
+            Cell::text(row.extra.answer.as_deref())
         }),
         column("outcome", Text, Always, |row| {
-            Cell::text(Some(match row.further.outcome {
+            Cell::text(Some(match row.extra.outcome {
                 AnswerOutcome::Missing => "failed",
                 AnswerOutcome::Null => "null",
                 AnswerOutcome::Unjudged => "unjudged",
@@ -156,14 +163,14 @@ fn marked() -> Vec<Column<Row<OpenDetail>>> {
             }))
         }),
         column("judge", Text, MayBeNull, |row| {
-            Cell::text(row.further.judge.as_deref())
+            Cell::text(row.extra.judge.as_deref())
         }),
-        column("mark", Int32, MayBeNull, |row| match row.further.outcome {
+        column("mark", Int32, MayBeNull, |row| match row.extra.outcome {
             AnswerOutcome::Marked(mark) => Cell::int(Some(mark)),
             _ => Cell::Null,
         }),
         column("score", Double, MayBeNull, |row| {
-            let points = row.further.outcome.points();
+            let points = row.extra.outcome.points();
             points.map_or(Cell::Null, Cell::Double)
         }),
     ]

@@ -1,6 +1,6 @@
-//! The places of a run's records in its file, in the order of its plan: [`places`].
+//! Places of a run's records in its log file, in the order of the table: [`ordered_places`].
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap};
 use std::hash::Hash;
 use std::path::Path;
 
@@ -9,34 +9,37 @@ use crate::store::{LinePlace, each_trial};
 use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{Condition, ModelListing, QuestionId, RunQuestion, TrialKey};
 
-/// A record by its place and what its order follows from: 48 bytes, so that the records themselves need not be held.
+/// The place of a record with its sort keys, in 48 bytes, so that the records themselves need not be kept in memory.
 #[derive(Debug, Clone, Copy)]
 struct Place {
-    /// The number of the question among those of the run, from 1; 0 if it is not among them.
+    /// Number of the question in the run, from 1; 0 if the run does not have it.
     question: u32,
-    /// The number of the condition.
+    /// Number of the condition in order of appearance.
     condition: u32,
-    /// The number of the model.
+    /// Number of the model in order of appearance.
     model: u32,
     repeat: u32,
     key: TrialKey,
     line: LinePlace,
 }
 
-/// Where the last record of each trial stands, in the order of [`sort`](crate::runs::stored::sort).
+/// The place of the last record of each trial, in the order of [`sort_trials`](crate::runs::stored::sort_trials).
 ///
 /// # Errors
 /// If a line is not a record.
-pub(super) fn places(
+pub(super) fn ordered_places(
     folder: &Path,
     manifest: &RunManifest,
     questions: &[RunQuestion],
 ) -> Result<Vec<LinePlace>> {
     let names = RecordedNames::from_manifest(manifest);
-    let ids = questions.iter().map(|question| &question.id);
-    let ids: HashMap<&QuestionId, u32> = ids.zip(1..).collect();
-    let mut conditions = Seen::<Option<Condition>>::default();
-    let mut models = Seen::<String>::default();
+    let ids: HashMap<&QuestionId, u32> = questions
+        .iter()
+        .map(|question| &question.id)
+        .zip(1..)
+        .collect();
+    let mut conditions = Numbering::<Option<Condition>>::default();
+    let mut models = Numbering::<String>::default();
     let mut all = Vec::new();
     each_trial(folder, |trial, line| {
         all.push(Place {
@@ -48,7 +51,7 @@ pub(super) fn places(
             line,
         });
     })?;
-    // Of each trial the last record.
+    // Keep the last record of each trial.
     all.sort_unstable_by_key(|place| (place.key, std::cmp::Reverse(place.line.start)));
     all.dedup_by_key(|place| place.key);
     let conditions = conditions.ranks(Clone::clone);
@@ -65,35 +68,28 @@ pub(super) fn places(
     Ok(all.into_iter().map(|place| place.line).collect())
 }
 
-/// The different values so far, numbered as they come.
-struct Seen<T>(HashMap<T, u32>);
+/// Numbers for distinct values, in order of appearance.
+struct Numbering<T>(HashMap<T, u32>);
 
-impl<T> Default for Seen<T> {
+impl<T> Default for Numbering<T> {
     fn default() -> Self {
         Self(HashMap::new())
     }
 }
 
-impl<T: Eq + Hash> Seen<T> {
+impl<T: Eq + Hash> Numbering<T> {
     fn number(&mut self, value: T) -> u32 {
         let next = self.0.len() as u32;
         *self.0.entry(value).or_insert(next)
     }
 
-    /// The rank of each number by what its value is sorted by; values that are sorted alike have the same rank.
-    fn ranks<K: Ord + Hash + Clone>(self, key: impl Fn(&T) -> K) -> Vec<usize> {
+    /// The rank of each number when values are sorted by `key`. Values with equal keys have the same rank.
+    fn ranks<K: Ord + Hash>(self, key: impl Fn(&T) -> K) -> Vec<usize> {
         let mut values: Vec<(T, u32)> = self.0.into_iter().collect();
         values.sort_unstable_by_key(|(_, number)| *number);
         let keys: Vec<K> = values.iter().map(|(value, _)| key(value)).collect();
-        let ranks = numbers(keys.iter().cloned());
+        let sorted: BTreeSet<&K> = keys.iter().collect();
+        let ranks: HashMap<&K, usize> = sorted.into_iter().zip(0..).collect();
         keys.iter().map(|key| ranks[key]).collect()
     }
-}
-
-/// A number for each of these values, in their order.
-fn numbers<T: Ord + Hash>(values: impl Iterator<Item = T>) -> HashMap<T, usize> {
-    let distinct: HashSet<T> = values.collect();
-    let mut sorted: Vec<T> = distinct.into_iter().collect();
-    sorted.sort_unstable();
-    sorted.into_iter().zip(0..).collect()
 }

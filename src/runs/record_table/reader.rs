@@ -1,4 +1,4 @@
-//! The records of a run for programs in Rust: [`StoredRun`].
+//! The records of a run for other Rust programs: [`StoredRun`].
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::vec;
 
 use super::batches::RowBatches;
-use super::row::{Row, Tabled};
+use super::row::{Row, TableDetail};
 use crate::error::{Error, Result};
 use crate::runs::stored::ExperimentKind;
 use crate::store::{Cell, CellKind};
 use crate::types::text::near_name::suggestion;
 use crate::types::{ChoiceDetail, OpenDetail};
 
-/// A run in its folder, of questions with choices or open ones.
+/// A run folder, of questions with choices or of open questions.
 #[derive(Debug)]
 pub struct StoredRun {
     folder: PathBuf,
@@ -24,15 +24,14 @@ impl StoredRun {
     /// Opens the folder of a run.
     ///
     /// # Errors
-    /// If the folder holds no run, or one that this version cannot read.
+    /// If the folder has no run, or one that this version cannot read.
     pub fn open(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref().to_owned();
         let kind = ExperimentKind::read(&folder)?;
         Ok(Self { folder, kind })
     }
 
-    /// The records, one for each trial, with the columns and in the order of `records.parquet`. They are read in batches, not held in
-    /// memory.
+    /// The records, one for each trial, with the columns and in the order of `records.parquet`. They are read in batches.
     ///
     /// # Errors
     /// If a line of the run is broken.
@@ -51,7 +50,7 @@ pub struct Records {
     batch: vec::IntoIter<RunRecord>,
 }
 
-/// The name and the type of a column.
+/// Name and type of a column.
 #[derive(Debug, Clone, Copy)]
 struct Heading {
     name: &'static str,
@@ -66,29 +65,31 @@ pub struct RunRecord {
 }
 
 impl Records {
-    fn new<D: Tabled>(folder: &Path) -> Result<Self> {
+    fn new<D: TableDetail>(folder: &Path) -> Result<Self> {
         let table = D::columns();
-        let headings = table.iter().map(|column| Heading {
-            name: column.name,
-            kind: column.kind,
-        });
-        let columns: Arc<[Heading]> = headings.collect();
+        let columns: Arc<[Heading]> = table
+            .iter()
+            .map(|column| Heading {
+                name: column.name,
+                kind: column.kind,
+            })
+            .collect();
         let mut batches = RowBatches::<D>::open(folder)?;
         let headings = Arc::clone(&columns);
-        let next = move || -> Result<Option<Vec<RunRecord>>> {
+        let next_batch = move || -> Result<Option<Vec<RunRecord>>> {
             let rows = batches.next_batch()?;
             let record = |row: &Row<D>| RunRecord {
                 columns: Arc::clone(&headings),
                 cells: table
                     .iter()
-                    .map(|column| owned((column.value)(row)))
+                    .map(|column| owned_cell((column.value)(row)))
                     .collect(),
             };
             Ok(rows.map(|rows| rows.iter().map(record).collect()))
         };
         Ok(Self {
             columns,
-            next_batch: Box::new(next),
+            next_batch: Box::new(next_batch),
             batch: Vec::new().into_iter(),
         })
     }
@@ -111,7 +112,7 @@ impl Iterator for Records {
                 Ok(Some(batch)) => self.batch = batch.into_iter(),
                 Ok(None) => return None,
                 Err(e) => {
-                    // Nothing follows an error.
+                    // An error ends the iterator.
                     self.next_batch = Box::new(|| Ok(None));
                     return Some(Err(e));
                 }
@@ -124,7 +125,7 @@ impl RunRecord {
     /// The text in a column; `None` if it is null. Keys and digests are hexadecimal.
     ///
     /// # Errors
-    /// If there is no such column, or it holds no texts.
+    /// If there is no such column, or its type is not text.
     pub fn text(&self, column: &str) -> Result<Option<&str>> {
         match self.cell(column)? {
             (
@@ -139,7 +140,7 @@ impl RunRecord {
     /// The number in a column; `None` if it is null.
     ///
     /// # Errors
-    /// If there is no such column, or it holds no numbers.
+    /// If there is no such column, or its type is not a number.
     pub fn number(&self, column: &str) -> Result<Option<f64>> {
         match self.cell(column)? {
             (Cell::Null, CellKind::Int8 | CellKind::Int16 | CellKind::Int32 | CellKind::Double) => {
@@ -154,7 +155,7 @@ impl RunRecord {
     /// The truth value in a column; `None` if it is null.
     ///
     /// # Errors
-    /// If there is no such column, or it holds no truth values.
+    /// If there is no such column, or its type is not a truth value.
     pub fn flag(&self, column: &str) -> Result<Option<bool>> {
         match self.cell(column)? {
             (Cell::Null, CellKind::Bool) => Ok(None),
@@ -178,8 +179,8 @@ fn other_type(column: &str, expected: &str) -> Error {
     Error::data(column, format_args!("the column holds no {expected}"))
 }
 
-/// A cell that outlives its row. Bytes become hexadecimal text.
-fn owned(cell: Cell<'_>) -> Cell<'static> {
+/// Copies a cell so that it outlives its row. Bytes become hexadecimal text.
+fn owned_cell(cell: Cell<'_>) -> Cell<'static> {
     match cell {
         Cell::Null => Cell::Null,
         Cell::Text(text) => Cell::Text(text.into_owned().into()),

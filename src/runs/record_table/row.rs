@@ -1,10 +1,11 @@
-//! A row of the table of records: [`Row`], and what differs between experiments: [`Tabled`].
+//! A row of the table of records ([`Row`]), and the interface to the columns of an experiment ([`TableDetail`]).
 
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::Result;
+use crate::runs::renamed::rename_record;
 use crate::store::Column;
 use crate::types::manifests::{RecordedNames, RunManifest};
 use crate::types::{
@@ -12,21 +13,21 @@ use crate::types::{
 };
 use darkqa_score::answers::record::Detail;
 
-/// The detail of a record that has a table of its own.
-pub(super) trait Tabled: Detail + Sync + 'static {
-    /// The name of the table with its version. New columns stand at the end of the same version.
+/// Record detail of an experiment with a table of records.
+pub(super) trait TableDetail: Detail + Sync + 'static {
+    /// Name of the table with its version. New columns are appended without a new version.
     const TABLE: &'static str;
 
     /// Data of the whole run, read before its rows are written.
     type Context: Send + Sync;
 
-    /// Data of a row besides its record.
-    type Further: Send + Sync;
+    /// Data of a row in addition to its record.
+    type Extra: Send + Sync;
 
     /// The columns, in order.
     fn columns() -> Vec<Column<Row<Self>>>;
 
-    /// Reads what rows need of the whole run.
+    /// Reads the data of the whole run that rows need.
     ///
     /// # Errors
     /// If a record is broken.
@@ -36,20 +37,20 @@ pub(super) trait Tabled: Detail + Sync + 'static {
         questions: &[RunQuestion],
     ) -> Result<Self::Context>;
 
-    /// The data of a record's row besides it; `None` if the record has no row.
-    fn further(context: &Self::Context, record: &Record<Self>) -> Option<Self::Further>;
+    /// The additional data of a record's row; `None` if the record has no row.
+    fn extra(context: &Self::Context, record: &Record<Self>) -> Option<Self::Extra>;
 
-    /// The name of the frame or the walk that the question is about.
+    /// Name of the frame or walk of the question.
     fn frame(&self) -> &str;
 
-    /// The family or the category of the question.
+    /// Family or category of the question.
     fn family(&self) -> &str;
 
-    /// The first image that was sent.
+    /// The first image sent.
     fn image(&self) -> Option<SentImage<'_>>;
 }
 
-/// The image of a record, as it was sent.
+/// The image of a record as sent.
 pub(super) struct SentImage<'a> {
     pub(super) digest: &'a Digest,
     pub(super) bytes: usize,
@@ -58,17 +59,17 @@ pub(super) struct SentImage<'a> {
     pub(super) format: &'a str,
 }
 
-/// A record, with what its columns need of the run.
-pub(super) struct Row<D: Tabled> {
+/// A record with the data of the run that its columns need.
+pub(super) struct Row<D: TableDetail> {
     pub(super) record: Record<D>,
-    pub(super) light: Arc<LightTexts>,
+    pub(super) condition: Arc<ConditionCells>,
     /// `None` if the run does not have the question.
-    pub(super) question: Option<Arc<QuestionTexts>>,
-    pub(super) further: D::Further,
+    pub(super) question: Option<Arc<QuestionCells>>,
+    pub(super) extra: D::Extra,
 }
 
-/// The columns that follow from a condition, as texts and numbers.
-pub(super) struct LightTexts {
+/// Values of the columns about a condition.
+pub(super) struct ConditionCells {
     pub(super) condition: Option<String>,
     pub(super) level: Option<String>,
     pub(super) variant: String,
@@ -78,7 +79,7 @@ pub(super) struct LightTexts {
     pub(super) enhancer: Option<String>,
 }
 
-impl LightTexts {
+impl ConditionCells {
     fn new(condition: Option<&Condition>) -> Self {
         let columns = ConditionColumns::new(condition);
         Self {
@@ -93,24 +94,24 @@ impl LightTexts {
     }
 }
 
-/// The columns that a row takes from its question.
-pub(super) struct QuestionTexts {
-    /// `None` if the data name no scenes.
+/// Values of the columns about a question.
+pub(super) struct QuestionCells {
+    /// `None` if the data set has no scenes.
     pub(super) scene: Option<String>,
-    /// `None` if nobody knows the true answer.
+    /// `None` if the true answer is unknown.
     pub(super) answer: Option<String>,
 }
 
 /// Makes the rows of a run's records.
-pub(super) struct Rows<D: Tabled> {
+pub(super) struct Rows<D: TableDetail> {
     names: RecordedNames,
-    lights: HashMap<Option<Condition>, Arc<LightTexts>>,
-    questions: HashMap<QuestionId, Arc<QuestionTexts>>,
+    conditions: HashMap<Option<Condition>, Arc<ConditionCells>>,
+    questions: HashMap<QuestionId, Arc<QuestionCells>>,
     context: D::Context,
 }
 
-impl<D: Tabled> Rows<D> {
-    /// Rows of the run in a folder.
+impl<D: TableDetail> Rows<D> {
+    /// Reads the data that the rows of a run need.
     ///
     /// # Errors
     /// If a record is broken.
@@ -119,39 +120,40 @@ impl<D: Tabled> Rows<D> {
         manifest: &RunManifest,
         questions: &[RunQuestion],
     ) -> Result<Self> {
-        let texts = questions.iter().map(|question| {
-            let texts = QuestionTexts {
-                scene: Some(question.scene.clone()).filter(|scene| !scene.is_empty()),
-                answer: question.answer.clone(),
-            };
-            (question.id.clone(), Arc::new(texts))
-        });
+        let questions_by_id = questions
+            .iter()
+            .map(|question| {
+                let cells = QuestionCells {
+                    scene: Some(question.scene.clone()).filter(|scene| !scene.is_empty()),
+                    answer: question.answer.clone(),
+                };
+                (question.id.clone(), Arc::new(cells))
+            })
+            .collect();
         Ok(Self {
             names: RecordedNames::from_manifest(manifest),
-            lights: HashMap::new(),
-            questions: texts.collect(),
+            conditions: HashMap::new(),
+            questions: questions_by_id,
             context: D::context(folder, manifest, questions)?,
         })
     }
 
     /// The row of a record; `None` if it has none.
     pub(super) fn row(&mut self, mut record: Record<D>) -> Option<Row<D>> {
-        let shown = self.names.shown(&record.model);
-        if shown != record.model {
-            record.model = shown.to_owned();
-        }
-        let further = D::further(&self.context, &record)?;
-        let known = self.lights.get(&record.condition).map(Arc::clone);
-        let light = known.unwrap_or_else(|| {
-            let light = Arc::new(LightTexts::new(record.condition.as_ref()));
-            let condition = record.condition.clone();
-            self.lights.insert(condition, Arc::clone(&light));
-            light
-        });
+        rename_record(&mut record, &self.names);
+        let extra = D::extra(&self.context, &record)?;
+        let condition = if let Some(known) = self.conditions.get(&record.condition) {
+            Arc::clone(known)
+        } else {
+            let cells = Arc::new(ConditionCells::new(record.condition.as_ref()));
+            self.conditions
+                .insert(record.condition.clone(), Arc::clone(&cells));
+            cells
+        };
         Some(Row {
             question: self.questions.get(&record.question).map(Arc::clone),
-            light,
-            further,
+            condition,
+            extra,
             record,
         })
     }

@@ -8,36 +8,36 @@ use crate::report::forecast::Forecast;
 use crate::types::Digest;
 use crate::types::manifests::Identity;
 
-/// The schema of a plan.
+/// Schema of a plan.
 pub(super) const SCHEMA: &str = "darkqa.plan/1";
-/// The file with the facts about the plan and the digests of the others. It is written last.
+/// File with the facts about the plan and the digests of its other files. It is written last.
 pub(super) const PLAN_FILE: &str = "plan.json";
-/// The questions that are asked, in the form of a run's.
+/// File with the planned questions, in the format of a run's questions.
 pub(super) const QUESTIONS: &str = "questions.jsonl";
-/// The frames that questions are about.
+/// File with the frames of the planned questions.
 pub(super) const FRAMES: &str = "frames.jsonl";
 
 /// The content of `plan.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct PlanFile {
     pub(super) schema: String,
-    /// The version of this program that wrote it.
+    /// Version of the program that wrote the plan.
     pub(super) version: String,
-    /// Data, questions and light: a run that takes the plan has the same. Models and enhancers are not in it.
+    /// Data, questions and light, which must be the same in every run that uses the plan. Models and enhancers are not included.
     pub(super) identity: Identity,
-    /// The digest of each other file.
+    /// Digests of the other files, by name.
     pub(super) files: BTreeMap<String, Digest>,
     pub(super) counts: PlanCounts,
-    /// The estimate for the whole run with the models and enhancers of the call that wrote the plan.
+    /// Estimate for the whole run with the models and enhancers of the command that wrote the plan.
     pub(super) estimate: PlanEstimate,
-    /// The models of that call.
+    /// Models of the command that wrote the plan.
     pub(super) models: Vec<String>,
-    /// The words of that call, without `plan` and `--shard`; `None` if one of them may hold a secret.
+    /// Words of the command that wrote the plan, without `plan` and `--shard`; `None` if one of them may be a secret.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) command: Option<Vec<String>>,
 }
 
-/// The numbers of what is planned.
+/// Numbers of planned questions, frames, scenes and trials.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct PlanCounts {
     pub(super) questions: usize,
@@ -46,27 +46,27 @@ pub(super) struct PlanCounts {
     pub(super) trials: usize,
 }
 
-/// The estimate of a run, as `--dry-run` makes it.
+/// Estimate of a run, as printed by `--dry-run`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PlanEstimate {
-    /// Number of images that are made.
+    /// Number of images to make.
     pub(crate) images: usize,
-    /// Time to make them on the machine that wrote the plan, in seconds, as measured on a few.
+    /// Time to make the images on the machine that wrote the plan, in seconds, extrapolated from a few.
     pub(crate) making_seconds: f64,
-    /// Processor seconds of all frames in `frames.jsonl`, by which parts are cut.
+    /// CPU time of all frames in `frames.jsonl`, in seconds. Shards are divided by it.
     pub(crate) cpu_seconds: f64,
-    /// Time of waiting for replies, in seconds.
+    /// Time waiting for replies, in seconds.
     pub(crate) asking_seconds: f64,
-    /// Bytes to be sent.
+    /// Bytes to send.
     pub(crate) bytes: f64,
-    /// Tokens of requests and replies, if each reply is short; `None` if it is not known how a model counts images.
+    /// Tokens of requests and replies, assuming short replies; `None` if the image tokens of a model are unknown.
     pub(crate) tokens: Option<f64>,
-    /// US dollars, if each reply is short; `None` if a price is not known.
+    /// Cost in US dollars, assuming short replies; `None` if a price is unknown.
     pub(crate) dollars: Option<f64>,
 }
 
 impl PlanEstimate {
-    /// The estimate of a plan whose frames take this many processor seconds.
+    /// The estimate of a plan whose frames take `cpu_seconds` of CPU time.
     pub(crate) fn new(forecast: &Forecast, cpu_seconds: f64) -> Self {
         let lines = &forecast.lines;
         let tokens = lines.iter().try_fold(0.0, |sum, line| {
@@ -87,26 +87,26 @@ impl PlanEstimate {
     }
 }
 
-/// Flags whose values may hold a secret.
-const SECRET: [&str; 2] = ["--header", "--extra-body"];
+/// Flags whose values may be secret.
+const SECRET_FLAGS: [&str; 2] = ["--header", "--extra-body"];
 
-/// The words of a call of `plan` as those of an evaluation; `None` if one of them may hold a secret: a header, a field of a request,
-/// an address with a password or a query.
+/// Converts the words of a `plan` command to those of an evaluation. `None` if one of them may be secret: a header, a request field, or a
+/// URL with a password or a query.
 pub(crate) fn recorded_command(words: &[String]) -> Option<Vec<String>> {
     let may_be_secret = |word: &String| {
         let flag = word.split('=').next().unwrap_or_default();
-        let is_address = word.contains("://");
-        SECRET.contains(&flag) || (is_address && word.contains(['@', '?']))
+        let is_url = word.contains("://");
+        SECRET_FLAGS.contains(&flag) || (is_url && word.contains(['@', '?']))
     };
     if words.iter().any(may_be_secret) {
         return None;
     }
     let mut recorded = Vec::new();
     let mut words = words.iter();
-    let mut is_named = false;
+    let mut has_plan = false;
     while let Some(word) = words.next() {
         match &**word {
-            "plan" if !is_named => is_named = true,
+            "plan" if !has_plan => has_plan = true,
             "--shard" | "--workers" => drop(words.next()),
             "--dry-run" => {}
             flag if flag.starts_with("--shard=") || flag.starts_with("--workers=") => {}

@@ -1,7 +1,7 @@
 //! The plan of a run, which `plan` writes once and every shard reads: [`RunPlan`].
 //!
-//! It holds the questions and the digests of the frames, so that a shard measures no frame to make its questions, and opens none that
-//! it does not ask about. Its folder stands in that of the run.
+//! The plan contains the questions and the digests of the frames, so that a shard need not measure frames to make questions, and opens only
+//! its own frames. The folder of the plan is in the folder of the run.
 
 mod file;
 mod frame;
@@ -18,8 +18,8 @@ use crate::dataset::Dataset;
 use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::images::frames::Source;
-use crate::runs::part::{Divided, own_sources};
 use crate::runs::shard::Shard;
+use crate::runs::shard_sources::{WeightedSource, shard_range};
 use crate::store::PLAN;
 use crate::types::flags::spelled_setting;
 use crate::types::manifests::{Identity, differences};
@@ -30,26 +30,26 @@ use file::{FRAMES, PLAN_FILE, PlanFile, QUESTIONS, SCHEMA};
 pub(crate) use frame::{FrameCost, PlannedFrame};
 pub(crate) use write::NewPlan;
 
-/// The plan of a run, read from its folder.
+/// The plan of a run, as read from its folder.
 #[derive(Debug)]
 pub(crate) struct RunPlan {
     folder: PathBuf,
     identity: Identity,
-    /// The questions that are asked, in order.
+    /// The planned questions, in order.
     questions: Vec<RunQuestion>,
-    /// The frames that questions are about, in the order of their first question.
+    /// The frames of the questions, in the order of their first question.
     frames: Vec<PlannedFrame>,
-    /// The index of each frame in `frames`.
+    /// Index of each frame in `frames`.
     places: HashMap<FrameId, usize>,
     command: Option<Vec<String>>,
     models: Vec<String>,
 }
 
 impl RunPlan {
-    /// The plan in the folder of a run; `None` if there is none.
+    /// Reads the plan in the folder of a run; `None` if there is none.
     ///
     /// # Errors
-    /// If it cannot be read, another version wrote it, or one of its files is not the one that it was written with.
+    /// If the plan cannot be read, has another schema, or one of its files has changed.
     pub(crate) fn read(run: &Path) -> Result<Option<Self>> {
         let folder = run.join(PLAN);
         let path = folder.join(PLAN_FILE);
@@ -64,8 +64,8 @@ impl RunPlan {
             );
             return Err(Error::Run { path, problem });
         }
-        let questions: Vec<RunQuestion> = lines(&folder.join(QUESTIONS), &file.files)?;
-        let frames: Vec<PlannedFrame> = lines(&folder.join(FRAMES), &file.files)?;
+        let questions: Vec<RunQuestion> = read_lines(&folder.join(QUESTIONS), &file.files)?;
+        let frames: Vec<PlannedFrame> = read_lines(&folder.join(FRAMES), &file.files)?;
         let names = frames.iter().map(|frame| frame.frame.clone());
         Ok(Some(Self {
             places: names.zip(0..).collect(),
@@ -83,7 +83,7 @@ impl RunPlan {
     /// # Errors
     /// Names the setting that differs.
     pub(crate) fn check_identity(&self, run: &Identity) -> Result<()> {
-        // A flag is said before what it is made of: the variant before the noise profiles that it has.
+        // Name a whole setting rather than a part of it: the variant rather than one of its noise profiles.
         let differences = differences(&self.identity, run);
         match differences.min_by_key(|(field, ..)| field.contains(" of the ")) {
             None => Ok(()),
@@ -95,7 +95,7 @@ impl RunPlan {
         }
     }
 
-    /// The planned questions. Those that the data have themselves must be the same.
+    /// The planned questions. `own` are the questions of the data set; if there are any, they must be the planned ones.
     ///
     /// # Errors
     /// If a question of the data is not the planned one, or its frame is missing.
@@ -113,11 +113,13 @@ impl RunPlan {
                 lost.frame.0
             )));
         }
-        let questions = self.questions.par_iter();
-        questions.map(RunQuestion::to_question).collect()
+        self.questions
+            .par_iter()
+            .map(RunQuestion::to_question)
+            .collect()
     }
 
-    /// Checks that the questions of the data are the planned ones.
+    /// Checks that the questions of the data set are the planned ones.
     fn check_questions(&self, dataset: &Dataset, own: &[Question]) -> Result<()> {
         let remedy = "use the questions of the plan, or write the plan again into another --out";
         if own.len() != self.questions.len() {
@@ -142,15 +144,15 @@ impl RunPlan {
         }
     }
 
-    /// The index of each planned question among all questions of the data.
+    /// The index of each planned question among all questions of the data set.
     pub(crate) fn question_places(&self) -> impl Iterator<Item = usize> {
         self.questions.iter().map(|question| question.place)
     }
 
-    /// Checks that the frames of these sources are those of the plan.
+    /// Checks that the images of these sources are the planned ones.
     ///
     /// # Errors
-    /// If a frame has another content; names the frame.
+    /// If a frame has changed or is not planned; names the frame.
     pub(crate) fn check_sources(&self, sources: &[Source]) -> Result<()> {
         for source in sources {
             let Some(digest) = source.digest() else {
@@ -185,53 +187,57 @@ impl RunPlan {
         self.frame(name)?.digest
     }
 
-    /// The estimated cost of the requests and images about a frame, in millionths of a second, by which a run is divided.
-    pub(crate) fn cost(&self, name: &str) -> u64 {
+    /// The cost of a frame by which a run is divided into shards, in microseconds; 1 if the frame is not planned.
+    pub(crate) fn weight(&self, name: &str) -> u64 {
         let frame = self.frame(&FrameId(name.to_owned()));
         frame.map_or(1, |frame| frame.cost.weight())
     }
 
-    /// Number of frames that questions are about.
-    pub(crate) fn frames(&self) -> usize {
+    /// Number of planned frames.
+    pub(crate) fn frame_count(&self) -> usize {
         self.frames.len()
     }
 
-    /// Number of requests about the frames at these places, by the models of the plan.
-    pub(crate) fn requests(&self, places: impl Iterator<Item = usize>) -> usize {
+    /// Number of requests about the frames with these indices, to all models of the plan.
+    pub(crate) fn request_count(&self, places: impl Iterator<Item = usize>) -> usize {
         places
             .filter_map(|place| self.frames.get(place))
             .map(|frame| frame.cost.requests)
             .sum()
     }
 
-    /// The places of the frames of a shard.
-    pub(crate) fn part(&self, shard: Shard) -> Range<usize> {
-        let divided = self.frames.iter().map(|frame| Divided {
-            scene: frame.scene.clone(),
-            cost: frame.cost.weight(),
-        });
-        own_sources(&divided.collect::<Vec<_>>(), shard)
+    /// The indices of the frames of a shard.
+    pub(crate) fn shard_range(&self, shard: Shard) -> Range<usize> {
+        let sources: Vec<WeightedSource> = self
+            .frames
+            .iter()
+            .map(|frame| WeightedSource {
+                scene: frame.scene.clone(),
+                cost: frame.cost.weight(),
+            })
+            .collect();
+        shard_range(&sources, shard)
     }
 
-    /// The share of the estimated cost that a shard has: in dollars if all are known, else in tokens, else in requests.
-    pub(crate) fn share(&self, shard: Shard) -> f64 {
-        let own = self.part(shard);
-        let share = |of: &dyn Fn(&PlannedFrame) -> Option<f64>| {
+    /// A shard's share of the estimated cost, from 0 to 1: by dollars if all are known, else by tokens, else by requests.
+    pub(crate) fn cost_share(&self, shard: Shard) -> f64 {
+        let own = self.shard_range(shard);
+        let share_by = |cost: &dyn Fn(&FrameCost) -> Option<f64>| {
             let sum = |frames: &[PlannedFrame]| {
                 frames
                     .iter()
-                    .try_fold(0.0, |sum, frame| Some(sum + of(frame)?))
+                    .try_fold(0.0, |sum, frame| Some(sum + cost(&frame.cost)?))
             };
             let whole = sum(&self.frames)?;
             Some(sum(&self.frames[own.clone()])? / whole).filter(|_| whole > 0.0)
         };
-        share(&|frame| frame.cost.dollars)
-            .or_else(|| share(&|frame| frame.cost.tokens))
-            .or_else(|| share(&|frame| Some(frame.cost.requests as f64)))
+        share_by(&|cost| cost.dollars)
+            .or_else(|| share_by(&|cost| cost.tokens))
+            .or_else(|| share_by(&|cost| Some(cost.requests as f64)))
             .unwrap_or(0.0)
     }
 
-    /// The command of the run without `--shard`; `None` if the plan does not hold it, or other models than its own were asked.
+    /// The command of the run without `--shard`; `None` if the plan does not have it, or if models other than its own were asked.
     pub(crate) fn command<'a>(&self, asked: impl Iterator<Item = &'a str>) -> Option<String> {
         let planned: BTreeSet<&str> = self.models.iter().map(|name| &**name).collect();
         let words = self.command.as_ref()?;
@@ -249,8 +255,11 @@ impl RunPlan {
     }
 }
 
-/// The lines of a file of a plan, which must be the one that its digest is of.
-fn lines<T: DeserializeOwned + Send>(
+/// Reads the lines of a file of a plan.
+///
+/// # Errors
+/// If the file does not have the digest in `digests`, or a line cannot be parsed.
+fn read_lines<T: DeserializeOwned + Send>(
     path: &Path,
     digests: &BTreeMap<String, Digest>,
 ) -> Result<Vec<T>> {

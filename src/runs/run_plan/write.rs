@@ -1,4 +1,4 @@
-//! Writing of a plan: [`NewPlan`].
+//! Writes a plan: [`NewPlan`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -16,7 +16,7 @@ use crate::store::{self, PLAN};
 use crate::types::manifests::Identity;
 use crate::types::{Digest, RunQuestion};
 
-/// All that a plan is written from.
+/// The contents of a plan to write.
 pub(crate) struct NewPlan {
     pub(crate) identity: Identity,
     pub(crate) questions: Vec<RunQuestion>,
@@ -28,32 +28,34 @@ pub(crate) struct NewPlan {
 }
 
 impl NewPlan {
-    /// Writes the plan into the folder of a run: beside its place, then renamed. If the run has an earlier plan of the same questions
-    /// and frames, its costs stay, so that parts keep their frames.
+    /// Writes the plan into the folder of a run, by renaming a temporary folder. If the run has an earlier plan with the same questions and
+    /// frames, the plan keeps its costs, so that shards keep their frames.
     ///
     /// Returns the folder of the plan.
     ///
     /// # Errors
-    /// If the run has parts whose plan has other questions or frames, or a file cannot be written.
+    /// If the run has shards of an earlier plan with other questions or frames, or a file cannot be written.
     pub(crate) fn write(mut self, run: &Path, forecast: &Forecast) -> Result<PathBuf> {
-        let place = run.join(PLAN);
+        let folder = run.join(PLAN);
         let earlier = RunPlan::read(run)?;
         if let Some(earlier) = &earlier {
             if self.has_content_of(earlier) {
                 self.frames.clone_from(&earlier.frames);
-            } else if let Some(part) = part_of(run)? {
+            } else if let Some(shard) = first_shard(run)? {
                 let problem = format!(
                     "the run has parts of another plan, with other questions or frames ({}); use another --out, or delete the parts",
-                    part.display()
+                    shard.display()
                 );
-                let path = place;
-                return Err(Error::Run { path, problem });
+                return Err(Error::Run {
+                    path: folder,
+                    problem,
+                });
             }
         }
-        let questions = lines(&self.questions)?;
-        let frames = lines(&self.frames)?;
-        let file = serde_json::to_vec_pretty(&self.file(&questions, &frames, forecast));
-        let file = file.map_err(|e| Error::data(PLAN_FILE, e))?;
+        let questions = json_lines(&self.questions)?;
+        let frames = json_lines(&self.frames)?;
+        let file = serde_json::to_vec_pretty(&self.file(&questions, &frames, forecast))
+            .map_err(|e| Error::data(PLAN_FILE, e))?;
         let unfinished = run.join(format!(".{PLAN}{UNFINISHED}"));
         if unfinished.exists() {
             remove(&unfinished)?;
@@ -65,24 +67,29 @@ impl NewPlan {
             (PLAN_FILE, &file),
         ] {
             let path = unfinished.join(name);
-            let written = File::create(&path).and_then(|mut file| {
-                file.write_all(content)?;
-                file.sync_all()
-            });
-            written.map_err(|e| Error::file(&path, "write", e))?;
+            File::create(&path)
+                .and_then(|mut file| {
+                    file.write_all(content)?;
+                    file.sync_all()
+                })
+                .map_err(|e| Error::file(&path, "write", e))?;
         }
-        if place.exists() {
-            remove(&place)?;
+        if folder.exists() {
+            remove(&folder)?;
         }
-        fs::rename(&unfinished, &place).map_err(|e| Error::file(&place, "write", e))?;
-        Ok(place)
+        fs::rename(&unfinished, &folder).map_err(|e| Error::file(&folder, "write", e))?;
+        Ok(folder)
     }
 
+    /// True if an earlier plan has the same questions and frames.
     fn has_content_of(&self, earlier: &RunPlan) -> bool {
-        let mut frames = self.frames.iter().zip(&earlier.frames);
         self.questions == earlier.questions
             && self.frames.len() == earlier.frames.len()
-            && frames.all(|(now, before)| now.is_same(before))
+            && self
+                .frames
+                .iter()
+                .zip(&earlier.frames)
+                .all(|(now, before)| now.is_same(before))
     }
 
     fn file(&self, questions: &[u8], frames: &[u8], forecast: &Forecast) -> PlanFile {
@@ -108,8 +115,8 @@ impl NewPlan {
     }
 }
 
-/// A part in the folder of a run; `None` if there is none.
-fn part_of(run: &Path) -> Result<Option<PathBuf>> {
+/// The first shard in the folder of a run; `None` if there is none.
+fn first_shard(run: &Path) -> Result<Option<PathBuf>> {
     for path in reading::entries(run)? {
         if path.is_dir() && store::schema(&path)?.is_some() {
             return Ok(Some(path));
@@ -122,7 +129,7 @@ fn remove(folder: &Path) -> Result<()> {
     fs::remove_dir_all(folder).map_err(|e| Error::file(folder, "remove", e))
 }
 
-fn lines<T: Serialize>(values: &[T]) -> Result<Vec<u8>> {
+fn json_lines<T: Serialize>(values: &[T]) -> Result<Vec<u8>> {
     let mut lines = Vec::new();
     for value in values {
         serde_json::to_writer(&mut lines, value).map_err(|e| Error::data("plan", e))?;

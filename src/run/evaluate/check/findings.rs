@@ -1,18 +1,18 @@
-//! The findings of a check, one per line: [`Findings`].
+//! Findings of `check`, one per line: [`Findings`].
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-/// How grave a finding is.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum Mark {
-    /// As it should be.
+    /// No problem.
     Ok,
-    /// A run goes on, and its numbers may not mean what they seem to.
+    /// A run would continue, but its numbers may be misleading.
     Warning,
-    /// A run stops here.
+    /// A run would stop.
     Problem,
 }
 
@@ -33,14 +33,14 @@ pub(super) struct Finding {
     pub(super) text: String,
 }
 
-/// The number of findings of one kind that are shown.
-const SHOWN: usize = 5;
+/// Maximum number of findings of one kind that are shown.
+const MAX_SHOWN: usize = 5;
 
-/// All findings, in the order in which they were made.
+/// All findings, in order.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
     all: Vec<Finding>,
-    /// The number of findings of each kind, and the place of the last one shown.
+    /// Number of findings of each kind, and index of the last one shown.
     kinds: BTreeMap<&'static str, (usize, usize)>,
 }
 
@@ -62,25 +62,25 @@ impl Findings {
         self.all.push(Finding { mark, text });
     }
 
-    /// Adds a finding of a kind of which there may be many: the first five are shown.
-    pub(super) fn one_of(&mut self, kind: &'static str, mark: Mark, text: impl Into<String>) {
+    /// Adds a finding of a kind. Only the first [`MAX_SHOWN`] of a kind are shown.
+    pub(super) fn add_of_kind(&mut self, kind: &'static str, mark: Mark, text: impl Into<String>) {
         let count = self.kinds.entry(kind).or_default();
         count.0 += 1;
-        if count.0 <= SHOWN {
+        if count.0 <= MAX_SHOWN {
             count.1 = self.all.len();
             self.add(mark, text);
         }
     }
 
-    /// The findings, with a line for those of a kind that are not shown.
+    /// The findings, with a line for the number of each kind that is not shown.
     pub(super) fn finish(mut self) -> Vec<Finding> {
         let mut rest: Vec<(usize, Finding)> = self
             .kinds
             .iter()
-            .filter(|(_, (count, _))| *count > SHOWN)
+            .filter(|(_, (count, _))| *count > MAX_SHOWN)
             .map(|(kind, (count, last))| {
                 let mark = self.all[*last].mark;
-                let text = format!("and {} more: {kind}", count - SHOWN);
+                let text = format!("and {} more: {kind}", count - MAX_SHOWN);
                 (*last, Finding { mark, text })
             })
             .collect();
@@ -91,20 +91,20 @@ impl Findings {
         self.all
     }
 
-    /// How many problems there are.
-    pub(super) fn problems(&self) -> usize {
-        let problems = self
+    /// Number of problems, including those that are not shown.
+    pub(super) fn problem_count(&self) -> usize {
+        let shown = self
             .all
             .iter()
-            .filter(|finding| finding.mark == Mark::Problem);
-        let hidden = self
+            .filter(|finding| finding.mark == Mark::Problem)
+            .count();
+        let hidden: usize = self
             .kinds
             .values()
-            .map(|(count, last)| match self.all[*last].mark {
-                Mark::Problem => count.saturating_sub(SHOWN),
-                Mark::Ok | Mark::Warning => 0,
-            });
-        problems.count() + hidden.sum::<usize>()
+            .filter(|(_, last)| self.all[*last].mark == Mark::Problem)
+            .map(|(count, _)| count.saturating_sub(MAX_SHOWN))
+            .sum();
+        shown + hidden
     }
 }
 
@@ -128,14 +128,14 @@ mod tests {
         let mut findings = Findings::default();
         findings.ok("files");
         for n in 0..7 {
-            findings.one_of(
+            findings.add_of_kind(
                 "missing images",
                 Mark::Problem,
                 format!("{n}.png is missing"),
             );
         }
-        findings.one_of("grey images", Mark::Warning, "x.png is grey");
-        assert_eq!(findings.problems(), 7);
+        findings.add_of_kind("grey images", Mark::Warning, "x.png is grey");
+        assert_eq!(findings.problem_count(), 7);
         let text = lines(&findings.finish());
         assert!(
             text.contains(

@@ -1,4 +1,4 @@
-//! The images of a check: [`images`].
+//! Checks of the images of the questions: [`check_images`].
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -14,35 +14,36 @@ use crate::text::words::counted;
 use crate::types::{Digest, FrameId, InputNote, InputSummary, Question};
 use darkqa_enhance::brightness;
 
-/// Whether the pixels of images are looked at.
+/// Whether all pixels of images are decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Depth {
-    /// The head of each file, and the pixels of a sample.
-    Heads,
-    /// Every pixel.
+    /// Read the header of each file, and decode a sample of the images.
+    Headers,
+    /// Decode all images.
     Pixels,
 }
 
-/// The number of images whose brightness is measured.
-const SAMPLED: usize = 32;
+/// Number of images whose brightness is measured.
+const SAMPLE_SIZE: usize = 32;
 
-/// Facts about one image.
-struct Looked<'a> {
+/// The result of inspecting an image.
+struct Inspection<'a> {
     id: &'a FrameId,
-    facts: Result<Facts>,
+    facts: Result<ImageFacts>,
+    /// Size of the file.
     bytes: u64,
 }
 
-/// The properties of an image.
-struct Facts {
+/// Properties of a usable image.
+struct ImageFacts {
     size: (u32, u32),
     digest: Digest,
-    /// Changes made when it was read, if any.
+    /// Changes made when the image was read, if any.
     note: Option<Box<InputNote>>,
 }
 
-/// Looks at the images that the questions are about.
-pub(super) fn images(
+/// Checks the images of the questions.
+pub(super) fn check_images(
     dataset: &Dataset,
     dark: DarkImages,
     questions: &[Question],
@@ -50,32 +51,27 @@ pub(super) fn images(
     progress: &Progress,
     findings: &mut Findings,
 ) {
-    let shown = first_shown(dataset, questions);
+    let shown = shown_frames(dataset, questions);
     let bar = progress.bar("reading images", shown.len());
-    let looked: Vec<Looked<'_>> = shown
+    let inspections: Vec<Inspection<'_>> = shown
         .par_iter()
         .map(|frame| {
-            let looked = look(dataset, frame, depth);
+            let inspection = inspect(dataset, frame, depth);
             bar.inc();
-            looked
+            inspection
         })
         .collect();
     drop(bar);
     let (mut by_digest, mut sizes) = (HashMap::new(), BTreeMap::new());
-    let (mut bytes, mut notes, mut unusable) = (0, InputSummary::default(), 0);
-    for Looked {
-        id,
-        facts,
-        bytes: of,
-    } in looked
-    {
+    let (mut total_bytes, mut notes, mut unusable) = (0, InputSummary::default(), 0);
+    for Inspection { id, facts, bytes } in inspections {
         match facts {
             Err(e) => {
                 unusable += 1;
-                findings.one_of("images that cannot be used", Mark::Problem, e.to_string());
+                findings.add_of_kind("images that cannot be used", Mark::Problem, e.to_string());
             }
-            Ok(Facts { size, digest, note }) => {
-                bytes += of;
+            Ok(ImageFacts { size, digest, note }) => {
+                total_bytes += bytes;
                 *sizes.entry(size).or_insert(0_usize) += 1;
                 if let Some(note) = note {
                     notes.add(id, &note);
@@ -85,7 +81,7 @@ pub(super) fn images(
                         "{:?} and {:?} are the same image under two names: each gets its own noise",
                         first.0, id.0
                     );
-                    findings.one_of("images that occur twice", Mark::Warning, text);
+                    findings.add_of_kind("images that occur twice", Mark::Warning, text);
                 }
             }
         }
@@ -100,17 +96,17 @@ pub(super) fn images(
     findings.ok(format!(
         "{}, {}, {}",
         counted(shown.len(), "image"),
-        megabytes(bytes),
-        listed(&sizes)
+        megabytes(total_bytes),
+        size_list(&sizes)
     ));
     for line in notes.lines() {
         findings.warn(line);
     }
-    light(dataset, &shown, dark, findings);
+    check_brightness(dataset, &shown, dark, findings);
 }
 
-/// The frames that the questions show, each once, in the order of the questions.
-fn first_shown<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a FrameId> {
+/// The distinct frames that the questions show, in the order of the questions.
+fn shown_frames<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a FrameId> {
     let mut seen = HashSet::new();
     first_asked(questions)
         .into_iter()
@@ -119,7 +115,7 @@ fn first_shown<'a>(dataset: &'a Dataset, questions: &'a [Question]) -> Vec<&'a F
         .collect()
 }
 
-fn look<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Looked<'a> {
+fn inspect<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Inspection<'a> {
     let picture = dataset.picture(id);
     let bytes = match &picture {
         Ok(Picture::Encoded(file)) => file.bytes().len() as u64,
@@ -131,18 +127,23 @@ fn look<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Looked<'a> {
             picture.decode()?;
         }
         let note = Some(picture.note()).filter(|note| *note != InputNote::default());
-        Ok(Facts {
+        Ok(ImageFacts {
             size,
             digest: picture.digest(),
             note: note.map(Box::new),
         })
     });
-    Looked { id, facts, bytes }
+    Inspection { id, facts, bytes }
 }
 
-/// Measures the brightness of a sample of the images.
-fn light(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut Findings) {
-    let number = shown.len().min(SAMPLED);
+/// Measures the brightness of a sample of the images, and warns if they are already dark.
+fn check_brightness(
+    dataset: &Dataset,
+    shown: &[&FrameId],
+    dark: DarkImages,
+    findings: &mut Findings,
+) {
+    let number = shown.len().min(SAMPLE_SIZE);
     let mut sample: Vec<f64> = (0..number)
         .into_par_iter()
         .filter_map(|index| {
@@ -155,7 +156,7 @@ fn light(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut
     let Some(median) = sample.get(sample.len() / 2) else {
         return;
     };
-    match advice(*median).filter(|_| dark == DarkImages::Odd) {
+    match advice(*median).filter(|_| dark == DarkImages::Unexpected) {
         Some(advice) => findings.warn(advice),
         None => findings.ok(format!(
             "median brightness {median:.0} of 255 ({})",
@@ -164,7 +165,7 @@ fn light(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut
     }
 }
 
-fn listed(sizes: &BTreeMap<(u32, u32), usize>) -> String {
+fn size_list(sizes: &BTreeMap<(u32, u32), usize>) -> String {
     let text =
         |((width, height), count): (&(u32, u32), &usize)| format!("{count} of {width}×{height}");
     if sizes.len() <= 4 {

@@ -1,6 +1,6 @@
-//! `check`: everything that a run needs, looked at before anything is spent. No network and no key is used.
+//! `check`: checks everything that a run needs before any cost arises. Uses no network and no key.
 //!
-//! Cheap steps come before dear ones, and a problem ends no step but those that need what is broken.
+//! Cheap steps come first. A problem skips only the steps that depend on the broken part.
 
 mod findings;
 mod images;
@@ -15,7 +15,7 @@ use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
 use super::estimate;
-use super::power::power;
+use super::power::power_forecast;
 use super::settings::EvaluateArgs;
 use super::unnamed_scenes::unnamed_scenes;
 use crate::dataset::{DataPlace, Dataset, Picture};
@@ -51,7 +51,7 @@ pub(crate) struct CheckArgs {
 /// Checks data, questions, images, models, enhancers and prompts.
 ///
 /// # Errors
-/// If the flags contradict each other. What else is wrong is a finding, and the exit code is 1.
+/// If the flags contradict each other. Other problems are findings, and set the exit code to 1.
 pub(crate) fn check(
     mut args: EvaluateArgs,
     check: &CheckArgs,
@@ -63,17 +63,17 @@ pub(crate) fn check(
     let is_json = std::mem::take(&mut args.job.output.show.json);
     args.job.money.dry_run = true;
     let mut findings = Findings::default();
-    settings::settings(&args, &mut findings);
-    let asked = data(&args, check, progress, &mut findings)?;
-    plan(args, progress, &mut findings);
-    let problems = findings.problems();
+    settings::check_settings(&args, &mut findings);
+    let asked = check_data(&args, check, progress, &mut findings)?;
+    check_plan(args, progress, &mut findings);
+    let problems = findings.problem_count();
     let findings = findings.finish();
     let warnings = findings
         .iter()
         .filter(|finding| finding.mark == Mark::Warning)
         .count();
     let output = if is_json {
-        json_of(&findings, asked, problems)
+        findings_json(&findings, asked, problems)
     } else {
         format!(
             "{}{}\n",
@@ -95,13 +95,13 @@ fn verdict(asked: usize, problems: usize, warnings: usize) -> String {
     }
 }
 
-fn json_of(findings: &[Finding], questions: usize, problems: usize) -> String {
+fn findings_json(findings: &[Finding], questions: usize, problems: usize) -> String {
     let value = json!({"findings": findings, "questions": questions, "problems": problems});
     format!("{value:#}\n")
 }
 
-/// The steps about data; returns the number of questions that would be asked.
-fn data(
+/// Checks data, questions and images; returns the number of questions that would be asked.
+fn check_data(
     args: &EvaluateArgs,
     check: &CheckArgs,
     progress: &Progress,
@@ -143,35 +143,36 @@ fn data(
             return Ok(0);
         }
     };
-    questions::questions(&asked, findings);
+    questions::check_questions(&asked, findings);
     if let Some(warning) = unnamed_scenes(&dataset, &asked) {
         findings.warn(warning);
     }
     if args.job.models.is_empty() {
-        // With a model, this line is among what a run would take.
+        // With a model, the estimate of the run includes this line.
         let sets = RunContents {
             models: 1,
             enhancers: args.job.enhancers.llie.len() + args.job.enhancers.enhanced.len(),
             lights: 1,
             has_noise: true,
         };
-        if let Some(power) = power(&dataset, &asked, sets) {
+        if let Some(power) = power_forecast(&dataset, &asked, sets) {
             findings.ok(power.line());
         }
     }
     let depth = if check.deep {
         Depth::Pixels
     } else {
-        Depth::Heads
+        Depth::Headers
     };
     let enhancers = args.job.enhancers.clone().for_set(light);
-    // Flags that cannot be followed are a finding already.
-    let dark = LightSettings::resolve(&args.job.light, light).map_or(DarkImages::Odd, |levels| {
-        DarkImages::new(light, &levels, &enhancers)
-    });
-    images::images(&dataset, dark, &asked, depth, progress, findings);
+    // Contradictory flags are a finding already.
+    let dark = LightSettings::resolve(&args.job.light, light)
+        .map_or(DarkImages::Unexpected, |levels| {
+            DarkImages::new(light, &levels, &enhancers)
+        });
+    images::check_images(&dataset, dark, &asked, depth, progress, findings);
     if let Some(path) = &check.save_questions {
-        save(path, &dataset, &asked)?;
+        save_questions(path, &dataset, &asked)?;
         findings.ok(format!(
             "{}: the questions as they were read",
             path.display()
@@ -180,15 +181,15 @@ fn data(
     Ok(asked.len())
 }
 
-/// The models, and what a run would take. Nothing is sent, and no key is read.
-fn plan(args: EvaluateArgs, progress: &Progress, findings: &mut Findings) {
+/// Checks the models, and estimates the run. Nothing is sent, and no key is read.
+fn check_plan(args: EvaluateArgs, progress: &Progress, findings: &mut Findings) {
     if args.job.models.is_empty() {
         findings.warn(
             "no model is named: --model NAME adds it to the check, and what a run would take",
         );
         return;
     }
-    if findings.problems() > 0 {
+    if findings.problem_count() > 0 {
         findings.warn("what a run would take is not estimated, as long as there are problems");
         return;
     }
@@ -198,8 +199,8 @@ fn plan(args: EvaluateArgs, progress: &Progress, findings: &mut Findings) {
     }
 }
 
-/// Writes the questions, one a line.
-fn save(path: &Path, dataset: &Dataset, questions: &[Question]) -> Result<()> {
+/// Writes the questions, one per line, with the SHA-256 of each image.
+fn save_questions(path: &Path, dataset: &Dataset, questions: &[Question]) -> Result<()> {
     let mut text = String::new();
     for question in questions {
         let digest = |frame| match dataset.picture(frame) {

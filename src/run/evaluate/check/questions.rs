@@ -1,4 +1,4 @@
-//! The questions of a check: [`questions`].
+//! Checks of the questions: [`check_questions`].
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -8,14 +8,14 @@ use crate::types::Question;
 use crate::types::questions::letter;
 use crate::types::text::excerpt;
 
-/// The share of one answer or letter from which on a model that always says it scores well.
-const COMMON: f64 = 0.6;
+/// Share of one true answer or letter above which a constant reply scores well.
+const MAX_SHARE: f64 = 0.6;
 
-/// Number of families that are listed.
+/// Maximum number of families listed.
 const MAX_FAMILIES: usize = 12;
 
-/// Looks at the questions: families, numbers of choices, chance, and what gives answers away.
-pub(super) fn questions(questions: &[Question], findings: &mut Findings) {
+/// Reports families, numbers of choices and chance accuracy, and warns of questions that give their answers away.
+pub(super) fn check_questions(questions: &[Question], findings: &mut Findings) {
     let (mut families, mut sizes) = (BTreeMap::new(), BTreeMap::new());
     let mut chance = 0.0;
     for question in questions {
@@ -43,23 +43,25 @@ pub(super) fn questions(questions: &[Question], findings: &mut Findings) {
         "families: {}",
         first_names(&families, MAX_FAMILIES)
     ));
-    commonest(questions, findings);
-    repeats(questions, findings);
-    given_away(questions, findings);
+    warn_of_common_answers(questions, findings);
+    warn_of_repeats(questions, findings);
+    warn_of_contained_answers(questions, findings);
 }
 
-/// Warns of an answer or a letter that is true so often that a blind model scores by always saying it.
-fn commonest(questions: &[Question], findings: &mut Findings) {
-    let letters = questions
+/// Warns of an answer or letter that is true so often that a constant reply scores well.
+fn warn_of_common_answers(questions: &[Question], findings: &mut Findings) {
+    let letters: Vec<String> = questions
         .iter()
-        .filter_map(|question| Some(letter(question.choices.truth()?).to_string()));
-    let texts = questions.iter().filter_map(|question| {
-        let truth = question.choices.truth()?;
-        Some(question.choices.texts()[truth].to_lowercase())
-    });
-    let all: [(&str, Vec<String>); 2] =
-        [("letter", letters.collect()), ("answer", texts.collect())];
-    for (what, answers) in all {
+        .filter_map(|question| Some(letter(question.choices.truth()?).to_string()))
+        .collect();
+    let texts: Vec<String> = questions
+        .iter()
+        .filter_map(|question| {
+            let truth = question.choices.truth()?;
+            Some(question.choices.texts()[truth].to_lowercase())
+        })
+        .collect();
+    for (what, answers) in [("letter", letters), ("answer", texts)] {
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for answer in &answers {
             *counts.entry(answer).or_default() += 1;
@@ -69,7 +71,7 @@ fn commonest(questions: &[Question], findings: &mut Findings) {
             continue;
         };
         let share = *count as f64 / questions.len() as f64;
-        if share >= COMMON {
+        if share >= MAX_SHARE {
             findings.warn(format!(
                 "always the {what} {:?} scores {:.0} %; ask the model without images too (--blind-model NAME), or show the choices in other orders (--choice-order shuffle)",
                 excerpt(answer, 60),
@@ -80,7 +82,7 @@ fn commonest(questions: &[Question], findings: &mut Findings) {
 }
 
 /// Warns of questions that occur twice.
-fn repeats(questions: &[Question], findings: &mut Findings) {
+fn warn_of_repeats(questions: &[Question], findings: &mut Findings) {
     let mut seen = HashMap::new();
     for question in questions {
         let content = (&question.frame, &question.text, question.choices.texts());
@@ -90,34 +92,36 @@ fn repeats(questions: &[Question], findings: &mut Findings) {
                 excerpt(&first.0, 60),
                 excerpt(&question.id.0, 60)
             );
-            findings.one_of("questions that occur twice", Mark::Warning, text);
+            findings.add_of_kind("questions that occur twice", Mark::Warning, text);
         }
     }
 }
 
-/// Warns of questions whose text holds the true choice and no other.
-fn given_away(questions: &[Question], findings: &mut Findings) {
+/// Warns of questions whose text contains the true choice and no other.
+fn warn_of_contained_answers(questions: &[Question], findings: &mut Findings) {
     for question in questions {
         let text = format!(" {} ", words(&question.text));
-        let held = |choice: &String| text.contains(&format!(" {} ", words(choice)));
+        let is_contained = |choice: &String| text.contains(&format!(" {} ", words(choice)));
         let texts = question.choices.texts();
         let Some(truth) = question.choices.truth().map(|truth| &texts[truth]) else {
             continue;
         };
-        let others = texts.iter().filter(|choice| *choice != truth);
-        if words(truth).len() > 2 && held(truth) && !others.clone().any(held) {
+        let is_other_contained = texts
+            .iter()
+            .any(|choice| choice != truth && is_contained(choice));
+        if words(truth).len() > 2 && is_contained(truth) && !is_other_contained {
             let line = format!(
                 "the question {:?} holds its answer {:?}: {:?}",
                 excerpt(&question.id.0, 60),
                 excerpt(truth, 60),
                 excerpt(&question.text, 120)
             );
-            findings.one_of("questions that hold their answers", Mark::Warning, line);
+            findings.add_of_kind("questions that hold their answers", Mark::Warning, line);
         }
     }
 }
 
-/// The words of a text in lower case, between single spaces.
+/// The words of a text in lower case, separated by single spaces.
 fn words(text: &str) -> String {
     let lower = text.to_lowercase();
     lower

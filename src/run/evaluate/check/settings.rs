@@ -1,4 +1,4 @@
-//! The flags of a check, and the files that they name: [`settings`].
+//! Checks of the flags and of the files that they name: [`check_settings`].
 
 use std::path::Path;
 
@@ -13,8 +13,8 @@ use crate::types::Rgb;
 use darkqa_enhance::{Install, RuntimeSearch};
 use darkqa_light::LightSettings;
 
-/// Looks at the flags and the files that they name; no data is read.
-pub(super) fn settings(args: &EvaluateArgs, findings: &mut Findings) {
+/// Checks the flags and the files that they name. No data is read.
+pub(super) fn check_settings(args: &EvaluateArgs, findings: &mut Findings) {
     let place = args.scene.place(args.data.place());
     let set = args.scene.set_light(&place);
     let enhancers = |set| args.job.enhancers.clone().for_set(set);
@@ -22,34 +22,37 @@ pub(super) fn settings(args: &EvaluateArgs, findings: &mut Findings) {
     match &light {
         Ok((set, light)) => {
             let used = check_used(light, &enhancers(*set));
-            said(findings, used.map(|()| None));
+            add(findings, used.map(|()| None));
         }
         Err(e) => findings.problem(e.to_string()),
     }
     let rulebook = args.selection.rules.as_deref();
-    said(findings, rules(rulebook).map(|_| file("rules", rulebook)));
+    add(
+        findings,
+        rules(rulebook).map(|_| file_line("rules", rulebook)),
+    );
     let folder = args.choice.prompts.as_deref();
     let prompts = folder.map_or_else(Prompts::built_in, Prompts::load);
-    said(findings, prompts.map(|_| file("prompts", folder)));
+    add(findings, prompts.map(|_| file_line("prompts", folder)));
     if !args.job.models.is_empty() {
-        let models = args.job.check_models(&args.experiment());
-        let line = |names: Vec<String>| {
+        let models = args.job.check_models(&args.experiment()).map(|names| {
             Some(format!(
                 "models: {}; the keys that they need are there",
                 names.join(", ")
             ))
-        };
-        said(findings, models.map(line));
+        });
+        add(findings, models);
     }
-    said(findings, enhance(args));
+    add(findings, try_enhancers(args));
 }
 
-/// One line for a file that was named and can be used.
-fn file(what: &str, path: Option<&Path>) -> Option<String> {
+/// The line about a usable file or folder; `None` if none was named.
+fn file_line(what: &str, path: Option<&Path>) -> Option<String> {
     path.map(|path| format!("{what}: {}", path.display()))
 }
 
-fn said(findings: &mut Findings, result: Result<Option<String>>) {
+/// Adds the line or the error of a step to the findings.
+fn add(findings: &mut Findings, result: Result<Option<String>>) {
     match result {
         Ok(Some(line)) => findings.ok(line),
         Ok(None) => {}
@@ -57,8 +60,8 @@ fn said(findings: &mut Findings, result: Result<Option<String>>) {
     }
 }
 
-/// Loads the enhancers and puts one image through each. A runtime that is not there is not installed.
-fn enhance(args: &EvaluateArgs) -> Result<Option<String>> {
+/// Loads the enhancers and enhances one image with each. A missing runtime is not installed.
+fn try_enhancers(args: &EvaluateArgs) -> Result<Option<String>> {
     let files = enhancers::read(&args.job.enhancers.llie)?;
     if files.is_empty() {
         return Ok(None);
@@ -72,8 +75,8 @@ fn enhance(args: &EvaluateArgs) -> Result<Option<String>> {
     let mut loading: EnhancerRunArgs = args.job.loading.clone();
     loading.runtime.offline = true;
     let mut enhancers = OpenEnhancers::load(files, &loading)?.take()?;
-    // A gradient: an image of one value has no structure that a model could keep.
-    let samples = (0..64 * 64 * 3).map(|at| (at / 192) as u8);
+    // A gradient, because an image of a single value has no structure.
+    let samples = (0..64 * 64 * 3).map(|index| (index / 192) as u8);
     let image = Rgb::new(64, 64, samples.collect())?;
     for enhancer in &mut enhancers {
         enhancer.enhance(&image)?;

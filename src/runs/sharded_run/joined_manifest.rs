@@ -1,20 +1,20 @@
-//! [`joined_manifest`]: the manifest of a run that is joined from its parts.
+//! The manifest of a run joined from its shards: [`joined_manifest`].
 
 use std::collections::BTreeMap;
 
 use super::coverage::Coverage;
-use super::part::{StoredPart, no_part};
+use super::stored_shard::{StoredShard, no_shard_error};
 use crate::error::{Error, Result};
-use crate::runs::part_cost::PartCost;
+use crate::runs::shard_budget::ShardBudget;
 use crate::types::InputSummary;
 use crate::types::flags::spelled_setting;
 use crate::types::manifests::{RunManifest, differences};
 
-/// Checks that all parts belong to the same run.
+/// Checks that all shards belong to the same run.
 ///
 /// # Errors
-/// If a part belongs to another run; names the first difference.
-pub(super) fn check_same_run(parts: &[StoredPart]) -> Result<()> {
+/// If a shard belongs to another run; names the first difference.
+pub(super) fn check_same_run(parts: &[StoredShard]) -> Result<()> {
     let Some(first) = parts.first() else {
         return Ok(());
     };
@@ -44,15 +44,15 @@ fn difference(one: &RunManifest, other: &RunManifest) -> Option<(String, String,
     Some((field, column.first, column.second))
 }
 
-/// Joins the manifests of the parts into the manifest of the run. Its trial counts are left to the caller.
+/// Joins the manifests of the shards into the manifest of the run. The caller sets the counts of trials.
 ///
 /// # Errors
-/// If there is no part.
-pub(super) fn joined_manifest(parts: &[StoredPart], coverage: &Coverage) -> Result<RunManifest> {
-    let mut manifest = parts.first().ok_or_else(no_part)?.manifest.clone();
+/// If there is no shard.
+pub(super) fn joined_manifest(parts: &[StoredShard], coverage: &Coverage) -> Result<RunManifest> {
+    let mut manifest = parts.first().ok_or_else(no_shard_error)?.manifest.clone();
     manifest.shard = None;
     manifest.part = None;
-    PartCost::forget(&mut manifest);
+    ShardBudget::remove_note(&mut manifest);
     for part in parts {
         for (column, values) in &part.manifest.columns {
             let all = manifest.columns.entry(column.clone()).or_default();
@@ -66,18 +66,23 @@ pub(super) fn joined_manifest(parts: &[StoredPart], coverage: &Coverage) -> Resu
         manifest.enhancers.insert(name.clone(), note);
     }
     let mut inputs: Option<InputSummary> = None;
-    for (part, is_counted) in parts.iter().zip(coverage.once()) {
+    for (part, is_counted) in parts.iter().zip(coverage.counted_once()) {
         if is_counted && let Some(part_inputs) = &part.manifest.inputs {
             inputs.get_or_insert_default().join(part_inputs);
         }
     }
     manifest.inputs = inputs;
-    // The records of the parts keep their readings, so the oldest version counts; `None` is the first version.
-    let reply_reading = parts.iter().map(|part| &part.manifest.reply_reading).min();
-    manifest.reply_reading = reply_reading.cloned().flatten();
-    let created = parts.iter().map(|part| &part.manifest.created).min();
-    manifest.created = created.cloned().unwrap_or_default();
-    let updated = parts.iter().map(|part| &part.manifest.updated).max();
-    manifest.updated = updated.cloned().unwrap_or_default();
+    for part in parts.iter().map(|part| &part.manifest) {
+        // The records of the shards are not parsed again, so the oldest version counts; `None` is the first version.
+        if part.reply_reading < manifest.reply_reading {
+            manifest.reply_reading.clone_from(&part.reply_reading);
+        }
+        if part.created < manifest.created {
+            manifest.created.clone_from(&part.created);
+        }
+        if part.updated > manifest.updated {
+            manifest.updated.clone_from(&part.updated);
+        }
+    }
     Ok(manifest)
 }

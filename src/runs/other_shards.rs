@@ -1,40 +1,41 @@
-//! Sources and trials in parts of another division of the same run: [`OtherParts`].
+//! Shards of the same run with another number of shards: [`OtherShards`].
 
 use std::collections::{BTreeSet, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::runs::placed_trials::{append, trials_of};
+use crate::runs::shard_records::{append_records, latest_trials};
 use crate::store::{self, Store};
 use crate::types::flags::spelled_setting;
 use crate::types::manifests::{RunManifest, differences};
 use crate::types::{FrameId, TextPlace, TrialKey};
 use darkqa_score::answers::record::Detail;
 
-/// The parts of a run in another number than now, as when a job array was stopped and goes on with another size.
-pub(crate) struct OtherParts(Vec<(PathBuf, RunManifest)>);
+/// Shards of a run that was divided into another number of shards, for example because a job array was stopped and restarted with another
+/// size. Their replies are reused.
+pub(crate) struct OtherShards(Vec<(PathBuf, RunManifest)>);
 
-impl OtherParts {
-    /// The parts of other divisions beside the folder of a part.
+impl OtherShards {
+    /// Finds the shards of other divisions in the parent folder of a shard.
     ///
     /// # Errors
-    /// If one is of another run, or another process writes to it: both might ask the same.
-    pub(crate) fn beside<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Self> {
-        let mut parts = Vec::new();
-        let (Some(own), Some(whole)) = (division(manifest), folder.parent()) else {
-            return Ok(Self(parts));
+    /// If one belongs to another run, or another process is writing to it and might ask the same questions.
+    pub(crate) fn find<D: Detail>(folder: &Path, manifest: &RunManifest) -> Result<Self> {
+        let mut shards = Vec::new();
+        let (Some(own), Some(run)) = (shard_count(manifest), folder.parent()) else {
+            return Ok(Self(shards));
         };
-        let entries = fs::read_dir(whole).map_err(|e| Error::file(whole, "read", e))?;
+        let entries = fs::read_dir(run).map_err(|e| Error::file(run, "read", e))?;
         for entry in entries {
-            let path = entry.map_err(|e| Error::file(whole, "read", e))?.path();
+            let path = entry.map_err(|e| Error::file(run, "read", e))?.path();
             if store::schema(&path)?.is_none_or(|schema| schema != D::SCHEMA) {
                 continue;
             }
             let Some(other) = store::read_manifest(&path, D::SCHEMA)? else {
                 continue;
             };
-            if division(&other).is_none_or(|division| division == own) {
+            if shard_count(&other).is_none_or(|count| count == own) {
                 continue;
             }
             let wrong = |problem: String| {
@@ -56,14 +57,14 @@ impl OtherParts {
                     manifest.shard.as_deref().unwrap_or_default()
                 ));
             }
-            parts.push((path, other));
+            shards.push((path, other));
         }
-        parts.sort_by(|one, other| one.0.cmp(&other.0));
-        Ok(Self(parts))
+        shards.sort_by(|one, other| one.0.cmp(&other.0));
+        Ok(Self(shards))
     }
 
-    /// Copies the replies to these trials from the other parts, and the notes about the images of these sources. Returns the number of
-    /// replies.
+    /// Copies the replies to the trials in `wanted` from the other shards, with the thumbnails and fidelity notes of `sources`. Returns the
+    /// number of replies.
     ///
     /// # Errors
     /// If a record cannot be read or written.
@@ -76,27 +77,31 @@ impl OtherParts {
     ) -> Result<usize> {
         let mut found: Vec<(TrialKey, TextPlace)> = Vec::new();
         let mut keys = HashSet::new();
-        for (part, (folder, other)) in self.0.iter().enumerate() {
-            let trials = trials_of::<D>(folder, other)?;
+        for (number, (folder, other)) in self.0.iter().enumerate() {
+            let trials = latest_trials::<D>(folder, other)?;
             let mut answered: Vec<(TextPlace, TrialKey)> = trials
                 .iter()
                 .filter(|trial| wanted.contains(&trial.key()) && !trial.failed())
-                .map(|trial| (trial.text().in_log(part), trial.key()))
+                .map(|trial| (trial.text().in_log(number), trial.key()))
                 .collect();
             answered.sort_unstable();
-            let new = answered.into_iter().filter(|(_, key)| keys.insert(*key));
-            found.extend(new.map(|(place, key)| (key, place)));
+            found.extend(
+                answered
+                    .into_iter()
+                    .filter(|(_, key)| keys.insert(*key))
+                    .map(|(place, key)| (key, place)),
+            );
         }
         if found.is_empty() {
             return Ok(0);
         }
-        let parts: Vec<(&Path, &RunManifest)> = self
+        let shards: Vec<(&Path, &RunManifest)> = self
             .0
             .iter()
             .map(|(folder, manifest)| (&**folder, manifest))
             .collect();
-        append(store, manifest, &parts, found.iter().copied())?;
-        let folders: Vec<&Path> = parts.iter().map(|(folder, _)| *folder).collect();
+        append_records(store, manifest, &shards, found.iter().copied())?;
+        let folders: Vec<&Path> = shards.iter().map(|(folder, _)| *folder).collect();
         store.add_thumbnails_of(&folders, |frame| sources.contains(frame))?;
         store.add_fidelity_of(&folders, |frame| sources.contains(frame))?;
         store.sync()?;
@@ -104,8 +109,8 @@ impl OtherParts {
     }
 }
 
-/// The number of parts, if a run is a part.
-fn division(manifest: &RunManifest) -> Option<&str> {
+/// The number of shards in the manifest of a shard; `None` if the run is not a shard.
+fn shard_count(manifest: &RunManifest) -> Option<&str> {
     let (_, count) = manifest.shard.as_deref()?.split_once('/')?;
     Some(count)
 }

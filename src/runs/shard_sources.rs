@@ -1,4 +1,4 @@
-//! The part of a run that a shard does: [`part`].
+//! Division of a run's sources into shards: [`shard_questions`], [`shard_range`].
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -8,15 +8,15 @@ use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
 use crate::types::manifests::PartPlace;
 
-/// The questions about the sources of a shard, with the place of these sources; the place is `None` for everything.
+/// The questions about the sources of a shard, with the place of these sources. The place is `None` if the run is not divided.
 ///
-/// Sources are numbered in the order of their first question. A shard has neighbouring ones, which cost about as much as those of
-/// any other. Neighbours of one scene stay together where they cost at most as much as a shard. `source` returns the source of a
-/// question, `scene` its scene, which is empty where there is none, and `cost` the cost of a source, in any unit.
+/// Sources are numbered in the order of their first question. A shard has consecutive sources, and all shards cost about the same.
+/// Consecutive sources of one scene stay in one shard if they cost at most as much as a shard. `source` returns the source of a question,
+/// `scene` its scene (empty if it has none), and `cost` the cost of a source in any unit.
 ///
 /// # Errors
-/// If the shard has no question.
-pub(crate) fn part<Q>(
+/// If the shard is empty.
+pub(crate) fn shard_questions<Q>(
     questions: Vec<Q>,
     shard: Shard,
     source: impl Fn(&Q) -> String,
@@ -27,18 +27,18 @@ pub(crate) fn part<Q>(
         return Ok((questions, None));
     }
     let mut positions = HashMap::<String, usize>::new();
-    let mut divided = Vec::new();
+    let mut sources = Vec::new();
     for question in &questions {
         let next = positions.len();
         if let Entry::Vacant(place) = positions.entry(source(question)) {
-            divided.push(Divided {
+            sources.push(WeightedSource {
                 scene: scene(question),
                 cost: cost(place.key()),
             });
             place.insert(next);
         }
     }
-    let own = own_sources(&divided, shard);
+    let own = shard_range(&sources, shard);
     if own.is_empty() {
         let problem = format!(
             "{shard} is empty: there are {} frames or walks; use at most as many shards",
@@ -57,51 +57,64 @@ pub(crate) fn part<Q>(
     Ok((questions.collect(), Some(place)))
 }
 
-/// A source as it is divided.
+/// The scene and the cost of a source.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Divided {
-    /// Its scene; empty if there is none.
+pub(crate) struct WeightedSource {
+    /// Empty if the source has no scene.
     pub(crate) scene: String,
-    /// Its cost, in any unit; 0 counts as 1.
+    /// Cost in any unit; 0 counts as 1.
     pub(crate) cost: u64,
 }
 
-/// The positions of a shard's sources among all of them; empty only if there are more shards than sources.
-pub(crate) fn own_sources(sources: &[Divided], shard: Shard) -> Range<usize> {
-    let count = sources.len();
-    let parts = shard.count().get() as usize;
-    let starts = starts(sources, parts);
-    let index = shard.index() as usize;
-    let start = |index: usize| starts.get(index).copied().unwrap_or(count);
-    start(index)..start(index + 1)
-}
-
-/// The position of the first source of each part.
-fn starts(sources: &[Divided], parts: usize) -> Vec<usize> {
-    let cost = |source: &Divided| u128::from(source.cost.max(1));
-    let total: u128 = sources.iter().map(cost).sum();
-    // A source is in the part in whose equal share of the cost it begins.
-    let part_of = |before: u128| (before * parts as u128 / total.max(1)) as usize;
-    let mut part_of_source = Vec::with_capacity(sources.len());
-    let mut before = 0;
-    for together in sources.chunk_by(|one, next| !one.scene.is_empty() && one.scene == next.scene) {
-        let own: u128 = together.iter().map(cost).sum();
-        let (is_kept, first) = (own * parts as u128 <= total, part_of(before));
-        for source in together {
-            part_of_source.push(if is_kept { first } else { part_of(before) });
-            before += cost(source);
+impl WeightedSource {
+    /// A source without a scene and with the same cost as all others.
+    pub(crate) fn equal() -> Self {
+        Self {
+            scene: String::new(),
+            cost: 1,
         }
     }
-    let mut starts: Vec<usize> = (0..parts)
-        .map(|part| part_of_source.partition_point(|of| *of < part))
-        .collect();
-    // What costs more than a part leaves none empty beside it, as long as there are as many sources as parts.
-    if parts <= sources.len() {
-        for part in 1..parts {
-            starts[part] = starts[part].max(starts[part - 1] + 1);
+}
+
+/// The indices of a shard's sources; empty only if there are more shards than sources.
+pub(crate) fn shard_range(sources: &[WeightedSource], shard: Shard) -> Range<usize> {
+    let mut starts = shard_starts(sources, shard.count().get() as usize);
+    starts.push(sources.len());
+    let index = shard.index() as usize;
+    starts[index]..starts[index + 1]
+}
+
+/// The index of the first source of each shard.
+fn shard_starts(sources: &[WeightedSource], count: usize) -> Vec<usize> {
+    let cost = |source: &WeightedSource| u128::from(source.cost.max(1));
+    let total: u128 = sources.iter().map(cost).sum();
+    // The total cost is cut into equal shares. A source belongs to the share in which it starts.
+    let shard_at = |cost_before: u128| (cost_before * count as u128 / total.max(1)) as usize;
+    let mut shards = Vec::with_capacity(sources.len());
+    let mut cost_before = 0;
+    for scene in sources.chunk_by(|one, next| !one.scene.is_empty() && one.scene == next.scene) {
+        let scene_cost: u128 = scene.iter().map(cost).sum();
+        let fits_in_shard = scene_cost * count as u128 <= total;
+        let first = shard_at(cost_before);
+        for source in scene {
+            shards.push(if fits_in_shard {
+                first
+            } else {
+                shard_at(cost_before)
+            });
+            cost_before += cost(source);
         }
-        for part in (1..parts).rev() {
-            starts[part] = starts[part].min(sources.len() - (parts - part));
+    }
+    let mut starts: Vec<usize> = (0..count)
+        .map(|shard| shards.partition_point(|other| *other < shard))
+        .collect();
+    // If there are enough sources, give each shard at least one, although a source may cost more than a share.
+    if count <= sources.len() {
+        for shard in 1..count {
+            starts[shard] = starts[shard].max(starts[shard - 1] + 1);
+        }
+        for shard in (1..count).rev() {
+            starts[shard] = starts[shard].min(sources.len() - (count - shard));
         }
     }
     starts
@@ -118,22 +131,22 @@ mod tests {
             '-' => String::new(),
             letter => letter.to_string(),
         };
-        let sources = scenes.chars().map(|letter| Divided {
+        let sources = scenes.chars().map(|letter| WeightedSource {
             scene: scene(letter),
             cost: 1,
         });
-        divided(&sources.collect::<Vec<Divided>>(), count)
+        divided(&sources.collect::<Vec<WeightedSource>>(), count)
     }
 
-    fn divided(sources: &[Divided], count: u32) -> Vec<Range<usize>> {
+    fn divided(sources: &[WeightedSource], count: u32) -> Vec<Range<usize>> {
         let shards = Shard::all(NonZeroU32::new(count).unwrap());
-        shards.map(|shard| own_sources(sources, shard)).collect()
+        shards.map(|shard| shard_range(sources, shard)).collect()
     }
 
-    fn divided_costs(costs: &[u64]) -> Vec<Divided> {
+    fn divided_costs(costs: &[u64]) -> Vec<WeightedSource> {
         costs
             .iter()
-            .map(|cost| Divided {
+            .map(|cost| WeightedSource {
                 scene: String::new(),
                 cost: *cost,
             })
@@ -171,16 +184,17 @@ mod tests {
         assert_eq!(cuts("aabbcc", 3), [0..2, 2..4, 4..6]);
         assert_eq!(cuts("aaaaab", 2), [0..3, 3..6]);
     }
+
     #[test]
-    fn parts_cost_about_the_same() {
-        // One source is as dear as all others together.
+    fn shards_cost_about_the_same() {
+        // One source costs as much as all others together.
         assert_eq!(divided(&divided_costs(&[4, 1, 1, 1, 1]), 2), [0..1, 1..5]);
         assert_eq!(divided(&divided_costs(&[1, 1, 1, 1, 4]), 2), [0..4, 4..5]);
         assert_eq!(
             divided(&divided_costs(&[2, 2, 1, 1, 1, 1]), 2),
             [0..2, 2..6]
         );
-        // A dear source leaves no part empty.
+        // An expensive source leaves no shard empty.
         assert_eq!(divided(&divided_costs(&[100, 1, 1]), 3), [0..1, 1..2, 2..3]);
         assert_eq!(divided(&divided_costs(&[1, 1, 100]), 3), [0..1, 1..2, 2..3]);
         assert_eq!(divided(&divided_costs(&[0, 0, 0]), 3), [0..1, 1..2, 2..3]);

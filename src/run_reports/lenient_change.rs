@@ -1,4 +1,4 @@
-//! Changes if stored replies are read by the rules of this version: [`LenientChange`].
+//! Effect of parsing stored replies again by the rules of this version: [`LenientChange`].
 
 use crate::error::Result;
 use crate::types::manifests::{FIRST_REPLY_READING, RunManifest};
@@ -6,23 +6,23 @@ use crate::types::{ChoiceDetail, Record};
 use darkqa_score::answers::record::reread;
 use darkqa_score::choice::LENIENT_VERSION;
 
-/// How the lenient parsing of stored replies changes.
+/// Difference between the stored lenient parsing of replies and the one of this version.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct LenientChange {
-    /// The version by which the replies were read.
+    /// Version of the rules by which the replies were parsed.
     from: String,
     /// Number of replies.
     replies: usize,
-    /// Number of replies that read differently.
+    /// Number of replies whose parsed choice changes.
     changed: usize,
     /// Number of replies to questions whose true choice is known.
     scored: usize,
-    /// Number of replies that read as the true choice, before and now.
+    /// Number of replies parsed as the true choice, before and now.
     right: [usize; 2],
 }
 
 impl LenientChange {
-    /// No replies yet, of a run with this manifest.
+    /// A comparison without replies, for the run of this manifest.
     pub(super) fn new(manifest: &RunManifest) -> Self {
         let from = manifest.reply_reading.as_deref();
         Self {
@@ -31,16 +31,16 @@ impl LenientChange {
         }
     }
 
-    /// Whether the replies were read by the rules of this version.
+    /// True if the replies were parsed by the rules of this version.
     pub(super) fn is_current(&self) -> bool {
         self.from == LENIENT_VERSION
     }
 
-    /// The change for stored records.
+    /// Parses the replies of stored records again, and counts the changes.
     ///
     /// # Errors
     /// If a record cannot be read, or its choices are not valid.
-    pub(super) fn through(
+    pub(super) fn with_records(
         mut self,
         records: impl IntoIterator<Item = Result<Record>>,
     ) -> Result<Self> {
@@ -51,7 +51,7 @@ impl LenientChange {
         Ok(self)
     }
 
-    /// Counts one reply, as it was read and as it is read now. A trial without a reply does not count.
+    /// Counts one reply, given its trial as parsed before and now. Ignores a trial without a reply.
     pub(super) fn add(&mut self, before: &ChoiceDetail, now: &ChoiceDetail) {
         let (Some(old), Some(new)) = (before.lenient, now.lenient) else {
             return;
@@ -66,7 +66,7 @@ impl LenientChange {
         }
     }
 
-    /// Whether any reply reads differently.
+    /// True if the parsed choice of any reply changes.
     pub(super) fn has_changed(&self) -> bool {
         self.changed > 0
     }

@@ -1,4 +1,4 @@
-//! Rebuilding the images of a run: `ImageRebuilder`.
+//! Rebuilds the images of a run: [`ImageRebuilder`].
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,7 +24,8 @@ use darkqa_light::KindSettings;
 
 /// Flags for the current paths of a run's data and enhancers, and for running them.
 ///
-/// The variables are `DARKQA_MOVED_DATA`, `DARKQA_MOVED_LLIE` and `DARKQA_MOVED_ENHANCED`, because `DARKQA_DATA` is for new runs and not for this one.
+/// Their environment variables are `DARKQA_MOVED_DATA`, `DARKQA_MOVED_LLIE` and `DARKQA_MOVED_ENHANCED`, because `DARKQA_DATA` applies to
+/// new runs only.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RebuildArgs {
     /// The data, if they were moved; default: where they were
@@ -46,20 +47,23 @@ pub(crate) struct RebuildArgs {
 
 /// Rebuilds the images of a run with the settings in its manifest.
 pub(crate) struct ImageRebuilder {
-    folder: FrameFolder,
+    data: FrameData,
     recipe: Recipe,
     enhancers: Vec<Enhancer>,
 }
 
-/// The frames of a data set or of walks.
+/// The data set or the walks of a run.
 #[allow(clippy::large_enum_variant, reason = "a run has one")]
-enum FrameFolder {
+enum FrameData {
     Frames(Dataset),
     Walks(WalkFolder, Walk),
 }
 
 impl ImageRebuilder {
-    /// A rebuilder with the data and the enhancers of these conditions opened.
+    /// Opens the data of a run, and the enhancers of these conditions.
+    ///
+    /// # Errors
+    /// If the manifest has no image flags, or the data or an enhancer cannot be opened.
     pub(crate) fn open(
         args: RebuildArgs,
         manifest: &RunManifest,
@@ -78,19 +82,19 @@ impl ImageRebuilder {
         }
         let flags = ImageFlags::read(&manifest.images).map_err(wrong)?;
         let flags = with_new_paths(flags, &args).map_err(wrong)?;
-        let enhanced = conditions
+        let has_enhanced = conditions
             .iter()
             .any(|condition| condition.enhancer.is_some());
-        let models = if enhanced { &*flags.llie } else { &[] };
-        let elsewhere = if enhanced { &*flags.enhanced } else { &[] };
+        let models = if has_enhanced { &*flags.llie } else { &[] };
+        let elsewhere = if has_enhanced { &*flags.enhanced } else { &[] };
         let files = enhancers::read(models)?;
         let kinds = KindSettings::resolve(&flags.sensor, &flags.camera)?;
         let recipe = Recipe::new(&kinds, flags.images.image, flags.max_side, &files);
         let recipe = recipe.with_elsewhere(elsewhere)?;
-        let (frames, recipe) = if let Some(walk) = flags.walk {
+        let (data, recipe) = if let Some(walk) = flags.walk {
             let recipe = recipe.for_walks(&walk);
             let folder = WalkFolder::new(&walk, flags.decode.rule());
-            (FrameFolder::Walks(folder, walk), recipe)
+            (FrameData::Walks(folder, walk), recipe)
         } else {
             let dataset = if manifest.identity.contains_key(ASK) {
                 Photographs::open(&flags.data.place(), &flags.data.set)?.dataset
@@ -100,7 +104,7 @@ impl ImageRebuilder {
                 frames(&flags.data)?
             };
             let dataset = dataset.with_rule(flags.decode.rule());
-            (FrameFolder::Frames(dataset), recipe)
+            (FrameData::Frames(dataset), recipe)
         };
         let loading = EnhancerRunArgs {
             size: flags.size,
@@ -109,13 +113,16 @@ impl ImageRebuilder {
             threads: args.threads,
         };
         Ok(Self {
-            folder: frames,
+            data,
             recipe,
             enhancers: OpenEnhancers::load(files, &loading)?.take()?,
         })
     }
 
-    /// The images of a frame or walk in each of these conditions, in the order shown, as they would be sent.
+    /// The images of a frame or walk in each of these conditions, in the order in which they would be sent.
+    ///
+    /// # Errors
+    /// If the frame is missing, or an image cannot be made.
     pub(crate) fn images(
         &mut self,
         name: &FrameId,
@@ -126,9 +133,9 @@ impl ImageRebuilder {
                 format_args!("{e}; if the data were moved, name their folder with --data");
             Error::data(name, problem)
         })?;
-        let frames: &dyn Frames = match &self.folder {
-            FrameFolder::Frames(dataset) => dataset,
-            FrameFolder::Walks(folder, _) => folder,
+        let frames: &dyn Frames = match &self.data {
+            FrameData::Frames(dataset) => dataset,
+            FrameData::Walks(folder, _) => folder,
         };
         if conditions
             .iter()
@@ -153,9 +160,9 @@ impl ImageRebuilder {
     }
 
     fn source(&self, name: &FrameId) -> Result<Source> {
-        match &self.folder {
-            FrameFolder::Frames(dataset) => Source::from_questions(dataset, name),
-            FrameFolder::Walks(folder, walk) => folder.source(&name.0, walk),
+        match &self.data {
+            FrameData::Frames(dataset) => Source::from_questions(dataset, name),
+            FrameData::Walks(folder, walk) => folder.source(&name.0, walk),
         }
     }
 }

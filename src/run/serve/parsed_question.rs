@@ -1,4 +1,4 @@
-//! A multiple-choice question found in a free text: [`Puzzle`].
+//! Parses a multiple-choice question in free text: [`ParsedQuestion`].
 
 use std::sync::LazyLock;
 
@@ -8,9 +8,9 @@ use regex::Regex;
 use super::completion::RequestFault;
 use crate::types::questions::letter;
 
-/// A question with its choices.
+/// A question with its choices, without their letters.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Puzzle {
+pub(super) struct ParsedQuestion {
     pub(super) question: String,
     pub(super) choices: Vec<String>,
 }
@@ -19,29 +19,33 @@ pub(super) struct Puzzle {
 static CHOICE: LazyLock<Option<Regex>> =
     LazyLock::new(|| Regex::new(r"^\s*[(\[]?([A-Z])[)\].:]+\s*(\S.*?)\s*$").ok());
 
-impl Puzzle {
-    /// The last question of a text. The choices are lines with consecutive letters. The question is the last line before
-    /// them that ends with a question mark, else the line just before them.
-    pub(super) fn read(text: &str) -> Result<Self, RequestFault> {
+impl ParsedQuestion {
+    /// Parses the last question of a text. The choices are lines with consecutive letters. The question is the last line before them that
+    /// ends with a question mark, or else the line directly before them.
+    ///
+    /// # Errors
+    /// 400 if the text has fewer than two choices.
+    pub(super) fn parse(text: &str) -> Result<Self, RequestFault> {
         let lines: Vec<&str> = text.lines().collect();
-        let lettered: Vec<Option<(char, &str)>> = lines.iter().map(|line| choice(line)).collect();
-        let first = lettered
-            .iter()
-            .rposition(|line| matches!(line, Some(('A', _))));
-        let none = || {
+        let parsed: Vec<Option<(char, &str)>> =
+            lines.iter().map(|line| parse_choice(line)).collect();
+        let no_choices = || {
             let message =
                 "no choices in the text; lines like \"A. yes\" and \"B. no\" are expected";
             RequestFault::new(StatusCode::BAD_REQUEST, message)
         };
-        let first = first.ok_or_else(none)?;
+        let first = parsed
+            .iter()
+            .rposition(|line| matches!(line, Some(('A', _))))
+            .ok_or_else(no_choices)?;
         let mut choices = Vec::new();
-        for line in lettered[first..].iter().flatten() {
-            if line.0 == letter(choices.len()) {
-                choices.push(line.1.to_owned());
+        for (own_letter, text) in parsed[first..].iter().flatten() {
+            if *own_letter == letter(choices.len()) {
+                choices.push((*text).to_owned());
             }
         }
         if choices.len() < 2 {
-            return Err(none());
+            return Err(no_choices());
         }
         let mut before = lines[..first]
             .iter()
@@ -61,7 +65,8 @@ impl Puzzle {
     }
 }
 
-fn choice(line: &str) -> Option<(char, &str)> {
+/// The letter and the text of a choice; `None` if the line is not a choice.
+fn parse_choice(line: &str) -> Option<(char, &str)> {
     let found = CHOICE.as_ref()?.captures(line)?;
     let letter = found.get(1)?.as_str().chars().next()?;
     Some((letter, found.get(2)?.as_str()))
@@ -79,16 +84,16 @@ mod tests {
             "Is it dark?\n A: yes \n B: no\nThe best answer is:",
             "Was it?\nA. no\nB. yes\nIs it dark?\nA) yes\nB) no",
         ] {
-            let puzzle = Puzzle::read(text).ok().unwrap();
-            assert_eq!(puzzle.question, "Is it dark?", "{text}");
-            assert_eq!(puzzle.choices, ["yes", "no"], "{text}");
+            let parsed = ParsedQuestion::parse(text).ok().unwrap();
+            assert_eq!(parsed.question, "Is it dark?", "{text}");
+            assert_eq!(parsed.choices, ["yes", "no"], "{text}");
         }
     }
 
     #[test]
     fn a_text_without_choices_is_refused() {
         for text in ["", "Hello", "Is it?\nA. yes", "Is it?\nB. no"] {
-            assert!(Puzzle::read(text).is_err(), "{text}");
+            assert!(ParsedQuestion::parse(text).is_err(), "{text}");
         }
     }
 }

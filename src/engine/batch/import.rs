@@ -16,7 +16,7 @@ use darkqa_score::answers::record::Detail;
 
 impl<'a, D: Detail> Driver<'a, D> {
     /// Imports the replies of a part whose batch has ended. Requests without a line in the output fail as timeouts and may be retried.
-    pub(super) fn take_over(&mut self, part: usize) -> Result<Step> {
+    pub(super) fn import_replies(&mut self, part: usize) -> Result<Step> {
         let Stage::Fetched { state } = self.part(part).stage.clone() else {
             return Ok(Step::Waiting);
         };
@@ -44,7 +44,7 @@ impl<'a, D: Detail> Driver<'a, D> {
     ///
     /// `ended` is the final state of the batch, if it has ended: requests without a line fail then.
     fn import_files(&mut self, part: usize, ended: Option<&str>) -> Result<(ReplyCounts, usize)> {
-        let (paths, keys) = (self.fetched(part), self.keys(part)?);
+        let (paths, keys) = (self.output_paths(part), self.keys(part)?);
         let models = self.models_of(part);
         let mut refused = BTreeSet::new();
         let (mut is_adapted, mut unparsed) = (false, 0);
@@ -61,7 +61,7 @@ impl<'a, D: Detail> Driver<'a, D> {
                 {
                     refusals.entry(key).or_insert(refusal);
                 }
-                replies.take(line)
+                replies.add_line(line)
             })?;
         }
         for (key, kind) in replies.failures() {

@@ -1,30 +1,30 @@
-//! One part of a run: [`StoredPart`].
+//! One shard of a run: [`StoredShard`].
 
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
-use crate::runs::stored::manifest;
+use crate::runs::stored::read_run_manifest;
 use crate::types::manifests::{RunManifest, RunPart};
 
-/// One shard, as read from its folder.
-pub(super) struct StoredPart {
+/// A shard as read from its folder.
+pub(super) struct StoredShard {
     pub(super) shard: Shard,
     pub(super) folder: PathBuf,
     pub(super) manifest: RunManifest,
 }
 
-impl StoredPart {
-    /// The shard in a folder.
+impl StoredShard {
+    /// Reads the shard in a folder.
     ///
     /// # Errors
-    /// If the folder holds no shard, or a file in it cannot be read.
+    /// If the folder has no shard, or a file in it cannot be read.
     pub(super) fn open(folder: &Path) -> Result<Self> {
         let wrong = |problem: &str| Error::Run {
             path: folder.to_owned(),
             problem: problem.to_owned(),
         };
-        let manifest = manifest(folder)?;
+        let manifest = read_run_manifest(folder)?;
         let Some(shard) = manifest.shard.as_deref() else {
             return Err(wrong("the run is not a shard: it was made without --shard"));
         };
@@ -35,12 +35,13 @@ impl StoredPart {
         })
     }
 
-    /// Whether each source of the part is in one of the others with as many trials, and with the same models, enhancers and other columns.
+    /// True if every source of this shard is in another one with at least as many trials, and the other has all models, enhancers and other
+    /// column values of this one.
     pub(super) fn is_covered_by(&self, others: &[&Self]) -> bool {
         let Some(own) = &self.manifest.part else {
             return false;
         };
-        let alike: Vec<&RunPart> = others
+        let candidates: Vec<&RunPart> = others
             .iter()
             .filter(|other| self.has_columns_in(other))
             .filter_map(|other| other.manifest.part.as_ref())
@@ -49,15 +50,16 @@ impl StoredPart {
             .iter()
             .zip(own.place.first..)
             .all(|(trials, source)| {
-                let place = |part: &&RunPart| {
-                    let place = source.checked_sub(part.place.first)?;
-                    part.trials.get(place).copied()
-                };
-                alike.iter().filter_map(place).any(|other| other >= *trials)
+                candidates.iter().any(|part| {
+                    source
+                        .checked_sub(part.place.first)
+                        .and_then(|place| part.trials.get(place))
+                        .is_some_and(|other| other >= trials)
+                })
             })
     }
 
-    /// Whether another part has every column value that this one has.
+    /// True if another shard has every column value of this one.
     fn has_columns_in(&self, other: &Self) -> bool {
         self.manifest.columns.iter().all(|(column, values)| {
             let known = other.manifest.columns.get(column);
@@ -68,7 +70,7 @@ impl StoredPart {
     }
 }
 
-/// The error about a command that names no part.
-pub(super) fn no_part() -> Error {
+/// The error for a command without a shard.
+pub(super) fn no_shard_error() -> Error {
     Error::usage("RUN", "no shard is named")
 }

@@ -1,18 +1,18 @@
-//! The `report` command, for one run or several: [`report`].
+//! The `report` command for one run or several: [`report`].
 
 use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 
-use super::alerts::{alerts, named_again};
+use super::alerts::{alerts, duplicate_folder_alerts};
 use super::baseline::{Baseline, FAIL_IF_WORSE};
-use super::choice::{files as report_files, in_its_folder, text, write_rows};
+use super::choice::{files as report_files, text, write_flip_rows, write_report};
 use super::combine::{Combined, combine};
-use super::common::restrict;
+use super::common::keep_common_items;
 use super::enhancers;
+use super::lenient_change::LenientChange;
 use super::report_folder::write_in_place;
-use super::rereading::LenientChange;
 use super::whole_report::no_records;
 use super::{open, own_answers};
 use crate::error::{Error, Result};
@@ -23,8 +23,8 @@ use crate::report::products::PAGE;
 use crate::runs::Outcome;
 use crate::runs::ShowArgs;
 use crate::runs::record_table;
-use crate::runs::run_parts::{any_run, choice_run};
-use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, name};
+use crate::runs::sharded_run::{open_any_run, open_choice_run};
+use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
 use crate::runs::{StdoutFormat, Syntax};
 use crate::store::now;
 use crate::store::{AddressChange, Store};
@@ -130,7 +130,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
     let (folders, duplicate_alerts) = distinct(&args.runs);
     let (mut choice, mut open) = (Vec::new(), Vec::new());
     for folder in folders {
-        match any_run(folder)? {
+        match open_any_run(folder)? {
             AnyRun::Choice(run) => choice.push(run),
             AnyRun::Open(run) => open.push(run),
         }
@@ -148,7 +148,7 @@ pub(crate) fn report(args: &ReportArgs) -> Result<Outcome> {
     Ok(outcome.in_format(args.format()))
 }
 
-/// Removes duplicate folders; also returns alerts about them.
+/// Removes duplicates from folders; also returns alerts about them.
 pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
     let mut counted = Vec::<(PathBuf, &PathBuf, usize)>::new();
     for folder in folders {
@@ -162,10 +162,10 @@ pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
     let duplicates: Vec<(String, usize)> = counted
         .iter()
         .filter(|(.., count)| *count > 1)
-        .map(|(_, folder, count)| (name(folder), *count))
+        .map(|(_, folder, count)| (run_name(folder), *count))
         .collect();
     let folders = counted.into_iter().map(|(_, folder, _)| folder);
-    (folders.collect(), named_again(&duplicates))
+    (folders.collect(), duplicate_folder_alerts(&duplicates))
 }
 
 fn report_choices(
@@ -190,7 +190,8 @@ fn report_choices(
     }
     let new_and_old = match &args.baseline.baseline {
         Some(folder) => {
-            let mut old = choice_run(folder, "--baseline compares runs of questions with choices")?;
+            let mut old =
+                open_choice_run(folder, "--baseline compares runs of questions with choices")?;
             old.leave_out(args.shown_models());
             Some((runs.clone(), old))
         }
@@ -201,7 +202,7 @@ fn report_choices(
         refuse_without_truths(args)?;
     }
     if args.common {
-        combined = restrict(combined)?;
+        combined = keep_common_items(combined)?;
     }
     combined.listing.show(&args.columns);
     let baseline = new_and_old
@@ -215,15 +216,15 @@ fn report_choices(
         args.out.is_none() && !args.common && baseline.is_none() && duplicate_alerts.is_empty();
     let written = match &*combined.runs {
         [run] if in_folder => {
-            let text = write_in_place((&*run.folder, run.layout), &run.manifest, |target| {
-                in_its_folder(target, &run.manifest, &combined, args.format())
+            let text = write_in_place(&run.folder, run.layout, &run.manifest, |target| {
+                write_report(target, &run.manifest, &combined, args.format())
             })?;
             text.map(|text| (run.folder.clone(), run.layout, text))
         }
         _ => None,
     };
     let (reported, table_folder) = if let Some((folder, layout, text)) = written {
-        // A run in parts has a record table in each part instead.
+        // A run in shards has a record table in each shard instead.
         let table_folder = (layout == RunLayout::Whole).then(|| folder.clone());
         let reported = Outcome::wrote(folder, Status::Complete, text);
         (reported, table_folder)
@@ -231,10 +232,10 @@ fn report_choices(
         let reported = report_combined(&combined, baseline.as_ref(), args, duplicate_alerts)?;
         (reported, None)
     };
-    // The record table takes as much memory as the trials, so free these first.
+    // Free the trials first, because the record table takes as much memory.
     drop(combined);
     if let Some(folder) = table_folder {
-        record_table::update(&folder, args.show.show.table())?;
+        record_table::update(&folder, args.show.show.record_table())?;
     }
     // `Incomplete` makes the command exit with 1.
     let status = if is_worse {
@@ -249,7 +250,7 @@ fn report_choices(
     })
 }
 
-/// Refuses flags that compare accuracies; for runs whose questions have no true answers.
+/// Refuses flags that need accuracies, for runs whose questions have no true answers.
 fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
     let flags = [
         (
@@ -278,7 +279,8 @@ fn report_combined(
 ) -> Result<Outcome> {
     if combined.truths() == Truths::Unknown {
         let show = args.format();
-        let output = own_answers::compared(combined, duplicate_alerts, show, args.out.is_some())?;
+        let output =
+            own_answers::report_output(combined, duplicate_alerts, show, args.out.is_some())?;
         return write_files(args, output.text, output.files);
     }
     let findings = combined.findings();
@@ -295,7 +297,7 @@ fn report_combined(
     let files = match &args.out {
         Some(out) => {
             let files = report_files(&report, combined, list)?;
-            write_rows(&findings, out)?;
+            write_flip_rows(&findings, out)?;
             files
         }
         None => Vec::new(),
@@ -350,13 +352,12 @@ fn report_open(
     let scores = open::Scores::new(joined)?;
     let run = &scores.run;
     if is_single && args.out.is_none() {
-        let place = (&*run.folder, run.layout);
-        let text = write_in_place(place, &run.manifest, |target| {
+        let text = write_in_place(&run.folder, run.layout, &run.manifest, |target| {
             scores.write(target, args.format())
         })?;
         if let Some(text) = text {
             if run.layout == RunLayout::Whole {
-                record_table::update(&run.folder, args.show.show.table())?;
+                record_table::update(&run.folder, args.show.show.record_table())?;
             }
             return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
         }
@@ -365,16 +366,16 @@ fn report_open(
         Some(_) => scores.products()?,
         None => Vec::new(),
     };
-    write_files(args, scores.shown(args.format())?, files)
+    write_files(args, scores.stdout_text(args.format())?, files)
 }
 
-/// Reads all stored replies again by the current rules. Stores the changed readings and the version of the rules, and returns a text
+/// Parses all stored replies again by the current rules. Stores the changed records and the version of the rules, and returns a text
 /// about the change.
 ///
 /// # Errors
-/// If the run is in parts, or one of its files cannot be read or written.
+/// If the run is in shards, or one of its files cannot be read or written.
 fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
-    if run.layout == RunLayout::Parts {
+    if run.layout == RunLayout::Shards {
         let problem = format!(
             "{} holds the parts of a run, and their readings are stored in each: name the parts, or merge them with report merge, which reads all replies again",
             run.folder.display()
@@ -383,11 +384,11 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     }
     let mut store = Store::open(&run.folder, &run.manifest, AddressChange::Allowed)?;
     let mut changed = 0;
-    let mut lenient = LenientChange::new(&run.manifest);
+    let mut lenient_change = LenientChange::new(&run.manifest);
     for trial in run.trials.iter() {
         let record = run.record(trial)?;
         let current = record::reread(record.clone())?;
-        lenient.add(&record.detail, &current.detail);
+        lenient_change.add(&record.detail, &current.detail);
         if current != record {
             store.append(&current)?;
             changed += 1;
@@ -396,8 +397,8 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     store.sync()?;
     let records = run.trials.len();
     let mut lines = format!("{changed} of {records} records now read differently\n");
-    if !lenient.is_current() {
-        let _ = writeln!(lines, "{}", lenient.words());
+    if !lenient_change.is_current() {
+        let _ = writeln!(lines, "{}", lenient_change.words());
         run.manifest.reply_reading = ChoiceDetail::REPLY_READING.map(str::to_owned);
         run.manifest.updated = now();
         store.write_manifest(&run.manifest)?;

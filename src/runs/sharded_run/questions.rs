@@ -1,4 +1,4 @@
-//! The questions of parts, each once, by the places of their lines: [`PartQuestions`].
+//! The distinct questions of shards, with the places of their lines: [`ShardQuestions`].
 
 use std::path::Path;
 
@@ -7,29 +7,30 @@ use crate::store::{LinePlace, QuestionFile, Store, each_placed_question};
 use crate::types::{FrameId, QuestionId, RunQuestion};
 use darkqa_score::answers::record::Detail;
 
-/// The questions of several parts in the order of the data, each once.
-pub(crate) struct PartQuestions(Vec<PartQuestion>);
+/// The distinct questions of several shards, in the order of the data.
+pub(crate) struct ShardQuestions(Vec<ShardQuestion>);
 
-/// A question of a part.
-struct PartQuestion {
+/// A question of a shard.
+struct ShardQuestion {
     /// The question without its evidence.
     question: RunQuestion,
-    part: usize,
+    /// Index of the shard's folder.
+    folder: usize,
     line: LinePlace,
 }
 
-impl PartQuestions {
+impl ShardQuestions {
     /// Reads the questions of these folders.
     ///
     /// # Errors
     /// If a line is not a question.
     pub(crate) fn read(folders: &[&Path]) -> Result<Self> {
         let mut questions = Vec::new();
-        for (part, folder) in folders.iter().enumerate() {
+        for (index, folder) in folders.iter().enumerate() {
             each_placed_question(folder, |question, line| {
-                questions.push(PartQuestion {
+                questions.push(ShardQuestion {
                     question: question.without_evidence(),
-                    part,
+                    folder: index,
                     line,
                 });
             })?;
@@ -40,12 +41,12 @@ impl PartQuestions {
         Ok(Self(questions))
     }
 
-    /// Their names, in order.
+    /// Names of the questions, in order.
     pub(crate) fn ids(&self) -> impl Iterator<Item = &QuestionId> {
         self.0.iter().map(|question| &question.question.id)
     }
 
-    /// Their frames, in order.
+    /// Frames of the questions, in order.
     pub(crate) fn frames(&self) -> impl Iterator<Item = &FrameId> {
         self.0.iter().map(|question| &question.question.frame)
     }
@@ -58,7 +59,7 @@ impl PartQuestions {
             .collect()
     }
 
-    /// Copies their lines into a run.
+    /// Copies the lines of the questions into a run.
     ///
     /// # Errors
     /// If a line cannot be read or written.
@@ -69,7 +70,7 @@ impl PartQuestions {
             .collect::<Result<_>>()?;
         store.write_question_lines(|out| {
             for question in &self.0 {
-                if let Some(file) = &files[question.part] {
+                if let Some(file) = &files[question.folder] {
                     out(&file.line(question.line)?)?;
                 }
             }

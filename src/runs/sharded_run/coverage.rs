@@ -1,4 +1,4 @@
-//! Which sources of a run some parts have: [`Coverage`].
+//! Coverage of a run's sources by shards: [`Coverage`].
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -10,32 +10,32 @@ use crate::error::{Error, Result};
 use crate::runs::shard::Shard;
 use crate::types::manifests::RunManifest;
 
-/// The sources (frames or walks) of a run that some parts have, which may be of several divisions.
+/// The sources (frames or walks) of a run that are in some shard. The shards may come from several divisions.
 pub(super) struct Coverage {
-    /// The number of trials about each source; `None` for a source in no part.
+    /// Number of trials about each source; `None` if the source is in no shard.
     trials: Vec<Option<usize>>,
-    /// The number of trials that were answered under an earlier command, and that the last command of their part did not plan.
-    more: usize,
+    /// Number of trials that an earlier command asked, and that the last command of their shard did not plan.
+    unplanned: usize,
     shards: Vec<Shard>,
-    /// Whether a source is in several parts.
+    /// True if a source is in several shards.
     overlaps: bool,
 }
 
 impl Coverage {
-    /// The coverage of these parts, each with its folder.
+    /// The coverage by these shards, each with its folder and manifest.
     ///
     /// # Errors
-    /// If a part does not state what it has, or is of a run with another number of sources.
-    pub(super) fn from_parts<'a>(
-        parts: impl Iterator<Item = (Shard, &'a Path, &'a RunManifest)>,
+    /// If the manifest of a shard has no sources, or the runs have different numbers of sources.
+    pub(super) fn from_shards<'a>(
+        shards: impl Iterator<Item = (Shard, &'a Path, &'a RunManifest)>,
     ) -> Result<Self> {
         let mut coverage = Self {
             trials: Vec::new(),
-            more: 0,
+            unplanned: 0,
             shards: Vec::new(),
             overlaps: false,
         };
-        for (shard, folder, manifest) in parts {
+        for (shard, folder, manifest) in shards {
             let wrong = |problem: String| {
                 let path = folder.to_owned();
                 Err(Error::Run { path, problem })
@@ -61,23 +61,23 @@ impl Coverage {
                 *known = (*known).max(Some(*trials));
             }
             let planned: usize = part.trials.iter().sum();
-            coverage.more += manifest.counts.trials.saturating_sub(planned);
+            coverage.unplanned += manifest.counts.trials.saturating_sub(planned);
             coverage.shards.push(shard);
         }
         Ok(coverage)
     }
 
-    /// The number of trials about all these sources.
+    /// Number of trials about all sources in the shards.
     pub(super) fn trials(&self) -> usize {
-        self.more + self.trials.iter().flatten().sum::<usize>()
+        self.unplanned + self.trials.iter().flatten().sum::<usize>()
     }
 
-    /// The number of sources of the run.
+    /// Number of sources of the run.
     pub(super) fn sources(&self) -> usize {
         self.trials.len()
     }
 
-    /// The places of the sources that are in no part.
+    /// Indices of the sources that are in no shard.
     pub(super) fn gaps(&self) -> impl Iterator<Item = usize> {
         self.trials
             .iter()
@@ -85,24 +85,24 @@ impl Coverage {
             .filter_map(|(place, trials)| trials.is_none().then_some(place))
     }
 
-    /// The shards that no part is of and that have the missing part. Of several divisions it is the one with the fewest such shards;
-    /// `part` returns the places of the sources of a shard. None if `part` knows none.
-    pub(super) fn absent(&self, part: impl Fn(Shard) -> Option<Range<usize>>) -> Vec<Shard> {
+    /// The shards that have the missing sources; if there are several divisions, those of the division with the fewest such shards.
+    /// `range` returns the indices of the sources of a shard, or `None` if they are unknown. Without them, the missing shards are known only
+    /// if all shards are from one division.
+    pub(super) fn absent(&self, range: impl Fn(Shard) -> Option<Range<usize>>) -> Vec<Shard> {
         let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
-        let is_needed = |shard: &Shard| match part(*shard) {
+        let is_needed = |shard: &Shard| match range(*shard) {
             None => counts.len() == 1 && !self.shards.contains(shard),
             Some(mut places) => places.any(|place| self.trials.get(place) == Some(&None)),
         };
-        let absent = counts
+        counts
             .iter()
-            .map(|count| Shard::all(*count).filter(is_needed).collect::<Vec<Shard>>());
-        absent
+            .map(|count| Shard::all(*count).filter(is_needed).collect::<Vec<Shard>>())
             .filter(|absent| !absent.is_empty())
             .min_by_key(Vec::len)
             .unwrap_or_default()
     }
 
-    /// The missing trials, in words; `None` if none are. `absent` are the shards that have them, as far as they are known.
+    /// The sentence about the missing sources; `None` if none is missing. `absent` are the shards that have them, if known.
     pub(super) fn missing(&self, absent: &[Shard]) -> Option<String> {
         if self.trials.iter().all(Option::is_some) {
             return None;
@@ -137,8 +137,9 @@ impl Coverage {
         ))
     }
 
-    /// The parts whose sources together are those of the run, each once, if there are such parts of one division; otherwise all parts.
-    pub(super) fn once(&self) -> impl Iterator<Item = bool> {
+    /// For each shard, true if notes about its sources are counted. If all shards of one division exist, only these are counted, each once;
+    /// otherwise all shards are.
+    pub(super) fn counted_once(&self) -> impl Iterator<Item = bool> {
         let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
         let is_whole =
             |count: &NonZeroU32| Shard::all(*count).all(|shard| self.shards.contains(&shard));
@@ -162,7 +163,7 @@ mod tests {
 
     use super::*;
 
-    /// A part with its shard, the place of its first source, and the trials about each.
+    /// Coverage by shards, each with the index of its first source and the number of trials about each source.
     fn coverage(parts: &[(&str, usize, &[usize])]) -> Coverage {
         let parts: Vec<(Shard, RunManifest)> = parts.iter().map(|(shard, first, trials)| {
             let total: usize = trials.iter().sum();
@@ -175,7 +176,7 @@ mod tests {
             (shard.parse().unwrap(), manifest)
         }).collect();
         let parts = parts.iter();
-        Coverage::from_parts(parts.map(|(shard, manifest)| (*shard, Path::new("run"), manifest)))
+        Coverage::from_shards(parts.map(|(shard, manifest)| (*shard, Path::new("run"), manifest)))
             .unwrap()
     }
 
@@ -184,19 +185,19 @@ mod tests {
         let whole = coverage(&[("1/2", 0, &[4, 4, 4]), ("2/2", 3, &[4, 4, 2])]);
         assert_eq!((whole.missing(&[]), whole.trials()), (None, 22));
         let one = coverage(&[("1/3", 0, &[4, 4])]);
-        let said = one.missing(&one.absent(|_| None)).unwrap();
-        assert_eq!(said, "2 shards are missing: 2/3, 3/3");
+        let sentence = one.missing(&one.absent(|_| None)).unwrap();
+        assert_eq!(sentence, "2 shards are missing: 2/3, 3/3");
         // The end of one division and the beginning of another.
         let mixed = coverage(&[("1/3", 0, &[4, 4]), ("5/6", 4, &[4])]);
         assert_eq!(mixed.absent(|_| None), []);
-        let said = mixed.missing(&[]).unwrap();
+        let sentence = mixed.missing(&[]).unwrap();
         assert!(
-            said.starts_with("frames or walks 3 to 4, 6 of 6 are in no part"),
-            "{said}"
+            sentence.starts_with("frames or walks 3 to 4, 6 of 6 are in no part"),
+            "{sentence}"
         );
         assert_eq!(mixed.trials(), 12);
         assert_eq!(mixed.gaps().collect::<Vec<_>>(), [2, 3, 5]);
-        // Where it is known which sources a shard has, the division with the fewest shards for them.
+        // If the sources of each shard are known, the division with the fewest missing shards is chosen.
         let equal = |shard: Shard| {
             let each = 6 / shard.count().get() as usize;
             let first = shard.index() as usize * each;
@@ -207,23 +208,23 @@ mod tests {
     }
 
     #[test]
-    fn what_parts_share_counts_once() {
+    fn sources_in_several_shards_count_once() {
         let parts = [
             ("1/2", 0, &[4, 4, 4][..]),
             ("2/2", 3, &[4, 4, 2]),
-            // A part that was stopped before it knew of all marks.
+            // A shard that was stopped before all its marks were planned.
             ("1/3", 0, &[3, 4]),
         ];
         let overlapping = coverage(&parts);
         assert_eq!((overlapping.missing(&[]), overlapping.trials()), (None, 22));
-        let once: Vec<bool> = overlapping.once().collect();
-        assert_eq!(once, [true, true, false]);
+        let counted: Vec<bool> = overlapping.counted_once().collect();
+        assert_eq!(counted, [true, true, false]);
         let together = coverage(&[
             ("1/2", 0, &[4, 4, 4]),
             ("2/3", 2, &[5, 4]),
             ("3/3", 4, &[4, 2]),
         ]);
         assert_eq!((together.missing(&[]), together.trials()), (None, 23));
-        assert!(together.once().all(|is_taken| is_taken));
+        assert!(together.counted_once().all(|is_counted| is_counted));
     }
 }

@@ -1,8 +1,8 @@
-//! Runs that show different images under one name of a condition are kept apart: [`Lights`].
+//! Groups runs by their images, to split conditions whose images differ between runs: [`ImageGroups`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::settings::{self, some};
+use super::settings::{self, differing_settings, identity_fields};
 use crate::runs::stored::StoredRun;
 use crate::types::degradations::Kind;
 use crate::types::manifests::RunManifest;
@@ -10,7 +10,7 @@ use crate::types::{Condition, Digest, EnhancerName, RunGroup, TrialRef, Variant}
 use darkqa_score::answers::record::Detail;
 use darkqa_score::subject::is_control;
 
-/// The conditions of one curve: a kind of degradation in a noise profile, raw or with an enhancer, at all levels.
+/// The conditions of one curve: a variant with or without an enhancer, at all levels.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct LightCurve {
     pub(super) variant: Variant,
@@ -25,7 +25,8 @@ impl LightCurve {
         }
     }
 
-    /// The curves with which the conditions of this one are compared: L0, raw images, and the kind that this one extends.
+    /// The raw curves that this one is compared with: L0, the degradation kind that this kind extends, and the same variant without the
+    /// enhancer.
     fn bases(&self) -> Vec<Self> {
         let raw = |variant| Self {
             variant,
@@ -36,8 +37,7 @@ impl LightCurve {
             kind: Some(kind),
             ..Variant::NONE
         });
-        let variants = [Some(Variant::NONE), base, Some(self.variant.clone())];
-        variants
+        [Some(Variant::NONE), base, Some(self.variant.clone())]
             .into_iter()
             .flatten()
             .map(raw)
@@ -45,7 +45,7 @@ impl LightCurve {
             .collect()
     }
 
-    /// The name of the curve without levels, as `noise+lift`; `L0` for untouched frames.
+    /// Name of the curve without levels, for example `noise+lift`; `L0` for untouched frames.
     pub(super) fn name(&self) -> String {
         let kind = if self.variant.is_untouched() {
             "L0".to_owned()
@@ -59,12 +59,12 @@ impl LightCurve {
     }
 }
 
-/// How the images of two runs agree on one curve.
+/// Agreement of the images of two runs on one curve.
 #[derive(Debug, Clone, Copy, Default)]
 struct ImageAgreement {
-    /// Number of images of which both runs hold the digest.
+    /// Number of images with a digest in both runs.
     shared: usize,
-    /// Number of those that differ.
+    /// Number of shared images whose digests differ.
     differing: usize,
 }
 
@@ -72,42 +72,43 @@ struct ImageAgreement {
 #[derive(Debug, Clone)]
 pub(super) struct SplitCurve {
     pub(super) curve: LightCurve,
-    /// The names of the groups, without repetition.
+    /// Distinct names of the groups.
     pub(super) groups: BTreeSet<String>,
-    /// Number of images of which two runs hold the digest, and of those that differ; both 0 if only the manifests differ.
+    /// Number of images with a digest in two runs of different groups; 0 if only the manifests differ.
     pub(super) shared: usize,
+    /// Number of shared images whose digests differ.
     pub(super) differing: usize,
 }
 
-/// The runs that show the same images, for each curve.
+/// Groups of runs with the same images, for each curve.
 ///
-/// Two runs show the same if the digests of all images agree that both have sent. If they share none, their manifests decide.
+/// Two runs have the same images if the digests of all images that both sent are equal. If they share none, their manifests decide.
 #[derive(Debug, Default)]
-pub(super) struct Lights {
-    /// The group of each run, for the curves whose images differ.
+pub(super) struct ImageGroups {
+    /// The group of each run, for the curves that are split.
     groups: HashMap<(LightCurve, usize), RunGroup>,
     /// The curves whose images differ.
-    pub(super) split: Vec<SplitCurve>,
-    /// The runs with images whose records hold no digest of them.
+    pub(super) split_curves: Vec<SplitCurve>,
+    /// The runs with images whose records have no digests of them.
     pub(super) undigested: Vec<usize>,
 }
 
-impl Lights {
-    /// The groups of runs; `names` are those of the runs, and `order` their numbers in the order of their names.
+impl ImageGroups {
+    /// Groups runs by their images. `names` are the names of the runs, and `order` their indices in the order of the names.
     pub(super) fn new<D: Detail>(runs: &[StoredRun<D>], names: &[String], order: &[usize]) -> Self {
         if runs.len() < 2 {
             return Self::default();
         }
-        let seen = Seen::new(runs);
+        let comparison = ImageComparison::new(runs);
         let manifests: Vec<&RunManifest> = runs.iter().map(|run| &run.manifest).collect();
-        let partitions = seen.partitions(&manifests, order);
-        let mut lights = Self {
-            undigested: seen.undigested.clone(),
+        let partitions = comparison.partitions(&manifests, order);
+        let mut found = Self {
+            undigested: comparison.undigested.clone(),
             ..Self::default()
         };
         for (curve, groups) in &partitions {
-            let bases = curve.bases();
-            let bases: Vec<_> = bases
+            let bases: Vec<_> = curve
+                .bases()
                 .iter()
                 .filter_map(|base| partitions.get(base))
                 .filter(|base| base.len() > 1)
@@ -115,65 +116,67 @@ impl Lights {
             if groups.len() < 2 && bases.is_empty() {
                 continue;
             }
-            let mut parted = BTreeSet::new();
+            let mut group_names = BTreeSet::new();
             for group in groups {
-                for part in parted_by(group, &bases) {
-                    let name = &names[part[0]];
-                    parted.insert(name.clone());
-                    let group = RunGroup::new(name, &part);
-                    let own = part
-                        .iter()
-                        .map(|run| (((*curve).clone(), *run), group.clone()));
-                    lights.groups.extend(own);
+                for subgroup in split_by(group, &bases) {
+                    let name = &names[subgroup[0]];
+                    group_names.insert(name.clone());
+                    let group = RunGroup::new(name, &subgroup);
+                    for run in subgroup {
+                        found.groups.insert(((*curve).clone(), run), group.clone());
+                    }
                 }
             }
             if groups.len() > 1 {
-                let agreement = seen.between(curve, groups);
-                lights.split.push(SplitCurve {
+                let agreement = comparison.between(curve, groups);
+                found.split_curves.push(SplitCurve {
                     curve: (*curve).clone(),
-                    groups: parted,
+                    groups: group_names,
                     shared: agreement.shared,
                     differing: agreement.differing,
                 });
             }
         }
-        lights
+        found
     }
 
-    /// Whether no curve is split.
-    pub(super) fn is_one(&self) -> bool {
-        self.groups.is_empty()
+    /// True if any curve is split.
+    pub(super) fn is_split(&self) -> bool {
+        !self.groups.is_empty()
     }
 
-    /// Names the group of a run in a condition, if the images of its curve differ.
+    /// Sets the group of a condition of a run, if the images of its curve differ.
     pub(super) fn mark(&self, condition: &mut Condition, run: usize) {
-        if !self.is_one() {
+        if self.is_split() {
             condition.group = self.groups.get(&(LightCurve::new(condition), run)).cloned();
         }
     }
 }
 
-/// A group of runs, parted by the groups of the curves with which it is compared.
-fn parted_by(group: &[usize], bases: &[&Vec<Vec<usize>>]) -> Vec<Vec<usize>> {
-    let place = |run: usize| -> Vec<Option<usize>> {
-        bases
-            .iter()
-            .map(|groups| groups.iter().position(|group| group.contains(&run)))
-            .collect()
-    };
-    let mut parts: Vec<(Vec<Option<usize>>, Vec<usize>)> = Vec::new();
+/// Splits a group of runs so that the runs of each subgroup are in the same group on every base curve.
+fn split_by(group: &[usize], bases: &[&Vec<Vec<usize>>]) -> Vec<Vec<usize>> {
+    let mut subgroups: Vec<(Vec<Option<usize>>, Vec<usize>)> = Vec::new();
     for run in group {
-        let place = place(*run);
-        match parts.iter_mut().find(|(known, _)| *known == place) {
-            Some((_, part)) => part.push(*run),
-            None => parts.push((place, vec![*run])),
+        let base_groups: Vec<Option<usize>> = bases
+            .iter()
+            .map(|groups| groups.iter().position(|group| group.contains(run)))
+            .collect();
+        match subgroups
+            .iter_mut()
+            .find(|(known, _)| *known == base_groups)
+        {
+            Some((_, subgroup)) => subgroup.push(*run),
+            None => subgroups.push((base_groups, vec![*run])),
         }
     }
-    parts.into_iter().map(|(_, part)| part).collect()
+    subgroups
+        .into_iter()
+        .map(|(_, subgroup)| subgroup)
+        .collect()
 }
 
-/// The agreement of runs on their images, by curve.
-struct Seen {
+/// Pairwise agreement of the images of runs, by curve.
+struct ImageComparison {
     /// The runs that have each curve.
     curves: BTreeMap<LightCurve, BTreeSet<usize>>,
     /// The agreement of each pair of runs that share images of a curve.
@@ -181,11 +184,11 @@ struct Seen {
     undigested: Vec<usize>,
 }
 
-/// Groups of runs that show the same images, by curve.
+/// Groups of runs with the same images, by curve.
 type Partitions<'a> = BTreeMap<&'a LightCurve, Vec<Vec<usize>>>;
 
-impl Seen {
-    /// The groups of runs that agree on each curve.
+impl ImageComparison {
+    /// The groups of runs whose images agree, for each curve. `order` is the order in which runs are added to groups.
     fn partitions(&self, manifests: &[&RunManifest], order: &[usize]) -> Partitions<'_> {
         self.curves
             .iter()
@@ -199,8 +202,10 @@ impl Seen {
                 };
                 let mut groups: Vec<Vec<usize>> = Vec::new();
                 for run in order.iter().copied().filter(|run| having.contains(run)) {
-                    let mut known = groups.iter_mut();
-                    match known.find(|group| group.iter().all(|other| agree(run, *other))) {
+                    let group = groups
+                        .iter_mut()
+                        .find(|group| group.iter().all(|other| agree(run, *other)));
+                    match group {
                         Some(group) => group.push(run),
                         None => groups.push(vec![run]),
                     }
@@ -210,7 +215,7 @@ impl Seen {
             .collect()
     }
 
-    /// The images of a curve that runs of different groups share.
+    /// The agreement on images of a curve, summed over pairs of runs in different groups.
     fn between(&self, curve: &LightCurve, groups: &[Vec<usize>]) -> ImageAgreement {
         let place = |run: usize| groups.iter().position(|group| group.contains(&run));
         let mut all = ImageAgreement::default();
@@ -277,36 +282,36 @@ impl Seen {
     }
 }
 
-/// The condition, the frame or walk, and the digest of the images of a trial; `None` if the model saw none or the trial failed. A
-/// control of the observer is shown a changed image, which reveals nothing about the light.
+/// The condition, the frame or walk, and the image digest of a trial. `None` if the trial had no image or failed, or if the model is a
+/// control of the observer, which gets a changed image.
 fn image<D: Detail>(trial: TrialRef<'_, D>) -> Option<(&Condition, &str, Option<Digest>)> {
     let is_image = !trial.failed() && !is_control(trial.model());
     let condition = trial.condition().filter(|_| is_image)?;
     Some((condition, trial.source(), trial.sent()))
 }
 
-/// Whether two runs show the same images on a curve, by their manifests.
+/// True if two runs have the same images on a curve according to their manifests.
 fn same_by_manifest(curve: &LightCurve, one: &RunManifest, other: &RunManifest) -> bool {
     let runs = [one, other];
-    let own = |run: &RunManifest| {
-        let mut all = some(run, &settings::ENCODING);
+    let image_settings = |run: &RunManifest| {
+        let mut all = identity_fields(run, &settings::ENCODING);
         let kind = curve.variant.synthetic_kind();
         if kind.is_some() || curve.enhancer.is_some() {
-            all.extend(settings::pixels(run));
+            all.extend(settings::pixel_settings(run));
         }
         if kind == Some(Kind::Exposure) {
             all.remove("--seed");
         }
         if let Some(kind) = kind {
-            all.extend(settings::variant(run, kind));
+            all.extend(settings::variant_settings(run, kind));
         }
         if kind.is_some_and(Kind::has_readings) {
-            all.extend(settings::noise(run, &runs));
+            all.extend(settings::noise_settings(run, &runs));
         }
         if curve.enhancer.is_some() {
-            all.extend(settings::enhancers(run));
+            all.extend(settings::enhancer_settings(run));
         }
         Some(all)
     };
-    settings::differing(&runs.map(own)).is_empty()
+    differing_settings(&runs.map(image_settings)).is_empty()
 }

@@ -1,27 +1,30 @@
-//! The trials of parts, each once: [`each_once`].
+//! Removes duplicate trials of shards: [`remove_duplicates`].
 
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::runs::placed_trials::PartLogs;
+use crate::runs::shard_records::ShardLogs;
 use crate::types::{KeptTrial, Record, TrialRef, Trials};
 use darkqa_score::answers::record::Detail;
 
-/// Keeps each trial of these parts once, whose folders are numbered as the places of the trials: of a trial in two parts the one with a
-/// reply, and of two replies that of the first part. Returns the number of trials with different replies in two parts, which were paid
-/// for twice.
+/// Keeps each trial once: the one with a reply, or the one from the first shard if both have a reply. `folders` are the folders of the
+/// shards, by the file numbers in the places of the trials. Returns the number of trials with different replies in two shards, which were
+/// paid for twice.
 ///
 /// # Errors
-/// If a trial has another image in another part, or a record cannot be read.
-pub(super) fn each_once<D: Detail>(trials: &mut Trials<D>, folders: &[&Path]) -> Result<usize> {
-    let mut logs = PartLogs::new(folders);
-    let mut twice = 0;
+/// If the same trial has different images in two shards, or a record cannot be read.
+pub(super) fn remove_duplicates<D: Detail>(
+    trials: &mut Trials<D>,
+    folders: &[&Path],
+) -> Result<usize> {
+    let mut logs = ShardLogs::new(folders);
+    let mut paid_twice = 0;
     trials.each_key_once(|first, later| {
         if first.text().log() == later.text().log() {
             return Ok(first.or_later(later));
         }
         let lines = [logs.line(first.text())?, logs.line(later.text())?];
-        // A part that goes on with the work of another has a copy of its lines.
+        // A shard that continued the work of another one has copies of its lines.
         if lines[0] == lines[1] {
             return Ok(KeptTrial::First);
         }
@@ -29,15 +32,15 @@ pub(super) fn each_once<D: Detail>(trials: &mut Trials<D>, folders: &[&Path]) ->
         if first.failed() && !later.failed() {
             return Ok(KeptTrial::Later);
         }
-        twice += usize::from(!first.failed() && !later.failed());
+        paid_twice += usize::from(!first.failed() && !later.failed());
         Ok(KeptTrial::First)
     })?;
-    Ok(twice)
+    Ok(paid_twice)
 }
 
-/// Checks that the same image was shown in two parts.
+/// Checks that a trial has the same image in two shards.
 fn check_images<D: Detail>(
-    logs: &mut PartLogs<'_>,
+    logs: &mut ShardLogs<'_>,
     folders: &[&Path],
     trials: [TrialRef<'_, D>; 2],
     lines: &[Vec<u8>; 2],

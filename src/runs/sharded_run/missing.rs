@@ -1,56 +1,57 @@
-//! Checks which trials the parts of a run lack, by its plan where there is one: [`check`], [`warn_unfinished`].
+//! Checks whether the shards of a run are complete, using its plan if it has one: [`check`], [`warn_unfinished`].
 
 use super::coverage::Coverage;
-use super::part::StoredPart;
+use super::stored_shard::StoredShard;
 use crate::error::{Error, Result};
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
 use crate::types::manifests::Status;
 
-/// Whether sources of a run may be in no part.
+/// Treatment of sources of a run that are in no shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum MissingParts {
-    /// It is an error.
-    Refused,
-    /// It is said, and the sources of the parts are those of the run.
-    Accepted,
+pub(crate) enum MissingShards {
+    /// Return an error.
+    Refuse,
+    /// Print a warning, and leave these sources out.
+    Accept,
 }
 
-/// The plan beside the parts; `None` if there is none, or if it is not of these parts, which is said.
+/// Reads the plan in the parent folder of the shards. Returns `None` if there is none, or, with a warning, if its number of sources differs
+/// from that of the run.
 ///
 /// # Errors
-/// If it cannot be read.
-pub(super) fn plan(parts: &[StoredPart], coverage: &Coverage) -> Result<Option<RunPlan>> {
+/// If the plan cannot be read.
+pub(super) fn plan(parts: &[StoredShard], coverage: &Coverage) -> Result<Option<RunPlan>> {
     let Some(run) = parts.first().and_then(|part| part.folder.parent()) else {
         return Ok(None);
     };
     let plan = RunPlan::read(run)?;
     let Some(other) = plan
         .as_ref()
-        .filter(|plan| plan.frames() != coverage.sources())
+        .filter(|plan| plan.frame_count() != coverage.sources())
     else {
         return Ok(plan);
     };
     tracing::warn!(
         "{}: the plan is about {} frames, and the parts are of a run about {}: it says nothing about them",
         run.display(),
-        other.frames(),
+        other.frame_count(),
         coverage.sources()
     );
     Ok(None)
 }
 
-/// Whether sources are in no part. Says which shards have them, and the command that asks them.
+/// Returns true if sources are in no shard, with a warning that names the missing shards and the command to run.
 ///
 /// # Errors
-/// If sources are in no part and that is refused.
+/// If sources are in no shard and `missing` is [`MissingShards::Refuse`].
 pub(super) fn check(
-    parts: &[StoredPart],
+    parts: &[StoredShard],
     coverage: &Coverage,
     plan: Option<&RunPlan>,
-    missing: MissingParts,
+    missing: MissingShards,
 ) -> Result<bool> {
-    let absent = coverage.absent(|shard| plan.map(|plan| plan.part(shard)));
+    let absent = coverage.absent(|shard| plan.map(|plan| plan.shard_range(shard)));
     let (Some(problem), Some(first)) = (coverage.missing(&absent), parts.first()) else {
         return Ok(false);
     };
@@ -59,19 +60,19 @@ pub(super) fn check(
             " ({} of {} frames, {} trials)",
             coverage.gaps().count(),
             coverage.sources(),
-            plan.requests(coverage.gaps())
+            plan.request_count(coverage.gaps())
         )
     });
     let remedy = || remedy(parts, plan, &absent);
     match missing {
-        MissingParts::Refused => Err(Error::Run {
+        MissingShards::Refuse => Err(Error::Run {
             path: first.folder.clone(),
             problem: format!(
                 "{problem}{counts}; --partial merges the others; {}",
                 remedy()
             ),
         }),
-        MissingParts::Accepted => {
+        MissingShards::Accept => {
             tracing::warn!(
                 "{problem}{counts}; the summary covers only the others; {}",
                 remedy()
@@ -81,12 +82,15 @@ pub(super) fn check(
     }
 }
 
-/// Warns about each part that is not complete, unless complete parts together have all that it was to ask.
-pub(super) fn warn_unfinished(parts: &[StoredPart], plan: Option<&RunPlan>) {
-    let is_complete = |part: &&StoredPart| part.manifest.status == Status::Complete;
-    let complete: Vec<&StoredPart> = parts.iter().filter(is_complete).collect();
-    let unfinished = parts.iter().filter(|part| !is_complete(part));
-    for part in unfinished.filter(|part| !part.is_covered_by(&complete)) {
+/// Warns about each shard that is not complete, unless complete shards together have all its trials.
+pub(super) fn warn_unfinished(parts: &[StoredShard], plan: Option<&RunPlan>) {
+    let (complete, unfinished): (Vec<&StoredShard>, Vec<&StoredShard>) = parts
+        .iter()
+        .partition(|part| part.manifest.status == Status::Complete);
+    for part in unfinished
+        .into_iter()
+        .filter(|part| !part.is_covered_by(&complete))
+    {
         let counts = part.manifest.counts;
         tracing::warn!(
             "{}: shard {} is {}: {} of {} trials answered; {}",
@@ -100,14 +104,15 @@ pub(super) fn warn_unfinished(parts: &[StoredPart], plan: Option<&RunPlan>) {
     }
 }
 
-/// The command that asks what these shards lack. What a part beside them has, it asks not again.
-fn remedy(parts: &[StoredPart], plan: Option<&RunPlan>, shards: &[Shard]) -> String {
+/// The advice to run the command that asks the missing trials of these shards.
+fn remedy(parts: &[StoredShard], plan: Option<&RunPlan>, shards: &[Shard]) -> String {
     let models = parts
         .iter()
-        .filter_map(|part| part.manifest.columns.get("model"));
-    let models = models.flat_map(|models| models.keys().map(String::as_str));
-    let command = plan.and_then(|plan| plan.command(models));
-    let command = command.unwrap_or_else(|| "the command of the parts with".to_owned());
+        .filter_map(|part| part.manifest.columns.get("model"))
+        .flat_map(|models| models.keys().map(String::as_str));
+    let command = plan
+        .and_then(|plan| plan.command(models))
+        .unwrap_or_else(|| "the command of the parts with".to_owned());
     match shards {
         [] => format!(
             "{command} --shard I/N, for all I of one N, asks only what no other part in the same folder has"

@@ -1,4 +1,4 @@
-//! Which runs can be compared in one table: [`GroupKey`].
+//! Grouping of runs that can be compared in one table: [`GroupKey`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -7,42 +7,43 @@ use serde_json::Value;
 use crate::error::Result;
 use crate::report::site::{GroupDifference, GroupDigests};
 use crate::run_reports::combine::Combined;
-use crate::run_reports::settings::{ENCODING, readings_and_variants};
-use crate::run_reports::settings::{Settings, differing, identity, pixels, short, some};
+use crate::run_reports::settings::{
+    ENCODING, Settings, differing_settings, identity_fields, identity_settings, pixel_settings,
+    profile_and_variant_settings, shorten,
+};
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::StoredRun;
 use crate::types::manifests::RunManifest;
 use crate::types::{AxisLevel, Digest, OpenDetail, RunQuestion, Variant};
 
-/// The field of an identity with the digest of the words around the questions.
+/// Identity field with the digest of the prompts.
 const PROMPTS: &str = "--prompts";
-/// The version of enhancement reveals nothing about raw images, by which models are compared.
+/// Identity field with the version of enhancement. Ignored, because models are compared on raw images.
 const ENHANCEMENT: &str = "enhancement";
-/// The setting with the light of the set.
+/// Setting with the light in which the photographs of the data set were taken.
 const SET_LIGHT: &str = "--light";
-/// Names of what has no flag.
+// Names of properties that have no flag.
 const QUESTIONS: &str = "questions";
 const LEVELS: &str = "levels";
 const VARIANT: &str = "variant";
 
 /// Settings that the runs of one table share: questions, light and prompts.
 pub(super) struct GroupKey {
-    /// Its description in words.
+    /// Title of the table.
     pub(super) title: String,
-    /// The digests of its questions, light and prompts.
     pub(super) digests: GroupDigests,
-    /// Settings in words, by name.
+    /// Names and values of the shared settings, as shown on the page.
     pub(super) shared: Vec<(String, String)>,
     /// Settings that must be equal.
     settings: Settings,
-    /// The images that were sent, by question and condition.
+    /// Digests of the images sent, by question and condition.
     images: HashMap<(String, String), BTreeSet<Digest>>,
-    /// The choices and the true one of each question.
+    /// The choices and the true choice, by question.
     truths: HashMap<String, (BTreeSet<String>, Option<String>)>,
 }
 
 impl GroupKey {
-    /// Of a run of questions with choices, in the variant that its rows are about.
+    /// The key of a run of questions with choices. `variant` is the one in its rows.
     ///
     /// # Errors
     /// If a setting cannot be written.
@@ -78,15 +79,15 @@ impl GroupKey {
             images,
             truths,
         };
-        key.named(
+        key.with_title(
             manifest,
             combined.questions.len(),
             &[(VARIANT, &light)],
-            &format!("{light}, {}", listed(&levels)),
+            &format!("{light}, {}", level_list(&levels)),
         )
     }
 
-    /// Of a run of open questions.
+    /// The key of a run of open questions.
     ///
     /// # Errors
     /// If a setting cannot be written.
@@ -112,12 +113,12 @@ impl GroupKey {
             title: String::new(),
             digests: GroupDigests::default(),
             shared: Vec::new(),
-            // Rows of other levels stand in the same table, in other columns.
+            // Without levels, because each level has its own column.
             settings: settings(&run.manifest, &run.questions, &BTreeSet::new())?,
             images,
             truths: HashMap::new(),
         };
-        key.named(
+        key.with_title(
             &run.manifest,
             run.questions.len(),
             &[(JUDGE, &judge), (PROTOCOL, &protocol)],
@@ -125,47 +126,46 @@ impl GroupKey {
         )
     }
 
-    /// The key with further settings, its title and what it shares in words.
-    fn named(
+    /// Adds further settings, then sets title, digests and shared settings. `title_end` follows the questions and the data in the title.
+    fn with_title(
         mut self,
         manifest: &RunManifest,
         questions: usize,
         more: &[(&str, &str)],
-        what: &str,
+        title_end: &str,
     ) -> Result<Self> {
-        let more = more
-            .iter()
-            .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
-        self.settings.extend(more);
-        let light = light(manifest);
+        for (name, value) in more {
+            self.settings
+                .insert((*name).to_owned(), (*value).to_owned());
+        }
+        let light = light_settings(manifest);
         let light = Digest::canonical("darkqa.site-light/1", &light)?.to_string();
-        let data = identity(manifest).get("--data").cloned();
+        let data = identity_settings(manifest).get("--data").cloned();
         self.title = format!(
-            "{questions} questions{}, {what}",
-            data.map_or_else(String::new, |data| format!(" of {}", short(&data)))
+            "{questions} questions{}, {title_end}",
+            data.map_or_else(String::new, |data| format!(" of {}", shorten(&data)))
         );
         self.digests = GroupDigests {
             questions: self.settings[QUESTIONS].clone(),
             light,
             prompts: self.settings.get(PROMPTS).cloned().unwrap_or_default(),
         };
-        let named = self
+        self.shared = self
             .settings
             .iter()
-            .filter(|(name, value)| ![QUESTIONS, PROMPTS].contains(&&***name) && !value.is_empty());
-        self.shared = named
-            .map(|(name, value)| (name.clone(), short(value)))
+            .filter(|(name, value)| ![QUESTIONS, PROMPTS].contains(&&***name) && !value.is_empty())
+            .map(|(name, value)| (name.clone(), shorten(value)))
             .collect();
         Ok(self)
     }
 
-    /// Whether two runs can stand in one table.
+    /// True if two runs can share a table.
     fn is_same(&self, other: &Self) -> bool {
-        self.settings == other.settings && self.disagreeing(other).is_none()
+        self.settings == other.settings && self.data_difference(other).is_none()
     }
 
-    /// Images or true answers in which the two differ, in words; `None` without a difference.
-    fn disagreeing(&self, other: &Self) -> Option<String> {
+    /// The difference between the images or true choices of two runs, in words; `None` if there is none.
+    fn data_difference(&self, other: &Self) -> Option<String> {
         let shared = self
             .images
             .iter()
@@ -191,22 +191,22 @@ impl GroupKey {
         }
     }
 
-    /// Differences from the group with this number.
+    /// Differences from the group `first`, which has this number.
     pub(super) fn difference(&self, first: &Self, number: usize) -> GroupDifference {
         let names = [format!("table {number}"), "this one".to_owned()];
         let settings = [Some(first.settings.clone()), Some(self.settings.clone())];
-        let lines = differing(&settings)
+        let lines = differing_settings(&settings)
             .into_iter()
             .map(|setting| setting.words(&names));
         GroupDifference {
             from: number,
-            lines: lines.chain(self.disagreeing(first)).collect(),
+            lines: lines.chain(self.data_difference(first)).collect(),
         }
     }
 }
 
-/// Runs in groups, each in the first one that it belongs to, in their order.
-pub(super) fn grouped<M>(members: Vec<M>, key: impl Fn(&M) -> &GroupKey) -> Vec<Vec<M>> {
+/// Groups runs, keeping their order. Each run joins the first group whose members it can be compared with.
+pub(super) fn group_members<M>(members: Vec<M>, key: impl Fn(&M) -> &GroupKey) -> Vec<Vec<M>> {
     let mut groups: Vec<Vec<M>> = Vec::new();
     for member in members {
         let own = key(&member);
@@ -235,30 +235,29 @@ fn settings(
         })
         .collect();
     let asked = Digest::canonical("darkqa.site-questions/1", &asked)?;
-    let mut settings = light(manifest);
-    settings.extend(some(manifest, &[PROMPTS]));
+    let mut settings = light_settings(manifest);
+    settings.extend(identity_fields(manifest, &[PROMPTS]));
     settings.insert(QUESTIONS.to_owned(), asked.to_string());
-    settings.insert(LEVELS.to_owned(), listed(levels));
+    settings.insert(LEVELS.to_owned(), level_list(levels));
     Ok(settings)
 }
 
 /// Settings that determine raw images.
-fn light(manifest: &RunManifest) -> Settings {
+fn light_settings(manifest: &RunManifest) -> Settings {
     let parts = [
-        pixels(manifest),
-        some(manifest, &ENCODING),
-        readings_and_variants(manifest),
+        pixel_settings(manifest),
+        identity_fields(manifest, &ENCODING),
+        profile_and_variant_settings(manifest),
     ];
     let mut light: Settings = parts.into_iter().flatten().collect();
     light.remove(ENHANCEMENT);
-    // The light in which the photographs of the set were taken: a statement about the data.
     if let Some(taken) = manifest.settings.get(SET_LIGHT).and_then(Value::as_str) {
         light.insert(SET_LIGHT.to_owned(), taken.to_owned());
     }
     light
 }
 
-fn listed(levels: &BTreeSet<AxisLevel>) -> String {
+fn level_list(levels: &BTreeSet<AxisLevel>) -> String {
     levels
         .iter()
         .map(ToString::to_string)
@@ -306,7 +305,7 @@ mod tests {
         );
         assert!(lines(4).is_empty());
         let numbered = keys.into_iter().enumerate().collect();
-        let groups: Vec<Vec<usize>> = grouped(numbered, |(_, key)| key)
+        let groups: Vec<Vec<usize>> = group_members(numbered, |(_, key)| key)
             .into_iter()
             .map(|group| group.into_iter().map(|(number, _)| number).collect())
             .collect();
