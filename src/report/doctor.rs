@@ -32,7 +32,7 @@ pub(crate) struct DoctorPage {
 #[derive(Debug, Serialize)]
 pub(crate) struct DoctorColumn {
     pub(crate) title: String,
-    /// The fault; `None` if the images can be enhanced images.
+    /// The fault; `None` if the images are plausible.
     pub(crate) problem: Option<String>,
     /// The image of each frame.
     pub(crate) cells: Vec<DoctorCell>,

@@ -22,9 +22,9 @@ impl FromStr for EnhancedFolder {
         let (name, folder) = text
             .split_once('=')
             .filter(|(_, folder)| !folder.is_empty())
-            .ok_or("NAME=DIR expected, such as mine=enhanced/")?;
+            .ok_or("expected NAME=DIR, such as mine=enhanced/")?;
         let name = EnhancerName::new(name).map_err(|_| {
-            format!("{name:?} is no name: only letters, digits, '_', '-' and '.' are allowed")
+            format!("{name:?} is not a valid name; use letters, digits, '_', '-' and '.'")
         })?;
         Ok(Self {
             name,

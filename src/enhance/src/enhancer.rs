@@ -10,7 +10,8 @@ use std::path::PathBuf;
 use darkqa_ground::error::{Error, Result};
 use darkqa_ground::types::{Digest, EnhancerName, Rgb, SizeLog};
 
-use super::conventions::{Description, sidecar};
+use super::conventions::Description;
+use super::conventions::sidecar::{self, ADD};
 use super::failure::{RunFailure, by, unusable};
 use super::files::{ModelFile, RandomOperators, traced_sizes};
 use super::graphs::{Graph, GraphSource, LoadLimits, RunResult, Stopper};
@@ -41,7 +42,7 @@ fn random_words(random: &RandomOperators) -> Option<String> {
     let names: Vec<&str> = random.names.iter().map(String::as_str).collect();
     (!names.is_empty()).then(|| {
         format!(
-            "its graph draws random numbers ({}): its images depend on the order in which they are made and are not reproducible; export it without them to compare it",
+            "its graph draws random numbers ({}), so its images depend on their order and are not reproducible; export it without them",
             names.join(", ")
         )
     })
@@ -223,7 +224,7 @@ impl Enhancer {
     pub fn enhance(&mut self, image: &Rgb) -> Result<Rgb> {
         if self.ended >= MOST_ENDED {
             return Err(self.fault(format!(
-                "is not run any more, because {MOST_ENDED} images in a row took longer than --llie-options timeout or more memory than --llie-options max-memory allows"
+                "is no longer run, because {MOST_ENDED} images in a row exceeded the limit of time or memory (--llie-options timeout, max-memory)"
             )));
         }
         self.graph.restart_clock();
@@ -271,7 +272,7 @@ impl Enhancer {
         self.graph.restart_clock();
         match (found, self.graph.convention.multiple) {
             (Some(found), Some(stated)) => Err(self.fault(format!(
-                "{}; the multiple = {stated} in its sidecar or preset does not suit it: {}",
+                "{}; `multiple = {stated}` in MODEL.onnx.toml or the preset does not fit: {}",
                 failure.words(),
                 found.words()
             ))),
@@ -360,7 +361,7 @@ impl Enhancer {
         let found = self.context.alignment(&self.graph, tile, context)?;
         if is_new && found > 1 {
             let words = format!(
-                "by trial its tiles must start at multiples of {found} pixels, and do; state it in MODEL.onnx.toml beside it: `multiple = {found}`"
+                "its tiles must start at multiples of {found} pixels (found by trial); to confirm, {ADD}: `multiple = {found}`"
             );
             let words = sidecar::named(&words, &self.path);
             tracing::warn!("{}: {words}", self.path.display());
@@ -424,7 +425,7 @@ impl Enhancer {
             NoPlan::TileFlag(side) => Error::usage(
                 "--llie-options tile",
                 format_args!(
-                    "{side} is not possible: {} needs the whole image (tile = \"none\" in its sidecar or preset)",
+                    "{side} is not possible: {} needs the whole image (tile = \"none\" in its .onnx.toml file or preset)",
                     self.name
                 ),
             ),
@@ -436,14 +437,14 @@ impl Enhancer {
         let rule = self.rule(size);
         self.fault(match failure {
             RunFailure::NoMemory { requested, .. } if self.fails_when_small(rule, *requested) => format!(
-                "{}, nor for one of {}: its graph needs that memory at any size; export it again, or use a smaller model",
+                "{} and on one of {}: its graph needs that memory at any size; export it again, or use a smaller model",
                 failure.words(),
                 by(rule.whole([SMALL; 2]))
             ),
             RunFailure::NoMemory { .. } => no_memory(failure, rule, size),
             RunFailure::TooLong(_) | RunFailure::TooLarge(_) => failure.words(),
             _ if !rule.takes_any_size() => format!(
-                "{}; its graph or its sidecar states the size {}",
+                "{}; its graph or MODEL.onnx.toml fixes the size {}",
                 failure.words(),
                 by(rule.whole(size))
             ),

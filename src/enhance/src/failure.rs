@@ -5,6 +5,7 @@
 use std::time::Duration;
 
 use super::conventions::ValueRange;
+use super::conventions::sidecar::ADD;
 use super::libraries::PINNED;
 use super::limits::MemoryLimit;
 use super::outputs::OutOfRange;
@@ -95,18 +96,18 @@ impl RunFailure {
         match self {
             Self::OtherSize { fed, dims, given } => match self.enlarges_by() {
                 Some(factor) => format!(
-                    "enlarges by {factor}: it gave {dims:?} for an image of {}; an enhancer keeps the size",
+                    "enlarges by {factor}: it gave {dims:?} for an image of {}; export it without the upsampling",
                     by(*fed)
                 ),
                 None => match given {
                     Some(given) => format!(
-                        "gave an image of {} for one of {}, and both must have the same size: {}",
+                        "gave an image of {} for one of {}, but both must have the same size: {}",
                         by(*given),
                         by(*fed),
                         other_size_remedy(*fed, *given)
                     ),
                     None => format!(
-                        "gave a tensor of {dims:?} for an image of {}, which is no image of that size; export it so that it gives [1, 3, {}, {}]",
+                        "gave a tensor of {dims:?} for an image of {}; export it so that it gives [1, 3, {}, {}]",
                         by(*fed),
                         fed[0],
                         fed[1]
@@ -117,15 +118,15 @@ impl RunFailure {
                 format!("failed on an image of {} ({message})", by(*fed))
             }
             Self::NoMemory { fed, .. } => {
-                format!("did not get the memory for an image of {}", by(*fed))
+                format!("ran out of memory on an image of {}", by(*fed))
             }
             Self::TooLong(limit) => format!(
-                "took longer than {} s for an image; --llie-options timeout allows more, and 0 any time",
+                "took longer than {} s for an image; allow more with --llie-options timeout=SECONDS (0: no limit)",
                 limit.as_secs_f64()
             ),
             Self::TooLarge(limit) => format!(
-                "took more than {limit} GB of memory together with the program and was ended; --llie-options max-memory allows more, and --llie-options tile or \
-                 --llie-options max-side need less"
+                "took more than {limit} GB of memory together with the program and was stopped; allow more with --llie-options max-memory=GB, or need less with \
+                 --llie-options tile=N or max-side=N"
             ),
             Self::NotCut(problem) => problem.clone(),
         }
@@ -136,15 +137,15 @@ impl RunFailure {
 pub(super) fn unusable(values: OutOfRange, range: ValueRange, size: [usize; 2]) -> String {
     match values {
         OutOfRange::NotFed => format!(
-            "is fed what expressions in its sidecar (`input`, `from`) make of an image of {}, and they give values that are not finite; check their divisions and powers",
+            "is fed values that are not finite, from `input` or `from` in MODEL.onnx.toml on an image of {}; check their divisions and powers",
             by(size)
         ),
         OutOfRange::NotNumbers => format!(
-            "gave values that are not numbers (NaN) for an image of {}; check its weights and its divisions by zero, and those of `image` in its sidecar",
+            "gave values that are not numbers (NaN) for an image of {}; check its weights, and divisions by zero in its graph and in `image` of MODEL.onnx.toml",
             by(size)
         ),
         OutOfRange::Beyond { min, max, likely } => format!(
-            "gave values from {min} to {max}, but {range} is usual; its range seems to be {likely}: state both ranges in MODEL.onnx.toml beside it, `range_in = \"…\"` and `range_out = \"…\"`; `darkqa-eval enhance doctor` finds them"
+            "gave values from {min} to {max}, expected {range}; its range seems to be {likely}. `darkqa-eval enhance doctor` finds it; {ADD}: `range_in = \"…\"` and `range_out = \"…\"`"
         ),
     }
 }
@@ -157,7 +158,7 @@ fn other_size_remedy(fed: [usize; 2], given: [usize; 2]) -> &'static str {
             "its convolutions cut off the edges; export it with padding that keeps the size"
         }
         [Some(_), Some(_)] => {
-            "it makes the image smaller; export it with the upsampling back to the size of the input"
+            "it makes the image smaller; export it with the upsampling to the size of the input"
         }
         _ => "export it so that it gives the size of the input",
     }
@@ -173,16 +174,14 @@ pub(super) fn load_problem(message: &str, version: &str) -> String {
     let newer = |what: &str, needed: u32, most: u32, pinned: u32| {
         let way_out = if needed <= pinned && version != PINNED {
             format!(
-                "version {PINNED} reads it: name its library with --llie-options ort-lib=FILE, or leave out --llie-options ort-lib and ORT_DYLIB_PATH"
+                "version {PINNED} reads it: name its library with --llie-options ort-lib=FILE, or leave out that flag and ORT_DYLIB_PATH"
             )
         } else {
             format!(
                 "name the library of a newer one with --llie-options ort-lib=FILE, or export the model with {what} {most} or older"
             )
         };
-        format!(
-            "needs an ONNX Runtime that reads {what} {needed}, and version {version} reads up to {what} {most}; {way_out}"
-        )
+        format!("needs {what} {needed}, but ONNX Runtime {version} reads up to {most}; {way_out}")
     };
     let ir = (
         number_after(message, "Unsupported model IR version: "),
@@ -199,7 +198,7 @@ pub(super) fn load_problem(message: &str, version: &str) -> String {
             || message.contains("No Op registered for") =>
         {
             format!(
-                "has an operator that is not part of ONNX; export it with standard operators alone ({message})"
+                "has an operator that is not part of ONNX; export it with standard operators only ({message})"
             )
         }
         _ => format!("ONNX Runtime cannot load it: {message}"),

@@ -95,7 +95,7 @@ impl SizeArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct ProbeArgs {
-    /// Use an enhancer even if its images of dark frames cannot be enhanced images: flat, inverted, in swapped colours, or in another value
+    /// Use an enhancer even if its images of dark frames are implausible: flat, inverted, in swapped colours, or in another value
     /// range than the one in which they are read; the report marks it
     #[arg(long, add = Decides::Nothing)]
     pub llie_anyway: bool,

@@ -75,7 +75,10 @@ impl EnhancedImages {
     ) -> Result<Vec<Self>> {
         let mut names: BTreeSet<&EnhancerName> = models.into_iter().collect();
         if let Some(twice) = folders.iter().find(|folder| !names.insert(&folder.name)) {
-            let problem = format_args!("two enhancers are named {}; take another NAME", twice.name);
+            let problem = format_args!(
+                "two enhancers are named {}; choose another NAME",
+                twice.name
+            );
             return Err(Error::usage("--enhanced", problem));
         }
         folders.iter().map(Self::open).collect()
@@ -92,7 +95,7 @@ impl EnhancedImages {
             })
             .collect::<Result<BTreeMap<_, _>>>()?;
         if files.is_empty() {
-            let problem = format_args!("{}: no image is in it", args.folder.display());
+            let problem = format_args!("{} contains no images", args.folder.display());
             return Err(Error::usage("--enhanced", problem));
         }
         Ok(Self {
@@ -152,12 +155,14 @@ impl EnhancedImages {
         let file = ImageFile::open(&place, ReadingRule::default())?;
         if Digest::from_bytes(file.bytes()) != self.digest_of(frame, condition)? {
             return Err(wrong(
-                "the image was changed during the run; restore it, or begin a new run",
+                "was changed during the run; restore it, or start a new run",
             ));
         }
         let image = file.decode()?;
         if (image.height(), image.width()) != (degraded.height(), degraded.width()) {
-            return Err(wrong("the image has another size than its dark image"));
+            return Err(wrong(
+                "has another size than its dark image; nothing is resized",
+            ));
         }
         let used = ImageUse::made_elsewhere([degraded, &image]);
         used.note_made_elsewhere(&self.usage, &self.folder, [frame, condition], implausible)?;
@@ -216,7 +221,7 @@ impl EnhancedImages {
             .collect();
         if !surplus.is_empty() {
             tracing::warn!(
-                "{}: {} of {} images are not used, as they are of other frames or conditions than those asked: {}",
+                "{}: {} of {} images are not used, because no question is about their frames or conditions: {}",
                 self.folder.display(),
                 surplus.len(),
                 self.files.len(),
@@ -232,7 +237,8 @@ impl EnhancedImages {
     /// The fault of the image.
     fn fault(&self, path: &str, dark: &DarkImage<'_>) -> std::result::Result<bool, Fault> {
         if dark.condition.pair().is_some() {
-            let words = "`synthesize` writes no photographs in the dark and none that match them (see --llie-on)";
+            let words =
+                "`synthesize` does not write dark photographs or their matches; see --llie-on";
             return Err(Fault::new(words, ""));
         }
         let Some(file) = self.files.get(path) else {
@@ -240,8 +246,8 @@ impl EnhancedImages {
             return Err(Fault::new("missing", other));
         };
         let size = file.size.as_ref();
-        let (width, height) = *size
-            .map_err(|problem| Fault::new("not a PNG file of 8 bits a channel", &**problem))?;
+        let (width, height) =
+            *size.map_err(|problem| Fault::new("not an 8-bit PNG file", &**problem))?;
         if (width, height) != dark.frame.size {
             let (w, h) = dark.frame.size;
             let words = "another size than the dark image, and nothing is resized";
@@ -249,14 +255,14 @@ impl EnhancedImages {
         }
         let json = self.folder.join(path).with_extension("json");
         if !json.exists() {
-            let words = "without the JSON file that `synthesize` wrote beside the dark image; copy it beside the enhanced one";
+            let words = "the JSON file of the dark image, from `synthesize`, is missing; copy it next to the enhanced one";
             return Err(Fault::new(words, ""));
         }
-        let words = "the JSON file beside it is not one of `synthesize`";
+        let words = "the JSON file next to it is not from `synthesize`";
         let sidecar =
             Sidecar::<ImageRecipe>::read(&json).map_err(|e| Fault::new(words, e.to_string()))?;
         if sidecar.recipe != dark.recipe {
-            let words = "made from another dark image than this run's; `synthesize` needs the same data and the same flags of light";
+            let words = "made from another dark image than this run's; call `synthesize` with the same data and the same light flags";
             return Err(Fault::new(
                 words,
                 differences(&sidecar.recipe, &dark.recipe),
@@ -271,7 +277,7 @@ impl EnhancedImages {
         let mut others = self.files.range(bare.to_owned()..);
         let (other, _) = others.next()?;
         let ending = other.strip_prefix(bare)?;
-        (!ending.contains(['/', '.'])).then(|| format!("only {other} is there"))
+        (!ending.contains(['/', '.'])).then(|| format!("only {other} exists"))
     }
 }
 
@@ -300,7 +306,7 @@ fn size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
         return Err("16 bits".to_owned());
     }
     if note.depth.is_some() || note.orientation.is_some() {
-        return Err("linear light or a stated turn".to_owned());
+        return Err("linear light or an orientation tag".to_owned());
     }
     Ok(size)
 }
@@ -315,7 +321,7 @@ fn differences(one: &ImageRecipe, other: &ImageRecipe) -> String {
         fields
     });
     match differing(&stated[0], &stated[1]) {
-        fields if fields.is_empty() => "other state of the sensor".to_owned(),
+        fields if fields.is_empty() => "other sensor state".to_owned(),
         fields => format!("other {}", fields.join(", ")),
     }
 }

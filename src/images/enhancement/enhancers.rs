@@ -15,7 +15,7 @@ pub(crate) struct EnhancerRunArgs {
     /// Size of the images and tiles that models take.
     #[command(flatten)]
     pub size: SizeArgs,
-    /// Whether their images can be enhanced images.
+    /// Whether their images are plausible.
     #[command(flatten)]
     pub probe: ProbeArgs,
     /// The ONNX Runtime that runs them.

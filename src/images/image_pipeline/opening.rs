@@ -49,7 +49,7 @@ impl<'a> ImagePipeline<'a> {
     /// again, and a model all of whose images it has is not opened.
     ///
     /// # Errors
-    /// If a model cannot be opened, its images cannot be enhanced images, or a frame cannot be read.
+    /// If a model cannot be opened, its images are implausible, or a frame cannot be read.
     pub(crate) fn open_enhancers<I>(
         &mut self,
         models: Vec<Model>,
@@ -89,7 +89,7 @@ impl<'a> ImagePipeline<'a> {
     /// Looks at images that were enhanced elsewhere, until enough of dark frames were seen for a verdict.
     ///
     /// # Errors
-    /// If most cannot be enhanced images of their dark images, or a file cannot be read.
+    /// If most are implausible, or a file cannot be read.
     fn look_at<I>(
         &mut self,
         images: &EnhancedImages,
@@ -164,7 +164,7 @@ impl<'a> ImagePipeline<'a> {
     /// Tries each enhancer on a few dark frames of a plan.
     ///
     /// # Errors
-    /// If its images cannot be enhanced images, or a frame cannot be read.
+    /// If its images are implausible, or a frame cannot be read.
     pub(crate) fn probe<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         let mut enhancers = std::mem::take(&mut self.enhancers);
         for enhancer in &mut enhancers {

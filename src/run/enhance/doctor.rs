@@ -43,10 +43,10 @@ pub(super) fn doctor(
     let out = &args.out;
     let examination = enhancer.examine(dark, image)?;
     let model = enhancer.path();
-    let lines: Vec<&str> = examination
+    let lines: Vec<String> = examination
         .proposal
         .iter()
-        .map(|line| &*line.line)
+        .map(|line| format!("`{}`", line.line))
         .collect();
     let mut sidecar = String::new();
     for line in &examination.proposal {
@@ -57,18 +57,19 @@ pub(super) fn doctor(
     write(&out.join(PICTURE), &png(&picture(&examination))?)?;
     let mut output = format!("{}\n", examination.conclusion);
     if !lines.is_empty() {
-        let _ = writeln!(output, "\n{sidecar}");
+        let path = enhancer.sidecar_path();
+        let _ = writeln!(output, "\nProposed for {}:\n{sidecar}", path.display());
         if args.write {
             if !model.is_file() {
-                let problem = "the built-in enhancers are not files, so they have no sidecar";
+                let problem =
+                    "a built-in enhancer is not a file, so no settings can be written next to it";
                 return Err(Error::usage("--write", problem));
             }
-            let path = enhancer.sidecar_path();
             if path.exists() {
                 return Err(Error::usage(
                     "--write",
                     format_args!(
-                        "{} exists already and is never replaced; state these lines in it, in the place of those with the same keys: {}; {} shows why",
+                        "{} exists and is never replaced; edit these lines in it: {}; {} shows why",
                         path.display(),
                         lines.join(", "),
                         out.join(PAGE).display()
@@ -80,7 +81,12 @@ pub(super) fn doctor(
         }
     }
     if lines.is_empty() && args.write {
-        output += "no sidecar is written, because no line is proposed\n";
+        let path = enhancer.sidecar_path();
+        let _ = writeln!(
+            output,
+            "not written, because no line is proposed: {}",
+            path.display()
+        );
     }
     let _ = writeln!(output, "page: {}", out.join(PAGE).display());
     let _ = writeln!(output, "picture: {}", out.join(PICTURE).display());

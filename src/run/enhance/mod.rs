@@ -154,7 +154,10 @@ pub(crate) fn enhance(command: &EnhanceCommand, progress: &Progress) -> Result<O
         (Some(EnhanceForm::Doctor(args)), _) => examine(args, progress),
         (Some(EnhanceForm::Presets), _) => Ok(Outcome::text(Status::Complete, list_of_presets()?)),
         (None, Some(args)) => enhance_images(args, progress),
-        (None, None) => Err(Error::usage("MODEL", "an enhancer is missing")),
+        (None, None) => Err(Error::usage(
+            "MODEL",
+            "missing; try `darkqa-eval enhance lift IMAGES… --out DIR`",
+        )),
     }
 }
 
@@ -163,13 +166,13 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
     let (mut enhancer, image) = open_for_examination(&args.enhancer)?;
     let sample = sample(&args.images.open()?);
     if sample.is_empty() {
-        let problem = "needs at least one image that can be read";
+        let problem = "no image could be read; give at least one";
         return Err(Error::usage("INPUT", problem));
     }
     let dark = darkened(&sample);
     let (model, n) = (args.enhancer.model.display(), dark.len());
     progress.say(&format!(
-        "{model} enhances {n} dark images with each convention"
+        "{model}: enhancing {n} dark images with each value range and colour order"
     ));
     doctor::doctor(&args.files, image, &mut enhancer, &dark)
 }

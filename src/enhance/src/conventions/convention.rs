@@ -322,7 +322,7 @@ impl FromStr for Tile {
             ("none", _) => Ok(Self::None),
             (_, Some(Ok(context))) if context <= 4096 => Ok(Self::Exact(context)),
             _ => Err(format!(
-                "tile is {text:?}; expected \"none\", or \"exact:8\" with the context in pixels"
+                "tile is {text:?}; expected \"none\", or \"exact:N\" with N pixels of context, at most 4096"
             )),
         }
     }

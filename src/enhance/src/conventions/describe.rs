@@ -61,7 +61,7 @@ impl Description {
         self.output(&mut lines, graph);
         let source = match convention.tile {
             Some(_) => self.source(|s| s.tile.is_some(), ""),
-            None => "not stated; --llie-options tile=N tries it and checks every seam".to_owned(),
+            None => "not set; --llie-options tile=N tries tiles and checks every seam".to_owned(),
         };
         lines.add("tile", convention.tile.unwrap_or(Tile::None), source);
         if let Some(data) = &convention.trained_on {
@@ -100,12 +100,12 @@ impl Description {
         }
         if graph.batch() > 1 {
             let cost = format!(
-                "graph: each image is given {0} times, which takes {0} times as long",
+                "graph: each image is repeated {0} times, which takes {0} times as long",
                 graph.batch()
             );
             lines.add("batch", graph.batch(), cost);
         }
-        let usual = "usual; a graph cannot state it";
+        let default = "default; a graph does not contain it";
         if let Some(input) = &convention.input {
             let source = self.source(|s| s.input.is_some(), "");
             lines.add("input = ", input, source);
@@ -114,16 +114,16 @@ impl Description {
             let source = self.source(|s| s.channels.is_some(), "");
             lines.add("channels", channels, source);
         }
-        let source = self.source(|s| s.color.is_some(), "usual, cannot be checked");
+        let source = self.source(|s| s.color.is_some(), "default, cannot be checked");
         lines.add("color", feeding.color, source);
         let source = self.source(
             |s| s.range_in.is_some(),
-            self.range_source("usual for its type"),
+            self.range_source("default for its type"),
         );
         lines.add("range_in", feeding.range, source);
         if convention.mean.is_some() || convention.std.is_some() {
             let value = format!("{:?}, {:?}", feeding.mean, feeding.std);
-            let source = self.source(|s| s.mean.is_some() || s.std.is_some(), usual);
+            let source = self.source(|s| s.mean.is_some() || s.std.is_some(), default);
             lines.add("mean, std", value, source);
         }
         let fixed = [signature.height, signature.width];
@@ -147,17 +147,17 @@ impl Description {
             None => lines.add(
                 "multiple",
                 1,
-                "its size is fixed: other images are filled or cut, if it is local",
+                "fixed size: other images are padded or tiled if the model is local",
             ),
         }
         lines.add(
             "pad",
             feeding.pad,
-            self.source(|s| s.pad.is_some(), "usual"),
+            self.source(|s| s.pad.is_some(), "default"),
         );
         if convention.pad_always == Some(true) {
             let source = self.source(|s| s.pad_always.is_some(), "");
-            lines.add("pad_always", "one row and column at least", source);
+            lines.add("pad_always", "at least one row and one column", source);
         }
         for extra in &signature.extras {
             let source = self.source(|s| s.extra.contains_key(&extra.port.name), "");
@@ -186,7 +186,7 @@ impl Description {
             lines.add("output", &output.port, source);
             let fallback = match reading.layout {
                 Some(_) => "graph: the dimension of size 3",
-                None => "as the input; the actual output decides",
+                None => "like the input; the actual output decides",
             };
             let source = self.source(|s| s.layout_out.is_some(), fallback);
             let layout = reading.layout.unwrap_or(reading.preferred);
@@ -196,16 +196,16 @@ impl Description {
             lines.add("not read", port, GRAPH);
         }
         let reading = &composition.outputs[0];
-        let source = self.source(|s| s.color_out.is_some(), "as the input");
+        let source = self.source(|s| s.color_out.is_some(), "like the input");
         lines.add("color_out", reading.color, source);
-        let checked = "as the input; the actual output is checked";
+        let checked = "like the input; the actual output is checked";
         let source = self.source(|s| s.range_out.is_some(), self.range_source(checked));
         lines.add("range_out", reading.range, source);
         if let Some([mean, std]) = reading.mean_and_std {
-            let source = self.source(|s| s.mean_out.is_some() || s.std_out.is_some(), "usual");
+            let source = self.source(|s| s.mean_out.is_some() || s.std_out.is_some(), "default");
             lines.add("mean_out, std_out", format!("{mean:?}, {std:?}"), source);
         }
-        let source = self.source(|s| s.rounding.is_some(), "usual");
+        let source = self.source(|s| s.rounding.is_some(), "default");
         lines.add("rounding", composition.rounding, source);
     }
 

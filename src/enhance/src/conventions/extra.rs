@@ -87,7 +87,7 @@ impl TryFrom<Table> for ExtraValue {
                 let divide = table.divide.unwrap_or(1);
                 if !(0.0..=f64::from(f32::MAX)).contains(&std) || divide == 0 {
                     return Err(format!(
-                        "noise of std = {std}, divide = {divide}; std must be a number from 0, divide a whole number from 1"
+                        "noise with std = {std}, divide = {divide}; std must be 0 or more, divide a whole number of at least 1"
                     ));
                 }
                 Ok(Self::Noise(NoiseStatement {
@@ -96,7 +96,7 @@ impl TryFrom<Table> for ExtraValue {
                     divide,
                 }))
             }
-            _ => Err(format!("a table in [extra] is {FORMS}")),
+            _ => Err(format!("a table in [extra] must be {FORMS}")),
         }
     }
 }
@@ -152,7 +152,7 @@ impl<'de> Visitor<'de> for AnyValue {
     type Value = ExtraValue;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a number, true, false, a list of them, {FORMS}")
+        write!(f, "a number, true, false, a list of these, {FORMS}")
     }
 
     fn visit_bool<E: Error>(self, value: bool) -> Result<ExtraValue, E> {
@@ -173,7 +173,7 @@ impl<'de> Visitor<'de> for AnyValue {
             numbers.push(number);
             if numbers.len() > MOST_NUMBERS {
                 return Err(A::Error::custom(format!(
-                    "a list of more than {MOST_NUMBERS} numbers"
+                    "a list can have at most {MOST_NUMBERS} numbers"
                 )));
             }
         }
@@ -196,7 +196,7 @@ impl<'de> Deserialize<'de> for Number {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         match ExtraValue::deserialize(deserializer)? {
             ExtraValue::Number(number) => Ok(number),
-            _ => Err(D::Error::custom("a number or a truth value is expected")),
+            _ => Err(D::Error::custom("expected a number, true or false")),
         }
     }
 }
@@ -304,7 +304,7 @@ mod tests {
             ("{ map = 1, from = \"image\" }", "{ map = NUMBER }"),
             ("{ map = 1, seed = 3 }", "{ map = NUMBER }"),
             ("{ chart = 1 }", "chart"),
-            ("{ map = { map = 1 } }", "a number or a truth value"),
+            ("{ map = { map = 1 } }", "a number, true or false"),
             ("{ noise = \"uniform\" }", "normal"),
             ("{ noise = \"normal\", std = -1 }", "std must be"),
             ("{ noise = \"normal\", std = inf }", "std must be"),

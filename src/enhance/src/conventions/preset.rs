@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::extra::{ExtraValue, Number};
-use super::sidecar::{ModelSidecar, OutputChoice};
+use super::sidecar::{ADD, ModelSidecar, OutputChoice};
 use crate::expressions::Expression;
 use crate::graphs::{Port, list};
 use darkqa_ground::error::{Error, Result};
@@ -359,7 +359,7 @@ impl Preset {
         if let Some(stacked) = &self.content.stacked {
             let image = stacked.image_of(outputs).ok_or_else(|| {
                 format!(
-                    "is not as preset {} knows it: one output of {} channels; it has {}",
+                    "does not match preset {}: expected one output of {} channels, found {}; export it as `darkqa-eval enhance presets` shows",
                     self.name,
                     stacked.channels,
                     list(outputs)
@@ -384,7 +384,7 @@ impl Preset {
             // Another output, such as curves, cannot be a part of the image.
             _ if self.is_only_image(outputs) => Ok(stated),
             _ => Err(format!(
-                "is not as preset {} knows it: {}; it has {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"`",
+                "does not match preset {}: expected {}, found {}; {ADD} the one that is the image: `output = \"NAME\"`",
                 self.name,
                 self.known_outputs(),
                 list(outputs)
@@ -414,7 +414,7 @@ impl Preset {
         let named = content.signatures.is_empty() && content.by_name(outputs).is_some();
         if !known && !named {
             return Some(format!(
-                "outputs are not those of the preset: {}; it has {}",
+                "outputs differ from the preset: expected {}, found {}",
                 self.known_outputs(),
                 list(outputs)
             ));
@@ -424,18 +424,14 @@ impl Preset {
             .filter(|port| !content.sidecar.extra.contains_key(&port.name))
             .cloned()
             .collect();
-        (others.len() > 1).then(|| {
-            format!(
-                "inputs are not those of the preset: it takes {}",
-                list(&others)
-            )
-        })
+        (others.len() > 1)
+            .then(|| format!("inputs differ from the preset: found {}", list(&others)))
     }
 
     /// The outputs that the preset knows, in words.
     fn known_outputs(&self) -> String {
         let content = &self.content;
-        let mut known = vec![format!("an image named {}", content.names.join(", "))];
+        let mut known = vec![format!("an image named {}", content.names.join(" or "))];
         if let Some(image) = &content.image {
             known.insert(0, format!("outputs for {image}"));
         }

@@ -102,6 +102,9 @@ pub(crate) fn path_for(model: &Path) -> PathBuf {
     path.into()
 }
 
+/// How a message begins to propose lines of the sidecar.
+pub(crate) const ADD: &str = "add to MODEL.onnx.toml next to it";
+
 /// A text in which the sidecar is `MODEL.onnx.toml`, with the name of the file.
 pub(crate) fn named(text: &str, model: &Path) -> String {
     let path = path_for(model);
@@ -117,7 +120,7 @@ pub(crate) fn text_for(model: &Path) -> Result<String> {
             let near = model.with_extension("toml");
             if near.exists() {
                 tracing::warn!(
-                    "{} is not read: the sidecar of {} is {}",
+                    "{} is ignored: the settings of {} are read from {}",
                     near.display(),
                     model.display(),
                     path.display()
@@ -171,7 +174,7 @@ impl ModelSidecar {
         sidecar.check_bounds().map_err(|problem| wrong(&problem))?;
         if sidecar.output.is_some() && sidecar.image.is_some() {
             return Err(wrong(
-                "output and image are both stated; state image alone, which names its outputs",
+                "`output` and `image` are both set; delete `output`, because `image` names its outputs",
             ));
         }
         let mut checks = sidecar.extra.iter().map(|(name, value)| value.check(name));
@@ -228,7 +231,7 @@ impl ModelSidecar {
             || !deviations.all(|number: f32| (1.0 / MOST_SCALE..=MOST_SCALE).contains(&number))
         {
             return Err(format!(
-                "mean is three numbers of at most {MOST_SCALE}, and std three from {} to {MOST_SCALE}",
+                "`mean` takes three numbers of at most {MOST_SCALE}, `std` three from {} to {MOST_SCALE}",
                 1.0 / MOST_SCALE
             ));
         }
@@ -236,13 +239,13 @@ impl ModelSidecar {
             .multiple
             .is_some_and(|multiple| multiple.get() > MOST_MULTIPLE)
         {
-            return Err(format!("multiple is at most {MOST_MULTIPLE} pixels"));
+            return Err(format!("`multiple` can be at most {MOST_MULTIPLE} pixels"));
         }
         if let Some([width, height]) = self.fixed {
             let is_too_long = width.max(height).get() > MOST_SIDE;
             if is_too_long || width.get() * height.get() > MOST_PIXELS {
                 return Err(format!(
-                    "the sides of fixed are at most {MOST_SIDE} pixels, and their product at most {MOST_PIXELS}"
+                    "the sides in `fixed` can be at most {MOST_SIDE} pixels, and their product at most {MOST_PIXELS}"
                 ));
             }
         }
@@ -251,11 +254,11 @@ impl ModelSidecar {
         };
         if !self.trained_on.iter().all(is_line) {
             return Err(format!(
-                "trained_on is one line of at most {MOST_TRAINED_ON} characters"
+                "`trained_on` must be one line of at most {MOST_TRAINED_ON} characters"
             ));
         }
         if self.extra.len() > MOST_EXTRA {
-            return Err(format!("extra has at most {MOST_EXTRA} inputs"));
+            return Err(format!("`[extra]` can have at most {MOST_EXTRA} inputs"));
         }
         Ok(())
     }
@@ -392,18 +395,18 @@ mod tests {
             ("fixed = [99999999999, 8]", "at most 65536"),
             ("fixed = [60000, 60000]", "product at most 100000000"),
             ("pad_always = 1", "boolean"),
-            ("std = [1, 0, 1]", "std three from"),
-            ("std = [1, nan, 1]", "std three from"),
-            ("std = [1, -1, 1]", "std three from"),
+            ("std = [1, 0, 1]", "`std` three from"),
+            ("std = [1, nan, 1]", "`std` three from"),
+            ("std = [1, -1, 1]", "`std` three from"),
             ("mean = [inf, 0, 0]", "at most 1000000"),
             ("mean = [nan, 0, 0]", "at most 1000000"),
-            ("tile = \"exact\"", "exact:8"),
+            ("tile = \"exact\"", "exact:N"),
             ("[extra]\ngamma = nan", "extra.gamma"),
             ("[extra]\na = { from = \"image +\" }", "the end"),
             ("channels = \"yuv\"", "yuv"),
             ("input = \"2 * imag\"", "names `imag`"),
             ("image = \"(1\"", "a closing parenthesis"),
-            ("output = \"a\"\nimage = \"a\"", "state image alone"),
+            ("output = \"a\"\nimage = \"a\"", "delete `output`"),
         ] {
             let message = ModelSidecar::parse(model, text).unwrap_err().to_string();
             assert!(message.starts_with("a/model.onnx.toml"), "{message}");

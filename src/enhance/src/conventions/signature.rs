@@ -4,7 +4,7 @@
 //! default they are those of the published models: RGB, 0..1.
 
 use super::convention::{Channels, TensorLayout};
-use super::sidecar::ModelSidecar;
+use super::sidecar::{ADD, ModelSidecar};
 use crate::graphs::{Port, list};
 use crate::inputs::{FurtherInput, is_map_or_noise};
 use crate::outputs::Output;
@@ -51,7 +51,7 @@ impl Signature {
         let not_one = |key: &str, numbers: Option<[f32; 3]>| {
             let numbers = numbers
                 .filter(|[a, b, c]| a.to_bits() != b.to_bits() || b.to_bits() != c.to_bits());
-            numbers.map(|numbers| format!("has one channel (channels = \"y\"), but {key} = {numbers:?} in its sidecar or preset has three different numbers; state the same one three times"))
+            numbers.map(|numbers| format!("takes one channel (channels = \"y\"), but {key} = {numbers:?} in MODEL.onnx.toml or the preset has different numbers; write the same one three times"))
         };
         let mismatch = not_one("mean", convention.mean).or(not_one("std", convention.std));
         if let (Channels::Y, Some(problem)) = (channels, mismatch) {
@@ -71,7 +71,7 @@ impl Signature {
             stated.find(|name| !extras.iter().any(|extra| extra.port.name == **name))
         {
             return Err(format!(
-                "its sidecar gives a value for {name:?}, which is not one of its further inputs; it has {}",
+                "MODEL.onnx.toml sets {name:?} under [extra], which is not an input besides the image; delete that line; inputs: {}",
                 list(inputs)
             ));
         }
@@ -147,24 +147,24 @@ fn image_input<'a>(
             .find(|port| port.dims.is_empty() && port.element.is_fed())
         {
             return Err(format!(
-                "takes {port}, without dimensions; export it with the input's shape, such as [1, 3, height, width]"
+                "takes {port}, an input without a shape; export it with one, such as [1, 3, height, width]"
             ));
         }
         return Err(format!(
-            "has no image among its inputs; it has {}",
+            "has no input that can be an image; export it with an input of [1, 3, height, width]; inputs: {}",
             list(inputs)
         ));
     };
     if !image.element.is_fed() {
         return Err(format!(
-            "takes {image}; export it with float32, float16 or uint8"
+            "takes {image}, an unsupported type; export it with float32, float16 or uint8"
         ));
     }
     if let [first, _, _, _] = image.dims.as_slice()
         && !first.can_be(1)
     {
         return Err(format!(
-            "takes {image}, several images at a time; export it for a batch of 1 or of any size"
+            "takes {image}, several images at a time; export it with batch size 1 or a dynamic batch axis"
         ));
     }
     if let Some(problem) = unusable_shape(image) {
@@ -176,24 +176,25 @@ fn image_input<'a>(
         (None, Some(found)) => Some(found),
         (None, None) if channels == Channels::Rgb && image.layout(1).is_some() => {
             return Err(format!(
-                "takes {image}, an image of one channel; if that is the luma, state it in MODEL.onnx.toml beside it: `channels = \"y\"`"
+                "takes {image}, an image of one channel; if that is the luma, {ADD}: `channels = \"y\"`"
             ));
         }
         (None, None) if channels == Channels::Y && image.layout(3).is_some() => {
             return Err(format!(
-                "takes {image}, an image of three channels, but its sidecar or preset states one (channels = \"y\"); leave that line out"
+                "takes {image}, an image of three channels, but MODEL.onnx.toml or the preset sets `channels = \"y\"` (one channel); delete that line"
             ));
         }
         (None, None) if image.may_be_image() => {
             return Err(format!(
-                "takes {image}, whose dimensions do not show which are the {}; state it in MODEL.onnx.toml beside it: `layout_in = \"nchw\"` (or nhwc, chw, hwc)",
+                "takes {image}, whose shape does not show where the {} are; {ADD}: `layout_in = \"nchw\"` (or nhwc, chw, hwc)",
                 channels.words()
             ));
         }
         (None, None) => {
             return Err(format!(
-                "takes {image}, which is not an image of {}",
-                channels.words()
+                "takes {image}, which is not an image of {}; export it for images of [1, {}, height, width]",
+                channels.words(),
+                channels.count()
             ));
         }
     };
@@ -202,7 +203,7 @@ fn image_input<'a>(
             Ok((image, layout))
         }
         _ => Err(format!(
-            "takes {image}, which contradicts layout_in in its sidecar or preset"
+            "takes {image}, which does not fit `layout_in` in MODEL.onnx.toml or the preset; correct or delete that line"
         )),
     }
 }
@@ -211,14 +212,14 @@ fn image_input<'a>(
 fn unusable_shape(port: &Port) -> Option<String> {
     let several = |count: usize| {
         format!(
-            "{count} channels, and an image has 3; export it so that it takes the image alone and makes the other channels inside the graph"
+            "{count} channels, but an image has 3; export it so that it takes the image alone and computes the other channels in the graph"
         )
     };
     let [three, one] = [3, 1].map(|count| port.layout(count).is_some());
     match port.dims.len() {
-        ..3 => Some(
-            "flat values; export it so that it takes an image of [1, 3, height, width]".to_owned(),
-        ),
+        ..3 => {
+            Some("a vector, not an image; export it for images of [1, 3, height, width]".to_owned())
+        }
         3 | 4 if three || one => None,
         3 | 4 => {
             let counts = port.channel_counts();
@@ -229,7 +230,7 @@ fn unusable_shape(port: &Port) -> Option<String> {
                 .map(several)
         }
         rank => Some(format!(
-            "{rank} dimensions: several frames at a time; export it for single images of [1, 3, height, width]"
+            "several frames at a time ({rank} dimensions); export it for single images of [1, 3, height, width]"
         )),
     }
 }

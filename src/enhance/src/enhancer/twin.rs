@@ -19,7 +19,7 @@ impl Enhancer {
         if file.digest() != self.digest {
             return Err(Error::Enhancer {
                 path: self.path.clone(),
-                problem: "was changed during the run; restore it, or begin a new run".to_owned(),
+                problem: "was changed during the run; restore it, or start a new run".to_owned(),
             });
         }
         let runtime = self.graph.runtime().beside()?;

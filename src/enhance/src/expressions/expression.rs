@@ -69,7 +69,7 @@ impl Expression {
         }
         let known: Vec<String> = known.iter().map(|name| format!("`{name}`")).collect();
         Err(format!(
-            "{key} = {:?} names {}, which is not there; the names are {}",
+            "{key} = {:?} names {}, which is unknown; the names are {}",
             self.text,
             unknown.join(", "),
             known.join(", ")
@@ -211,7 +211,7 @@ mod tests {
     #[test]
     fn a_wrong_expression_says_where_and_what() {
         let cases = [
-            ("", "at character 1, but there is the end"),
+            ("", "at character 1, found the end"),
             ("1 +", "at character 4"),
             ("1 2", "an operator or the end at character 3"),
             ("(1", "a closing parenthesis"),

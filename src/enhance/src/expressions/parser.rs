@@ -30,7 +30,7 @@ pub(super) fn parse(text: &str) -> Result<Parsed, String> {
     let characters: Vec<char> = text.chars().collect();
     if characters.len() > MOST_CHARACTERS {
         return Err(format!(
-            "an expression of {} characters; at most {MOST_CHARACTERS} are read",
+            "the expression has {} characters; at most {MOST_CHARACTERS} are allowed",
             characters.len()
         ));
     }
@@ -183,7 +183,7 @@ impl Parser {
             let slice = self.word(|c| c != ']');
             name = format!("{name}[{slice}]");
             if !self.taken(']') || ChannelSlice::split(&name).is_none() {
-                return Err(self.wrong("channels such as [4:7], from 0, without the last"));
+                return Err(self.wrong("channels such as [4:7] (from 0, end excluded)"));
             }
         }
         let names = &mut self.parsed.names;
@@ -244,7 +244,7 @@ impl Parser {
         let found = self.characters.get(self.at);
         let found = found.map_or("the end".to_owned(), |c| format!("{c:?}"));
         format!(
-            "expected {expected} at character {}, but there is {found}",
+            "expected {expected} at character {}, found {found}",
             self.at + 1
         )
     }

@@ -22,11 +22,11 @@ pub(super) fn built_in(word: &Path) -> Result<Option<&'static BuiltIn>> {
     BUILT_IN.iter().find(|enhancer| enhancer.name == text).map(Some).ok_or_else(|| {
         let names = BUILT_IN.map(|enhancer| enhancer.name);
         let near = nearest(text, &names);
-        let near = near.map_or_else(String::new, |name| format!("did you mean {name}? "));
+        let near = near.map_or_else(String::new, |name| format!("; did you mean {name}?"));
         let names = names.join(", ");
         let problem = format_args!(
-            "{near}{text:?} is not a built-in enhancer ({names}); name a file with its extension or its folder: {text}.onnx, \
-             ./{text}; a preset is written before its file: zero-dce:FILE.onnx"
+            "{text:?} is not a built-in enhancer ({names}); a file is named with extension or folder, {text}.onnx or ./{text}, and a \
+             preset with its file, zero-dce:FILE.onnx{near}"
         );
         Error::usage("--llie", problem)
     })

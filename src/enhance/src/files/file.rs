@@ -59,7 +59,7 @@ impl ModelFile {
             && let Some(other) = preset.named_after(&path)
         {
             tracing::warn!(
-                "{} is read as a model of {}, but is named like one of {other}",
+                "{} is named like a model of preset {other}, but run with preset {}",
                 path.display(),
                 preset.name
             );
@@ -67,7 +67,7 @@ impl ModelFile {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let name = name_of(&stem)?;
         if name.as_str() != stem {
-            tracing::warn!("{} is called {name} in tables and records", path.display());
+            tracing::warn!("{} is named {name} in tables and records", path.display());
         }
         let text = sidecar::text_for(&path)?;
         let file = Self::from_bytes(path, name, preset, bytes, &text)?;
@@ -254,7 +254,7 @@ fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
         return Err(Error::Enhancer {
             path: model.to_owned(),
             problem: format!(
-                "names {location:?} as a file of its weights, which is outside its folder; export it again with the weights beside it"
+                "has its weights in {location:?}, outside its folder; export it again with the weights in the same folder"
             ),
         });
     }
@@ -274,7 +274,7 @@ fn read_weights(model: &Path, file: &Path, min_size: u64) -> Result<Vec<u8>> {
         Ok(data) => data.len(),
         Err(e) if e.kind() == ErrorKind::NotFound => {
             return Err(fault(format!(
-                "the weights of the model are missing: {}; copy this file to the same folder, or export the model as one file",
+                "its weights are missing: {}; copy this file to the same folder, or export the model as one file (external_data=False)",
                 file.display()
             )));
         }
@@ -282,7 +282,7 @@ fn read_weights(model: &Path, file: &Path, min_size: u64) -> Result<Vec<u8>> {
     };
     if size < min_size {
         return Err(fault(format!(
-            "the weights of the model are cut short: {} has {size} of {min_size} bytes; copy or download it again",
+            "its weights are incomplete: {} has {size} of {min_size} bytes; copy or download it again",
             file.display()
         )));
     }
@@ -313,7 +313,7 @@ fn read_model(path: &Path) -> Result<Vec<u8>> {
         return Err(Error::Enhancer {
             path: path.to_owned(),
             problem: format!(
-                "has {:.1} GB, and an ONNX file holds at most 2.1 GB; export it with its weights in a file beside it (external data)",
+                "has {:.1} GB, but an ONNX file can have at most 2.1 GB; export it with its weights in a separate file (external_data=True)",
                 size as f64 / 1e9
             ),
         });
@@ -469,11 +469,7 @@ mod tests {
                 "git lfs pull",
             ),
             ("out.onnx", &model("../secret"), "outside its folder"),
-            (
-                "gone.onnx",
-                &model("gone.bin"),
-                "weights of the model are missing: ",
-            ),
+            ("gone.onnx", &model("gone.bin"), "its weights are missing: "),
         ];
         for (name, content, part) in cases {
             let path = folder.path().join(name);

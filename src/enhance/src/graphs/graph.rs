@@ -12,7 +12,7 @@ use super::session::{
 };
 use crate::conventions::Signature;
 use crate::conventions::preset::Preset;
-use crate::conventions::sidecar::ModelSidecar;
+use crate::conventions::sidecar::{ADD, ModelSidecar};
 use crate::failure::{RunFailure, load_problem};
 use crate::inputs::{DarkImage, FedImage, Feeding, Tensor};
 use crate::libraries::{Ended, JobLimits, Runtime};
@@ -109,7 +109,7 @@ impl Graph {
             Ended::InTime(session) => session,
             Ended::Late => {
                 let problem = format!(
-                    "takes longer than {} s to load; --llie-options timeout allows more, and 0 any time",
+                    "takes longer than {} s to load; allow more with --llie-options timeout=SECONDS (0: no limit)",
                     limits.time
                 );
                 return Ok(Err(problem));
@@ -206,10 +206,9 @@ impl Graph {
             .collect();
         (!unread.is_empty() && !is_stated).then(|| {
             format!(
-                "of its outputs {:?} is read as the image, and {}, which {} the image's size, {} not read: if its authors make the image of several, state their formula in MODEL.onnx.toml beside it, `image = \"EXPRESSION\"`, else `output = {:?}`",
+                "its output {:?} is read as the image, and {} of the same size {} not. If the image is made of several, {ADD}: `image = \"EXPRESSION\"`, else `output = {:?}`",
                 self.signature.outputs[0].port.name,
                 unread.join(", "),
-                if unread.len() == 1 { "has" } else { "have" },
                 if unread.len() == 1 { "is" } else { "are" },
                 self.signature.outputs[0].port.name
             )

@@ -3,6 +3,7 @@
 use super::fed_image::FedImage;
 use super::noise;
 use super::tensor::{Tensor, TensorData};
+use crate::conventions::sidecar::ADD;
 use crate::conventions::{ElementType, ExtraValue, ImageInput, TensorLayout, preset};
 use crate::graphs::{Dim, Port};
 
@@ -95,7 +96,7 @@ impl FurtherInput {
             && image.takes_any_side()
         {
             return Err(format!(
-                "takes {port} in addition to the image, a tensor of a fixed size that is not the image's; export the model with its values in the graph"
+                "takes {port} in addition to the image, a tensor of a fixed size that is not the image's; export the model with its values as constants"
             ));
         }
         let value = value.ok_or_else(|| missing(port, places))?;
@@ -105,7 +106,7 @@ impl FurtherInput {
             places,
         };
         input.check().map_err(|problem| {
-            format!("takes {port}; its sidecar or preset gives it {value}, but {problem}")
+            format!("takes {port}; MODEL.onnx.toml or the preset sets it to {value}, but {problem}")
         })?;
         Ok(input)
     }
@@ -116,7 +117,7 @@ impl FurtherInput {
             && let Some(other) = places.others(&self.port).find(|dim| !dim.can_be(1))
         {
             return Err(format!(
-                "a dimension of {other} is neither channels, rows nor columns"
+                "its dimension of {other} is neither channels, height nor width"
             ));
         }
         let floats = || TensorData::floats(&self.port.element, Vec::new()).is_some();
@@ -127,27 +128,29 @@ impl FurtherInput {
             (ExtraValue::List(numbers), None) => {
                 let length = vector_length(&self.port).unwrap_or(1);
                 if numbers.len() != length {
-                    return Err(format!("it takes {length}: {}", list_line(&key, length)));
+                    return Err(format!(
+                        "it takes {length} numbers: {}",
+                        list_line(&key, length)
+                    ));
                 }
                 TensorData::listed(&self.port.element, numbers).map(drop)
             }
             (_, None) if vector_length(&self.port).is_some_and(|length| length > 1) => {
                 let length = vector_length(&self.port).unwrap_or(1);
                 Err(format!(
-                    "it is a list of {length}: {}",
+                    "it takes a list of {length} numbers: {}",
                     list_line(&key, length)
                 ))
             }
-            (ExtraValue::List(_), Some(_)) => Err(
-                "it has the image's size; `{ map = NUMBER }` gives each of its samples a number"
-                    .to_owned(),
-            ),
-            (ExtraValue::Number(number), Some(_)) => Err(format!(
-                "it is not a single number; `{key} = {{ map = {number} }}` gives each of its samples this value"
+            (ExtraValue::List(_), Some(_)) => Err(format!(
+                "it has the image's size; `{key} = {{ map = NUMBER }}` gives every pixel one number"
             )),
-            (_, None) => Err(format!("it is a single number: `{key} = NUMBER`")),
+            (ExtraValue::Number(number), Some(_)) => Err(format!(
+                "it has the image's size; `{key} = {{ map = {number} }}` gives every pixel this number"
+            )),
+            (_, None) => Err(format!("it takes a single number: `{key} = NUMBER`")),
             (ExtraValue::Noise(_) | ExtraValue::From(_), Some(_)) if !floats() => Err(format!(
-                "its type {} holds no such values; export it with floats",
+                "its type {} cannot hold such values; export it as float32",
                 self.port.element
             )),
             (ExtraValue::Noise(_), Some(_)) => Ok(()),
@@ -156,10 +159,10 @@ impl FurtherInput {
                 match (places.channels(&self.port), made) {
                     (None | Some(3), _) | (Some(1), 1) => Ok(()),
                     (Some(1), _) => Err(
-                        "that has three channels, and it takes one; max(…) or mean(…) makes one of three"
+                        "this has three channels, and it takes one; wrap the expression in mean(…) or max(…)"
                             .to_owned(),
                     ),
-                    (Some(other), _) => Err(format!("it takes {other} channels")),
+                    (Some(other), _) => Err(format!("it takes {other} channels, and this has {made}")),
                 }
             }
         }
@@ -172,7 +175,7 @@ impl FurtherInput {
     pub(crate) fn check_cut(&self, fed: &FedImage<'_>) -> Result<(), String> {
         match &self.value {
             ExtraValue::Noise(noise) if noise.divide != 1 && !fed.is_whole() => Err(format!(
-                "takes noise of the image's size divided by {} ({:?}), which cannot be cut into tiles; enhance the whole image, without --llie-options tile, in a size that the model takes",
+                "takes noise of the image's size divided by {} ({:?}), which cannot be cut into tiles; leave out --llie-options tile, or enhance images of a size that the model takes",
                 noise.divide, self.port.name
             )),
             _ => Ok(()),
@@ -289,34 +292,34 @@ fn list_line(key: &str, length: usize) -> String {
 /// Message that names the sidecar lines needed for an input without a value.
 fn missing(port: &Port, places: Option<Places>) -> String {
     let key = quoted(&port.name);
-    let beside = "state it in MODEL.onnx.toml beside the model: `[extra]` and below it";
+    let add = format!("{ADD}, below `[extra]`:");
     let fits = |number| TensorData::filled(&port.element, number, 1).is_ok();
     let known = preset::number_of(&port.name).filter(|(number, _)| fits(*number));
     let Some(places) = places else {
         if let ElementType::Other(_) = port.element {
             return format!(
-                "takes {port} in addition to the image, whose type is not supported; export it with the value inside the graph"
+                "takes {port} in addition to the image, an unsupported type; export the model with its value as a constant"
             );
         }
         let line = match (known, &port.element) {
             _ if vector_length(port).is_some_and(|length| length > 1) => {
                 let length = vector_length(port).unwrap_or(1);
                 format!(
-                    "{}, its authors' values; if they are computed from the image, as a histogram is, export the model with that computation in the graph",
+                    "{} (as in the model's code); if it is computed from the image, as a histogram is, export the model with that computation",
                     list_line(&key, length)
                 )
             }
-            (Some((value, preset)), _) => format!("`{key} = {value}`, as preset {preset} has it"),
+            (Some((value, preset)), _) => format!("`{key} = {value}` (as in preset {preset})"),
             (None, ElementType::Bool) => format!("`{key} = true` or `{key} = false`"),
-            (None, _) => format!("`{key} = NUMBER`, its authors' value"),
+            (None, _) => format!("`{key} = NUMBER` (as in the model's code)"),
         };
         return format!(
-            "takes {port} in addition to the image, and its value is unknown; {beside} {line}"
+            "takes {port} in addition to the image, and its value is unknown; {add} {line}"
         );
     };
     if is_map(&port.name.to_lowercase()) {
         return format!(
-            "takes {port} in addition to the image, which seems to be made from it; {beside} an expression, as `{key} = {{ from = \"1 - max(image)\" }}`, with its authors' formula; a blur or a maximum over the image must be in the graph"
+            "takes {port} in addition to the image, probably computed from it; {add} its formula, such as `{key} = {{ from = \"1 - max(image)\" }}`; a blur or a maximum over all pixels must be part of the export"
         );
     }
     let number = known.map_or("NUMBER".to_owned(), |(value, _)| value.to_string());
@@ -326,7 +329,7 @@ fn missing(port: &Port, places: Option<Places>) -> String {
         _ => "the image's size",
     };
     format!(
-        "takes {port} in addition to the image, of {channels}; {beside} what it is: a number at each pixel, `{key} = {{ map = {number} }}`, noise, `{key} = {{ noise = \"normal\", std = NUMBER, seed = 0 }}`, or an expression of the image, `{key} = {{ from = \"EXPRESSION\" }}`"
+        "takes {port} in addition to the image, of {channels}; {add} `{key} = {{ map = {number} }}` (one number for all pixels), `{key} = {{ noise = \"normal\", std = NUMBER, seed = 0 }}` or `{key} = {{ from = \"EXPRESSION\" }}` (of `image`)"
     )
 }
 

@@ -45,9 +45,9 @@ pub(super) fn probe(path: &Path) -> Result<String, String> {
     match minor(&version) {
         Some(minor) if minor >= OLDEST => Ok(version),
         Some(_) => Err(format!(
-            "is version {version}, and 1.{OLDEST} or later is needed"
+            "is version {version}, but 1.{OLDEST} or later is needed"
         )),
-        None => Err(format!("says its version is {version:?}, which is not 1.x")),
+        None => Err(format!("has version {version:?}; expected 1.x")),
     }
 }
 
@@ -83,7 +83,7 @@ fn version_of(path: &Path) -> Result<String, String> {
     };
     // SAFETY: if it is not null, it points to a static of the library, which stays loaded to the end of this function.
     let Some(base) = (unsafe { base.as_ref() }) else {
-        return Err("gives no API".to_owned());
+        return Err("provides no API".to_owned());
     };
     // SAFETY: both functions may be called at any time; the version is a static string that ends with a zero.
     let (version, api) = unsafe {
@@ -97,7 +97,7 @@ fn version_of(path: &Path) -> Result<String, String> {
     // An older library gives no API either; the caller's error about its version is clearer.
     if api.is_null() && minor(&version).is_none_or(|minor| minor >= OLDEST) {
         return Err(format!(
-            "is version {version} but does not give API {OLDEST}"
+            "is version {version} but does not provide API {OLDEST}"
         ));
     }
     Ok(version)

@@ -52,7 +52,7 @@ impl LibraryFormat {
         self.check_content(&mut file, before.0, consts::ARCH)?;
         if state(&file).map_err(unreadable)? != before {
             return Err(
-                "is being written by another process; wait until that has ended".to_owned(),
+                "is being written by another process; wait until it is complete".to_owned(),
             );
         }
         Ok(())
@@ -75,7 +75,7 @@ impl LibraryFormat {
             Ok(needed) if needed <= size => Ok(()),
             Ok(needed) => Err(cut_short(&format!("{size} of {needed} bytes"))),
             Err(Flaw::Cut) => Err(cut_short(&format!(
-                "{size} bytes, fewer than its header names"
+                "{size} bytes, fewer than its header states"
             ))),
             Err(Flaw::Wrong(problem)) => Err(problem.to_owned()),
             Err(Flaw::Unreadable(e)) => Err(format!("cannot be read: {e}")),
@@ -86,7 +86,7 @@ impl LibraryFormat {
 /// Message for an incomplete file.
 fn cut_short(sizes: &str) -> String {
     format!(
-        "is cut short: {sizes}; copy or install it again, or wait if another process is still writing it"
+        "is incomplete: {sizes}; copy or install it again, or wait if another process is still writing it"
     )
 }
 

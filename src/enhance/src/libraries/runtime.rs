@@ -146,7 +146,7 @@ fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
                 // Reinstall a broken library in the cache: a later candidate may have another version.
                 match install_into_cache(surroundings, &rejected) {
                     Ok(found) => return Ok(found),
-                    Err(problem) => tracing::warn!("it cannot be installed again: {problem}"),
+                    Err(problem) => tracing::warn!("ONNX Runtime cannot be reinstalled: {problem}"),
                 }
             }
             Err(problem) => {
@@ -161,11 +161,11 @@ fn find(surroundings: &Surroundings, policy: Install) -> Result<FoundLibrary> {
             .iter()
             .map(|folder| {
                 let folder = folder.display();
-                format!("{folder} holds no library; the packages from version 1.19 on do")
+                format!("{folder} has no library; packages since version 1.19 have one")
             }),
     );
     let installed = match policy {
-        Install::Offline => Err("--llie-options offline forbids its installation".to_owned()),
+        Install::Offline => Err("--llie-options offline forbids installing it".to_owned()),
         Install::Allowed => install_into_cache(surroundings, &rejected),
     };
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
@@ -230,13 +230,13 @@ fn not_found_message(problem: &str, rejected: &[String]) -> String {
     let skipped = skipped_note(rejected);
     let places = LibraryPlace::ALL.map(|place| place.to_string()).join(", ");
     format!(
-        "no library was found ({places}){skipped}, and {problem}. Three ways out: install the Python package into the environment of this program or one on PATH (`pip install onnxruntime=={PINNED}`); or name the library of any release from 1.{OLDEST} on with --llie-options ort-lib=FILE or ORT_DYLIB_PATH; or let it be installed: without --llie-options offline, with pip on PATH and a reachable package index"
+        "no library was found{skipped}, and {problem}. Run `pip install onnxruntime=={PINNED}`, or name a library of 1.{OLDEST} or later with --llie-options ort-lib=FILE or ORT_DYLIB_PATH, or allow its installation (pip on PATH, a package index, no --llie-options offline). Searched: {places}"
     )
 }
 
 fn unusable_library(path: &Path, problem: &str) -> Error {
     Error::Runtime(format!(
-        "{} {problem}; name the library of ONNX Runtime 1.{OLDEST} or later with --llie-options ort-lib=FILE or ORT_DYLIB_PATH, or leave both out to have it found",
+        "{} {problem}; name a library of 1.{OLDEST} or later with --llie-options ort-lib=FILE or ORT_DYLIB_PATH, or leave both out to search for one",
         path.display()
     ))
 }
@@ -252,7 +252,7 @@ impl Runtime {
         let fault = |e: &dyn std::error::Error| Error::Runtime(format!("{}: {e}", path.display()));
         if std::env::var_os(TELEMETRY_SWITCH).is_none_or(|value| value != "1") {
             tracing::warn!(
-                "ONNX Runtime may report its use to Microsoft; {TELEMETRY_SWITCH}=1 in the environment forbids that"
+                "ONNX Runtime may report its use to Microsoft; set {TELEMETRY_SWITCH}=1 in the environment to forbid it"
             );
         }
         // Logged at debug level only, because ONNX Runtime also returns its errors to the caller.

@@ -104,7 +104,7 @@ impl RuntimeThread {
                 self.stuck.store(true, Ordering::SeqCst);
                 Err(match ended {
                     Ended::TooLarge => Error::Runtime(format!(
-                        "an enhancer took more memory than --llie-options max-memory allows, and did not end within {} s, although it was stopped; no further image is enhanced, and finished trials are saved. Allow more memory, or use a smaller model",
+                        "an enhancer exceeded --llie-options max-memory and could not be stopped within {} s; no more images are enhanced, finished trials are saved. Set a higher limit, or use a smaller model",
                         GRACE.as_secs()
                     )),
                     _ => stuck(),
@@ -199,8 +199,8 @@ fn thread_ended() -> Error {
 
 fn stuck() -> Error {
     Error::Runtime(format!(
-        "an enhancer did not end within {PATIENCE} times --llie-options timeout, although it was stopped, because one of its operators takes that \
-         long; no further image is enhanced, and finished trials are saved. Allow more time with --llie-options timeout, or enhance smaller images"
+        "an enhancer could not be stopped within {PATIENCE} times its time limit; no more images are enhanced, finished trials are saved. \
+         Set a higher --llie-options timeout=SECONDS, or enhance smaller images"
     ))
 }
 

@@ -56,7 +56,7 @@ impl LibraryPlace {
 impl fmt::Display for LibraryPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Program => "beside the program",
+            Self::Program => "next to the program",
             Self::Environment => "in the Python environment of the program",
             Self::Cache => "in the user's cache folder",
             Self::Python => "in the Python environments on PATH",

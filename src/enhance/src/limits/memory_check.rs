@@ -56,7 +56,7 @@ impl MemoryCheck {
         }
         Ok(checked.map_err(|[needed, available]| {
             format!(
-                "would need about {needed:.1} GB of memory for a run of {}, and {available:.1} GB are free; {}",
+                "needs about {needed:.1} GB of memory for {}, but {available:.1} GB are free; {}",
                 by(fed),
                 remedy(rule, fed, size)
             )
@@ -73,7 +73,7 @@ pub(crate) fn no_memory(failure: &RunFailure, rule: SizeRule, size: [usize; 2]) 
     let requested = requested.map_or(String::new(), |bytes| {
         format!("{} were needed at once, ", gigabytes(bytes))
     });
-    let free = memory::available().map_or("too little".to_owned(), gigabytes);
+    let free = memory::available().map_or("too few GB".to_owned(), gigabytes);
     let (words, remedy) = (failure.words(), remedy(rule, *fed, size));
     format!("{words}: {requested}{free} are free; {remedy}")
 }
@@ -84,21 +84,21 @@ fn remedy(rule: SizeRule, fed: [usize; 2], size: [usize; 2]) -> String {
     let much_larger = fed[0] * fed[1] > 4 * size[0] * size[1];
     match rule.tile {
         _ if much_larger && !rule.takes_any_size() => format!(
-            "the image has {}, so check the fixed size that its graph or its sidecar states",
+            "the image has only {}: check the size that its graph or MODEL.onnx.toml fixes",
             by(size)
         ),
         _ if much_larger => format!(
-            "the image has {}, so check multiple = {} in its sidecar or preset",
+            "the image has only {}: check `multiple = {}` in MODEL.onnx.toml or the preset",
             by(size),
             rule.multiple
         ),
         _ if !rule.takes_any_size() => {
-            "export it for a smaller size, or with free sizes".to_owned()
+            "export it for a smaller size, or with dynamic_axes".to_owned()
         }
         Some(Tile::None) => SMALLER.to_owned(),
         Some(Tile::Exact(_)) => "--llie-options tile=256 needs a fraction of it".to_owned(),
         None => format!(
-            "--llie-options tile=256 needs a fraction of it, if a pixel depends only on the pixels around it; otherwise {SMALLER}"
+            "--llie-options tile=256 needs a fraction of it if a pixel depends only on the pixels around it; otherwise {SMALLER}"
         ),
     }
 }

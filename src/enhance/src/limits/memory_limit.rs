@@ -58,7 +58,7 @@ impl FromStr for MemoryLimit {
             Ok(number) if number > 0.0 && number.is_finite() => {
                 Ok(Self(Some((number * GIGABYTE) as u64)))
             }
-            _ => Err("a number of GB (10⁹ bytes) expected, or 0 for no limit".to_owned()),
+            _ => Err("expected a number of GB (10⁹ bytes), or 0 for no limit".to_owned()),
         }
     }
 }

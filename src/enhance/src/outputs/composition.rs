@@ -85,7 +85,7 @@ impl Composition {
                 .collect();
             if image.channels(&names) != 1 {
                 return Err(format!(
-                    "has one channel (channels = \"y\"), but image = \"{image}\" gives three; mean(…) or max(…) makes one of three"
+                    "takes one channel (channels = \"y\"), but image = \"{image}\" has three; wrap the expression in mean(…) or max(…)"
                 ));
             }
         }

@@ -1,6 +1,6 @@
 //! Choice of the outputs of a graph that are the enhanced image, or from which it is made: [`Output`].
 
-use crate::conventions::sidecar::OutputChoice;
+use crate::conventions::sidecar::{ADD, OutputChoice};
 use crate::conventions::{Channels, ElementType, TensorLayout, preset};
 use crate::expressions::{ChannelSlice, Expression};
 use crate::graphs::{Dim, Port, list};
@@ -49,7 +49,7 @@ impl Output {
         {
             if slice.count() != channels.count() {
                 return Err(format!(
-                    "its sidecar or preset states output = {name:?}, {} channels; expected {}",
+                    "MODEL.onnx.toml or the preset sets output = {name:?}, {} channels; expected {}",
                     slice.count(),
                     channels.words()
                 ));
@@ -109,12 +109,7 @@ impl Output {
         let known_names = [&known[..], &slices].concat();
         image
             .check_names("image", &known_names)
-            .map_err(|problem| {
-                format!(
-                    "cannot be read: {problem}; its outputs are {}",
-                    list(outputs)
-                )
-            })?;
+            .map_err(|problem| format!("{problem}; outputs: {}", list(outputs)))?;
         let outputs: Vec<Self> = image.names().iter().filter(|name| *name != INPUT)
             .map(|name| {
                 if let Some((port, slice)) = sliced(outputs, name) {
@@ -123,7 +118,7 @@ impl Output {
                 let port = outputs.iter().find(|port| port.name == *name);
                 let port = port.filter(|port| channels.iter().any(|count| fits(port, *count))).ok_or_else(|| {
                     format!(
-                        "gives {name:?}, which image = \"{image}\" names, but which is not an image of {}; it has {}",
+                        "image = \"{image}\" names output {name:?}, which is not an image of {}; outputs: {}",
                         if channels == [1] { "one channel (channels = \"y\")" } else { "one or three channels" },
                         list(outputs)
                     )
@@ -139,7 +134,7 @@ impl Output {
             .collect::<Result<_, String>>()?;
         if outputs.is_empty() {
             return Err(format!(
-                "is not used: image = \"{image}\" names none of its outputs, which are {}",
+                "image = \"{image}\" names none of its outputs, so it would do nothing; they are {}",
                 known[..known.len() - 1].join(", ")
             ));
         }
@@ -163,7 +158,7 @@ impl Output {
             .find(|count| *count >= slice.end && fits(port, *count))
             .ok_or_else(|| {
                 format!(
-                    "has no channels {} to {} (counted from 0) of the input's size in {port}",
+                    "gives {port}, which has no channels {} to {} (counted from 0) of the input's size",
                     slice.first,
                     slice.end - 1
                 )
@@ -230,18 +225,18 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
         let name = &port.name;
         return match count {
             4 => format!(
-                "gives {port}, 4 channels, and an image has 3; if the fourth is opacity, state in MODEL.onnx.toml beside it: `output = \"{name}[0:3]\"`; if they are reflectance and light: `image = \"{0}[0:3] * {0}[3:4]\"`",
+                "gives {port}, 4 channels, but an image has 3; if the fourth is opacity, {ADD}: `output = \"{name}[0:3]\"`; if they are reflectance and light: `image = \"{0}[0:3] * {0}[3:4]\"`",
                 in_expression(name)
             ),
             6 => format!(
-                "gives {port}, 6 channels, and an image has 3; state in MODEL.onnx.toml beside it which half is the image: `output = \"{name}[0:3]\"` or `output = \"{name}[3:6]\"`"
+                "gives {port}, 6 channels, but an image has 3; {ADD} the half that is the image: `output = \"{name}[0:3]\"` or `output = \"{name}[3:6]\"`"
             ),
             24 => format!(
-                "gives {port}, 24 channels, and an image has 3; if they are the curves of Zero-DCE, state in MODEL.onnx.toml beside it: `image = \"curves(input, {0}[0:3], {0}[3:6], {0}[6:9], {0}[9:12], {0}[12:15], {0}[15:18], {0}[18:21], {0}[21:24])\"`",
+                "gives {port}, 24 channels, but an image has 3; if they are the curves of Zero-DCE, {ADD}: `image = \"curves(input, {0}[0:3], {0}[3:6], {0}[6:9], {0}[9:12], {0}[12:15], {0}[15:18], {0}[18:21], {0}[21:24])\"`",
                 in_expression(name)
             ),
             _ => format!(
-                "gives {port}, {count} channels, and an image has 3; state which are the image in MODEL.onnx.toml beside it, from 0 and without the last: `output = \"{name}[{}:{count}]\"`",
+                "gives {port}, {count} channels, but an image has 3; {ADD} those that are the image (from 0, end excluded): `output = \"{name}[{}:{count}]\"`",
                 count.saturating_sub(3)
             ),
         };
@@ -250,21 +245,21 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
         && let Some(port) = outputs.iter().find(|port| fits(port, 1))
     {
         return format!(
-            "gives {port}, one channel, which is no image: if it is a light map, which its authors divide by, state in MODEL.onnx.toml beside it: `image = \"clip(input / max({0}, 0.001), 0, 1)\"`; if it is the enhanced luma, export it with the colours joined in the graph",
+            "gives {port}, one channel, not an image; if it is a light map that the input is divided by, {ADD}: `image = \"clip(input / max({0}, 0.001), 0, 1)\"`; if it is the enhanced luma, export it joined with the colours",
             in_expression(&port.name)
         );
     }
     if let [port] = outputs {
         let problem = match (&port.element, port.dims.len()) {
             (ElementType::Other(_), _) => Some(
-                "which is no tensor of numbers; export it so that it gives one image as float32"
+                "not a tensor of numbers; export it so that it gives one image as float32"
                     .to_owned(),
             ),
-            (element, _) if !element.is_read() => Some(
-                "a type that is not read; export it so that it gives float32 or uint8".to_owned(),
-            ),
+            (element, _) if !element.is_read() => {
+                Some("an unsupported type; export it so that it gives float32 or uint8".to_owned())
+            }
             (_, 1 | 2) => Some(
-                "flat values; export it so that it gives an image of [1, 3, height, width]"
+                "a vector, not an image; export it so that it gives [1, 3, height, width]"
                     .to_owned(),
             ),
             (_, 5..) => Some(
@@ -282,7 +277,7 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
         Channels::Y => "an image of one channel (channels = \"y\")",
     };
     format!(
-        "has no output that is {what} of the input's size; it has {}",
+        "has no output that is {what} of the input's size; outputs: {}",
         list(outputs)
     )
 }
@@ -296,12 +291,14 @@ fn ambiguous(outputs: &[Port]) -> String {
     let presets = match presets.as_slice() {
         [] => String::new(),
         names => {
-            let known = "; the models of these presets have such outputs:";
-            format!("{known} {} (--llie PRESET:FILE)", names.join(", "))
+            format!(
+                "; presets with such outputs: {} (--llie PRESET:FILE)",
+                names.join(", ")
+            )
         }
     };
     format!(
-        "has several outputs that could be the image: {}; say which in MODEL.onnx.toml beside it: `output = \"NAME\"` or `output = INDEX`, counted from 0{presets}; `darkqa-eval enhance doctor` draws what each gives, and which are plausible",
+        "has several outputs that could be the image: {}; {ADD}: `output = \"NAME\"` or `output = INDEX` (from 0){presets}; `darkqa-eval enhance doctor` shows which are plausible",
         list(outputs)
     )
 }
@@ -318,11 +315,11 @@ fn stated_output(
     };
     let problem = match found {
         Some(index) if fits(&outputs[index]) => return Ok(index),
-        Some(_) => "which is not one of its image outputs",
-        None => "which it does not have",
+        Some(_) => "which is not an image",
+        None => "which does not exist",
     };
     Err(format!(
-        "its sidecar or preset states {choice}, {problem}; it has {}",
+        "MODEL.onnx.toml or the preset sets {choice}, {problem}; outputs: {}",
         list(outputs)
     ))
 }

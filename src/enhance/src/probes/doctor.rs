@@ -11,7 +11,7 @@ use super::plausible::{Codes, Facts};
 use super::probe::{PairTrial, Probe};
 use super::probe_run::{Trials, made};
 use super::range_pair::RangePair;
-use crate::conventions::sidecar::{ModelSidecar, OutputChoice};
+use crate::conventions::sidecar::{self, ADD, ModelSidecar, OutputChoice};
 use crate::conventions::{ChannelOrder, ValueRange, ValueScale};
 use crate::enhancer::Enhancer;
 use crate::graphs::Port;
@@ -78,7 +78,9 @@ impl Enhancer {
         let sizes = self.try_sizes(dark);
         let order = self.other_order();
         let trials = self.trials_of_all(dark)?.ok_or_else(|| {
-            self.fault("it takes none of the small sizes of the probe; state `multiple` or `fixed` in MODEL.onnx.toml beside it")
+            self.fault(format!(
+                "fails at 144 × 96, 160 × 120 and 128 × 128; {ADD} the sizes that it takes: `multiple = N` or `fixed = [WIDTH, HEIGHT]`"
+            ))
         })?;
         let Trials {
             frames,
@@ -111,13 +113,13 @@ impl Enhancer {
                     found.settled = Settled::No;
                     found.conclusion += match kind {
                         Some(OutputKind::Residual) => {
-                            " Its output of a white image is nearly black, so it may have to be added to the input; the possible expressions are drawn below."
+                            " Its output is nearly black for a white image, like a residual; the page shows the expressions that may be the image."
                         }
                         Some(OutputKind::Map) => {
-                            " Its output of a black image is nearly as bright as that of a white one, so it may be a light map; the possible expressions are drawn below."
+                            " Its output is nearly as bright for a black image as for a white one, like a light map; the page shows the expressions that may be the image."
                         }
                         None => {
-                            " Its authors may make the image of input and output; the plausible expressions are drawn below."
+                            " The image may be made of input and output; the page shows the plausible expressions."
                         }
                     };
                 }
@@ -139,7 +141,7 @@ impl Enhancer {
             frames,
             columns,
             proposal: found.lines,
-            conclusion: found.conclusion,
+            conclusion: sidecar::named(&found.conclusion, self.path()),
             sizes,
         })
     }
@@ -160,7 +162,7 @@ impl Enhancer {
         self.trials(dark, [&stated, &swapped], [None; 2])
     }
 
-    /// The lines of the sidecar with which the images of dark frames can be enhanced images, in a sentence; `None` if no lines are the
+    /// The lines of the sidecar with which the images of dark frames are plausible, in a sentence; `None` if no lines are the
     /// only ones.
     pub(super) fn better_lines(&self, dark: &[Rgb]) -> Result<Option<String>> {
         let Some(trials) = self.trials_of_all(dark)? else {
@@ -179,7 +181,7 @@ impl Enhancer {
             .collect();
         Ok((!lines.is_empty()).then(|| {
             format!(
-                "{} If its authors do that, state in MODEL.onnx.toml beside it, in place of what is stated: {}",
+                "{} If the model's code does that, {ADD}, replacing the present values: {}",
                 found.conclusion,
                 lines.join(" and ")
             )
@@ -280,7 +282,7 @@ fn conventions_to_draw(
     order: ChannelOrder,
     others: Vec<ExaminedConvention>,
 ) -> Vec<ExaminedConvention> {
-    let stated_title = stated.map(|pair| format!("{output}{pair}, as stated"));
+    let stated_title = stated.map(|pair| format!("{output}{pair}, as set"));
     let mut shown = columns(probe, |ranges| match &stated_title {
         Some(title) if stated == Some(ranges) => title.clone(),
         _ => format!("{output}{ranges}"),

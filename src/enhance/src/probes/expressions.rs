@@ -4,6 +4,7 @@ use super::endpoints::Endpoints;
 use super::probe::{PairTrial, Probe};
 use super::probe_run::Trials;
 use super::range_pair::RangePair;
+use crate::conventions::sidecar::ADD;
 use crate::conventions::{Channels, ValueRange};
 use crate::enhancer::Enhancer;
 use crate::outputs::in_expression;
@@ -131,10 +132,10 @@ impl Enhancer {
             .collect();
         Ok((!lines.is_empty()).then(|| {
             format!(
-                "The output may not be the image itself: plausible images come from {}. If its authors do that, state the line in MODEL.onnx.toml beside it{}",
+                "Its output may not be the image itself; {ADD} the line that the model's code uses: {}{}",
                 lines.join(" or "),
                 if flaw == Flaw::Grey {
-                    "; if it is the enhanced luma, export the model so that it joins luma and colours in the graph"
+                    "; if it is the enhanced luma, export it joined with the colours"
                 } else {
                     ""
                 }
@@ -165,10 +166,10 @@ impl Enhancer {
         let name = in_expression(&self.graph().signature.outputs[0].port.name);
         Ok(Some(match kind {
             OutputKind::Residual => format!(
-                "its output of a white image is nearly black, as if it had to be added to the input; if its authors add it, state in MODEL.onnx.toml beside it: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` draws both"
+                "its output is nearly black for a white image, like a residual; if the model's code adds it, {ADD}: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` shows both"
             ),
             OutputKind::Map => format!(
-                "its output of a black image is nearly as bright as that of a white one, as that of a light map; if its authors divide by it, state in MODEL.onnx.toml beside it: `image = \"clip(input / max({name}, 0.001), 0, 1)\"`; `darkqa-eval enhance doctor` draws both"
+                "its output is nearly as bright for black as for white, like a light map; if the model's code divides by it, {ADD}: `image = \"clip(input / max({name}, 0.001), 0, 1)\"`; `darkqa-eval enhance doctor` shows both"
             ),
         }))
     }
@@ -183,7 +184,7 @@ impl Enhancer {
         NAMES.iter().find(|word| lower_case.contains(**word))?;
         let term = in_expression(name);
         Some(format!(
-            "its output {name:?} is read as the image, but is named like a map or a residual; if its authors apply it to the input, state their formula in MODEL.onnx.toml beside it, as `image = \"clip(input / max({term}, 0.001), 0, 1)\"` or `image = \"input + {term}\"`; else `output = {name:?}`"
+            "its output {name:?} is named like a map or a residual, but read as the image; {ADD} what the model's code does: `image = \"clip(input / max({term}, 0.001), 0, 1)\"`, `image = \"input + {term}\"` or `output = {name:?}`"
         ))
     }
 

@@ -66,7 +66,7 @@ impl Findings {
 /// Warns about a model that takes none of the sizes of the probe.
 pub(super) fn warn_of_untried(name: &EnhancerName) {
     tracing::warn!(
-        "{name}: it takes none of the small sizes of the probe, so nothing is known of whether its images can be enhanced images"
+        "{name}: its images were not checked, because it fails at small sizes such as 144 × 96; look at some of them"
     );
 }
 

@@ -1,4 +1,4 @@
-//! The probe: whether a model's images of a few dark frames can be enhanced images, and in which value ranges ([`Probe`]).
+//! The probe: whether a model's images of a few dark frames are plausible, and in which value ranges ([`Probe`]).
 //!
 //! A graph does not state its value ranges. So where they are not stated, each pair of ranges is tried. The verdict on a pair is
 //! that of at least half of the frames.
@@ -8,10 +8,15 @@ use std::fmt;
 use super::endpoints::Endpoints;
 use super::plausible::{Codes, Gravity, Verdict, judge};
 use super::range_pair::RangePair;
+use crate::conventions::sidecar::ADD;
 use darkqa_ground::types::Flaw;
 
 /// Number of dark frames that a model is tried on: with 6, none of 9 trained models was flagged; with one, 5 % were.
 pub const FRAMES: usize = 6;
+
+/// The finding that no range explains a flaw, with the ranges that were tried.
+const NONE_FITS: &str =
+    "No usual value range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP)";
 
 /// Placeholder for the output that is read, in the remedy for a flaw.
 pub(super) const OUTPUT: &str = "OUTPUT";
@@ -155,13 +160,13 @@ pub(super) struct Probe {
 /// Conclusion of a probe.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Conclusion {
-    /// The ranges are stated, and the images can be enhanced images.
+    /// The ranges are stated, and the images are plausible.
     Plausible,
-    /// The images can be enhanced images with the usual ranges, which nothing states.
+    /// The images are plausible with the usual ranges, which nothing states.
     Assumed,
     /// The ranges are stated, and the images are odd, but some models do that.
     Doubtful(FlawedFrames),
-    /// The ranges are stated or all were tried, and the images cannot be enhanced images.
+    /// The ranges are stated or all were tried, and the images are implausible.
     Implausible(FlawedFrames),
     /// Only these ranges give plausible images, or they keep black and white nearest to themselves, and they are not the usual ones.
     Other(RangePair, FlawedFrames),
@@ -263,9 +268,7 @@ impl Probe {
         let usual = self.usual.stated();
         let dim = |seen: &FlawedFrames| {
             if self.is_dim(seen) {
-                format!(
-                    "If it is meant to be so dim, state the usual ranges in MODEL.onnx.toml beside it: {usual}. "
-                )
+                format!("If its images should be this dim, {ADD}: {usual}. ")
             } else {
                 String::new()
             }
@@ -277,7 +280,7 @@ impl Probe {
                 format!("{seen}. {}", self.remedy(&seen))
             }
             Conclusion::Other(pair, seen) => format!(
-                "{seen}. {}With {} they can be enhanced images; if its authors use these values, state in MODEL.onnx.toml beside it: {}",
+                "{seen}. {}With {} they are plausible; if the model's code uses these, {ADD}: {}",
                 dim(&seen),
                 self.words(pair),
                 pair.stated()
@@ -285,7 +288,7 @@ impl Probe {
             Conclusion::Several(pairs, seen) => {
                 let list: Vec<String> = pairs.iter().map(|pair| self.words(*pair)).collect();
                 format!(
-                    "{seen}. {}With other value ranges they can be enhanced images ({}); state those that its authors use in MODEL.onnx.toml beside it, as {}",
+                    "{seen}. {}With other value ranges they are plausible ({}); {ADD} those of the model's code, such as {}",
                     dim(&seen),
                     list.join("; "),
                     pairs[0].stated()
@@ -306,13 +309,15 @@ impl Probe {
     fn remedy(&self, seen: &FlawedFrames) -> String {
         match (seen.example.flaw, self.ranges) {
             (Flaw::Unlit, Ranges::Open | Ranges::OneStated) => format!(
-                "If it is meant to be so dim, state its ranges in MODEL.onnx.toml beside it: {}",
+                "If its images should be this dim, {ADD}: {}",
                 self.usual.stated()
             ),
             (Flaw::White | Flaw::Haze, Ranges::Open | Ranges::OneStated) => {
-                "Its values are none of 0..1, 0..255, -1..1, -0.5..0.5 and those with the mean and std of ImageNet or CLIP; take those of its authors' code, `range_in`, `mean`, `std` and `range_out`, into MODEL.onnx.toml beside it".to_owned()
+                format!(
+                    "{NONE_FITS}; {ADD} `range_in`, `mean`, `std` and `range_out` of the model's code"
+                )
             }
-            (flaw, ranges) => remedy(flaw, ranges).to_owned(),
+            (flaw, ranges) => remedy(flaw, ranges),
         }
     }
 }
@@ -330,33 +335,33 @@ fn clear_first<'p>(ranked: &[&'p PairTrial]) -> Option<&'p PairTrial> {
 }
 
 /// Remedy for a flaw that no other range explains.
-fn remedy(flaw: Flaw, ranges: Ranges) -> &'static str {
+fn remedy(flaw: Flaw, ranges: Ranges) -> String {
     match (flaw, ranges) {
-        (Flaw::Hue, _) => {
-            "If its output has blue first, state in MODEL.onnx.toml beside it: `color_out = \"bgr\"` (or \"rgb\", if that is stated); if its input has, `color = \"bgr\"` and `color_out = \"rgb\"`"
-        }
-        (Flaw::Inverted, _) => {
-            "Perhaps another output is the image, or its authors subtract it from white: `image = \"1 - OUTPUT\"`, or divide the input by it: `image = \"input / OUTPUT\"`, in MODEL.onnx.toml beside it"
-        }
-        (Flaw::Grey, _) => {
-            "Perhaps it is a light map, which its authors divide by: `image = \"clip(input / OUTPUT, 0, 1)\"`, or the luma alone, in MODEL.onnx.toml beside it"
-        }
-        (Flaw::Shuffled, _) => {
-            "Perhaps another output is the image, or the dimensions have another order: `layout_in`, `layout_out` and `output` in MODEL.onnx.toml beside it"
-        }
-        (Flaw::Nan, Ranges::Open) => "Check its weights and its divisions by zero",
+        (Flaw::Hue, _) => format!(
+            "If its output is BGR, {ADD}: `color_out = \"bgr\"` (or \"rgb\", if \"bgr\" is set); if its input is, `color = \"bgr\"` and `color_out = \"rgb\"`"
+        ),
+        (Flaw::Inverted, _) => format!(
+            "If the model's code inverts the output, {ADD}: `image = \"1 - OUTPUT\"`; if it divides the input by it: `image = \"input / OUTPUT\"`; or another output is the image"
+        ),
+        (Flaw::Grey, _) => format!(
+            "If the output is a light map that the input is divided by, {ADD}: `image = \"clip(input / OUTPUT, 0, 1)\"`; or it is the luma alone"
+        ),
+        (Flaw::Shuffled, _) => format!(
+            "Perhaps another output is the image, or the dimensions have another order; {ADD} `output`, `layout_in` or `layout_out`"
+        ),
+        (Flaw::Nan, Ranges::Open) => "Check its weights and its divisions by zero".to_owned(),
         (Flaw::Nan, _) => {
-            "Check `range_in` in its sidecar: values that are too large can do that; else its weights and its divisions by zero"
+            "Check `range_in` in MODEL.onnx.toml, because values that are too large can cause this; else its weights and its divisions by zero".to_owned()
         }
         (_, Ranges::Stated) => {
-            "Check `range_in`, `range_out` and `output` in its sidecar, and the preset"
+            "Check `range_in`, `range_out` and `output` in MODEL.onnx.toml, and the preset".to_owned()
         }
         (_, Ranges::OneStated) => {
-            "Beside the one range that its sidecar states, or its element type, no other explains that: without a line in the sidecar all are tried"
+            "One range is set, by MODEL.onnx.toml or the element type, and no other fits it; without a line in that file all are tried".to_owned()
         }
-        (_, Ranges::Open) => {
-            "No value range explains that (0..1, 0..255, -1..1, -0.5..0.5, ImageNet's and CLIP's mean and std); perhaps its authors use another `mean` and `std`, another output is the image, or the export has lost its weights"
-        }
+        (_, Ranges::Open) => format!(
+            "{NONE_FITS}; perhaps it needs another `mean` and `std`, another output is the image, or the export has lost its weights"
+        ),
     }
 }
 

@@ -4,16 +4,16 @@ use super::findings::warn_of_untried;
 use super::plausible::Codes;
 use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, Ranges};
 use super::range_pair::RangePair;
-use super::usage::{ImageUse, Implausible, Seen};
-use crate::conventions::sidecar::{self, ModelSidecar};
+use super::usage::{ImageUse, Implausible, Seen, way_out};
+use crate::conventions::sidecar::{self, ADD, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
 use crate::enhancer::Enhancer;
 use crate::graphs::{Graph, RunResult};
 use crate::outputs::in_expression;
 use crate::planes::Planes;
 use darkqa_ground::error::Result;
+use darkqa_ground::types::Rgb;
 use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
-use darkqa_ground::types::{EnhancerName, Rgb};
 
 /// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
@@ -30,7 +30,7 @@ impl Enhancer {
     /// Tries the model on dark frames, and decides in which value ranges it is fed and read where they are not stated.
     ///
     /// # Errors
-    /// If its images cannot be enhanced images, or several ranges would do, with the lines of a sidecar that would repair it; not if
+    /// If its images are implausible, or several ranges would do, with the lines of a sidecar that would repair it; not if
     /// implausible images are used.
     pub fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
         let mut trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
@@ -54,10 +54,7 @@ impl Enhancer {
         let problem = self.problem(&probe, dark)?;
         match (&problem, outcome, implausible) {
             (Some(problem), ProbeOutcome::Overruled, Implausible::Refused) => {
-                return Err(self.fault(format!(
-                    "{problem}. `darkqa-eval enhance doctor {} FRAMES… --out DIR` draws what it makes with each convention; --allow bad-enhancer uses it as it is",
-                    self.path().display()
-                )));
+                return Err(self.fault(format!("{problem}. {}", way_out(self.path()))));
             }
             (Some(problem), ..) => tracing::warn!("{}: {problem}", self.name()),
             (None, ..) => {}
@@ -73,7 +70,7 @@ impl Enhancer {
         }
         self.warn_of_remarks();
         if probe.conclusion() == Conclusion::Assumed {
-            warn_of_assumed(self.name(), probe.usual);
+            self.warn_of_assumed(probe.usual);
         }
         let note = ProbeNote {
             frames: dark.len(),
@@ -124,7 +121,7 @@ impl Enhancer {
     /// Enhances a frame in a condition, and looks at the result; with what its note got from it.
     ///
     /// # Errors
-    /// As by [`Self::enhance`], and if most of its images of dark frames so far cannot be enhanced images.
+    /// As by [`Self::enhance`], and if most of its images of dark frames so far are implausible.
     pub fn enhance_noted(
         &mut self,
         image: &Rgb,
@@ -145,7 +142,7 @@ impl Enhancer {
     /// Notes an image of a frame in a condition that it made in another run or process, as if it was made now.
     ///
     /// # Errors
-    /// If most of its images of dark frames so far cannot be enhanced images.
+    /// If most of its images of dark frames so far are implausible.
     pub fn note_stored(
         &self,
         used: &ImageUse,
@@ -257,6 +254,16 @@ impl Enhancer {
         Ok(())
     }
 
+    /// Says that nothing states the value ranges.
+    fn warn_of_assumed(&self, usual: RangePair) {
+        let words = format!(
+            "value ranges of {usual} assumed, because nothing sets them; its images of dark frames are plausible. To confirm, {ADD}: {}",
+            usual.stated()
+        );
+        let words = sidecar::named(&words, self.path());
+        tracing::warn!("{}: {words}", self.name());
+    }
+
     /// The model, fed and read by a convention with these ranges.
     pub(super) fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
         let convention = convention.clone().fed(ranges.input).read(ranges.output);
@@ -278,13 +285,6 @@ impl Enhancer {
             .to_rgb(Rounding::Round)
             .ok_or_else(|| self.fault("a frame of the probe has no pixel"))
     }
-}
-
-/// Says that nothing states the value ranges.
-fn warn_of_assumed(name: &EnhancerName, usual: RangePair) {
-    tracing::warn!(
-        "{name}: {usual} assumed, because neither sidecar nor preset states its value ranges; its images of dark frames are plausible with them"
-    );
 }
 
 /// Outputs of a model for each frame, read by each of these graphs, which share the input; `None` if it fails on a frame.

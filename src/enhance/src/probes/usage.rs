@@ -62,7 +62,7 @@ impl ImageUse {
     /// Notes an image of a frame in a condition that was made in another run or process, as if the enhancer in this file made it now.
     ///
     /// # Errors
-    /// If most of its images of dark frames so far cannot be enhanced images.
+    /// If most of its images of dark frames so far are implausible.
     pub fn note_in(
         &self,
         usage: &Usage,
@@ -88,7 +88,7 @@ impl ImageUse {
     /// Notes an image of a frame in a condition that was enhanced elsewhere.
     ///
     /// # Errors
-    /// If most images of dark frames so far cannot be enhanced images; names the folder.
+    /// If most images of dark frames so far are implausible; names the folder.
     pub fn note_made_elsewhere(
         &self,
         usage: &Usage,
@@ -98,7 +98,7 @@ impl ImageUse {
     ) -> Result<()> {
         let judged = usage.judge(&self.seen, place, implausible);
         judged.map_err(|problem| {
-            let remedy = "check that each has the name of its own dark image; --allow bad-enhancer uses them as they are";
+            let remedy = "check that each has the name of its own dark image; --allow bad-enhancer uses them anyway";
             Error::data(folder.display(), format_args!("{problem}; {remedy}"))
         })
     }
@@ -108,7 +108,7 @@ impl Seen {
     /// Counts the finding about a frame's image in a condition, unless images are not checked. The model is named by its file.
     ///
     /// # Errors
-    /// If most images of dark frames so far cannot be enhanced images.
+    /// If most images of dark frames so far are implausible.
     pub(super) fn judge_in(
         &self,
         usage: &Usage,
@@ -119,11 +119,17 @@ impl Seen {
         let judged = usage.judge(self, place, implausible);
         judged.map_err(|problem| Error::EnhancerEnded {
             path: model.to_owned(),
-            problem: format!(
-                "{problem}. `darkqa-eval enhance doctor MODEL FRAMES… --out DIR` draws what it makes with each convention; --allow bad-enhancer uses it as it is"
-            ),
+            problem: format!("{problem}. {}", way_out(model)),
         })
     }
+}
+
+/// What to do about an enhancer whose images are implausible, as a sentence.
+pub(super) fn way_out(model: &Path) -> String {
+    format!(
+        "`darkqa-eval enhance doctor {} IMAGES… --out DIR` tries each value range and colour order; --allow bad-enhancer uses it anyway",
+        model.display()
+    )
 }
 
 /// A handle to the note of an enhancer, which grows while it is used.
@@ -133,7 +139,7 @@ pub struct Usage(Arc<Mutex<UsageState>>);
 #[derive(Debug, Default)]
 struct UsageState {
     note: EnhancerNote,
-    /// Number of images that cannot be enhanced images.
+    /// Number of images that are implausible.
     impossible: usize,
     /// The digests of the frames and conditions whose images were looked at.
     judged: HashSet<Digest>,
@@ -195,7 +201,7 @@ impl Usage {
     /// Counts the finding about a frame's image in a condition; an image that is made again counts once.
     ///
     /// # Errors
-    /// The finding, if more than half of at least six images cannot be enhanced images, unless such images are used.
+    /// The finding, if more than half of at least six images are implausible, unless such images are used.
     pub(super) fn judge(
         &self,
         seen: &Seen,
@@ -229,7 +235,7 @@ impl Usage {
                     if judged >= ENOUGH && 2 * state.impossible > judged =>
                 {
                     Err(format!(
-                        "{} of its {judged} images of dark frames cannot be enhanced images; they {example}",
+                        "{} of its {judged} images of dark frames are implausible; they {example}",
                         state.impossible
                     ))
                 }

@@ -47,7 +47,7 @@ impl Context {
             Some(Tile::Exact(context)) => return Ok(Ok(context)),
             Some(Tile::None) => {
                 return Ok(Err(
-                    "it needs the whole image (tile = \"none\" in its sidecar or preset)"
+                    "it needs the whole image (tile = \"none\" in MODEL.onnx.toml or the preset)"
                         .to_owned(),
                 ));
             }
@@ -195,11 +195,15 @@ impl Reach {
 /// Output of a trial; the inner error explains why it failed.
 fn output(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, String>> {
     graph.restart_clock();
-    let unmeasured = |why: &str| Err(format!("how far it looks cannot be measured: it {why}"));
+    let unmeasured = |why: &str| {
+        Err(format!(
+            "the context that a pixel needs cannot be measured: the model {why}"
+        ))
+    };
     Ok(match graph.planes(planes)? {
         RunResult::Output(planes) => Ok(planes),
         RunResult::Failed(failure) => unmeasured(&failure.words()),
-        RunResult::Unusable(_) => unmeasured("gave values that are not those of an image"),
+        RunResult::Unusable(_) => unmeasured("gave values outside its range"),
     })
 }
 

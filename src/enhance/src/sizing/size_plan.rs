@@ -8,7 +8,7 @@
 use std::num::NonZeroUsize;
 
 use super::tiles::{Cutting, Seam, TilePlan, Tiling};
-use crate::conventions::sidecar::ModelSidecar;
+use crate::conventions::sidecar::{ADD, ModelSidecar};
 use crate::conventions::{Padding, Tile};
 use crate::failure::by;
 
@@ -161,7 +161,7 @@ fn cropping(size: [usize; 2], rule: SizeRule) -> Result<Cutting, NoPlan> {
     let tile = size.map(|side| side / rule.multiple * rule.multiple);
     if tile.contains(&0) {
         return Err(NoPlan::Other(format!(
-            "takes images whose sides are multiples of {} pixels, and {} is smaller than that",
+            "takes images whose sides are multiples of {} pixels, but {} is smaller; `pad = \"crop\"` does not pad it",
             rule.multiple,
             by(size)
         )));
@@ -219,7 +219,7 @@ fn fitting(size: [usize; 2], rule: SizeRule, context: usize) -> Cutting {
 
 fn too_small(cut: Cutting) -> String {
     format!(
-        "cannot be cut into tiles of {} pixels: with {} pixels of context on each side nothing is left of them; set larger ones with --llie-options tile=N, or export it for a larger size",
+        "cannot be cut into tiles of {} pixels: {} pixels of context on each side leave nothing; set larger tiles with --llie-options tile=N, or export it for a larger size",
         by(cut.tile),
         cut.context
     )
@@ -231,7 +231,7 @@ pub(crate) fn global(rule: SizeRule, size: [usize; 2], why: &str) -> String {
         .fixed
         .map(|side: Option<usize>| side.map_or("any".to_owned(), |side| side.to_string()));
     format!(
-        "takes images of {width} × {height} alone, and the image has {}; filling or cutting would change it, because {why}. Export the model with free sizes: torch.onnx.export(..., input_names=[\"input\"], output_names=[\"output\"], dynamic_axes={{\"input\": {{2: \"h\", 3: \"w\"}}, \"output\": {{2: \"h\", 3: \"w\"}}}}); or export it for images of {}; or let --llie-options resize resize each image to {width} × {height} and back, which blurs it and changes its brightness by some codes of 255",
+        "takes only images of {width} × {height}, but the image has {}; padding or tiling would change it, because {why}. Export it for any size: `torch.onnx.export(..., input_names=[\"input\"], output_names=[\"output\"], dynamic_axes={{\"input\": {{2: \"h\", 3: \"w\"}}, \"output\": {{2: \"h\", 3: \"w\"}}}})`, or for images of {}; or resize each image and back with --llie-options resize, which blurs it and changes its brightness by some codes of 255",
         by(size),
         by(size)
     )
@@ -256,7 +256,7 @@ pub(crate) fn seams_differ(
         return global(rule, size, &differ);
     }
     format!(
-        "cannot be cut: {differ}. Leave out --llie-options tile to enhance the whole image, or state more context (tile = \"exact:N\" in MODEL.onnx.toml)"
+        "cannot be tiled: {differ}. Leave out --llie-options tile to enhance the whole image, or {ADD} more context: `tile = \"exact:N\"`"
     )
 }
 
@@ -337,7 +337,7 @@ mod tests {
     fn tiles_without_room_for_their_context_are_refused() {
         let refused = SizePlan::new([100, 100], fixed([20, 20]), Tiling::Auto, 8);
         assert!(
-            matches!(refused, Err(NoPlan::Other(problem)) if problem.contains("nothing is left"))
+            matches!(refused, Err(NoPlan::Other(problem)) if problem.contains("leave nothing"))
         );
         let global = SizeRule {
             tile: Some(Tile::None),

@@ -2,6 +2,7 @@
 
 use super::texture::{CODES, texture};
 use super::tiles::TileWindow;
+use crate::conventions::sidecar::ADD;
 use crate::failure::{RunFailure, by};
 use crate::graphs::{Graph, RunResult};
 use darkqa_ground::error::Result;
@@ -28,10 +29,10 @@ impl TakenSizes {
     pub(crate) fn words(self) -> String {
         match self {
             Self::Multiple(multiple) => format!(
-                "by trial it takes images whose sides are multiples of {multiple}, to which others are filled; state it in MODEL.onnx.toml beside it: `multiple = {multiple}`"
+                "it takes only sides that are multiples of {multiple} pixels (found by trial), so other images are padded; to confirm, {ADD}: `multiple = {multiple}`"
             ),
             Self::Traced(size) => format!(
-                "its graph was traced for {} and takes no other size, so other images are filled or cut; state it in MODEL.onnx.toml beside it: `fixed = [{}, {}]`, or export it again without int(x.shape[..]) in its code",
+                "it was traced for {} and takes no other size, so other images are padded or tiled; export it without int(x.shape[..]) in its code, or {ADD}: `fixed = [{}, {}]`",
                 by(size),
                 size[1],
                 size[0]
@@ -160,7 +161,7 @@ pub(crate) fn not_found(failure: &RunFailure, search: &SizeSearch) -> String {
         .collect::<Vec<_>>()
         .join(", ");
     format!(
-        "{words}. The multiples {tried}{traced} were tried and do not help: export it for any size (dynamic_axes), without int(x.shape[..]) in its code, or for the size of the images"
+        "{words}. The multiples {tried}{traced} fail, too; export it with dynamic_axes and without int(x.shape[..]) in its code, or for the size of the images"
     )
 }
 

@@ -83,7 +83,7 @@ fn the_command_enhances_files_and_folders() {
     assert!(at("mended/c.json").is_file());
     let (code, out, _) = call(&["--describe"]);
     assert!(
-        code == 0 && out.contains("NCHW") && out.contains("usual"),
+        code == 0 && out.contains("NCHW") && out.contains("default, cannot be checked"),
         "{out}"
     );
     let rows = [

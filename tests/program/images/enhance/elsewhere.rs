@@ -147,7 +147,7 @@ fn each_unusable_image_is_named() {
         format!("missing: {}, {} (only ", name(0), name(1)),
         format!("{} (48×32, not 96×64)", name(2)),
         format!("{} (16 bits), {} (JPEG), {}", name(3), name(4), name(8)),
-        format!("copy it beside the enhanced one: {}", name(5)),
+        format!("copy it next to the enhanced one: {}", name(5)),
         format!("{} (other condition, drop)", name(6)),
         "8 of the 16 images of mine cannot be used; nothing was asked".to_owned(),
     ];

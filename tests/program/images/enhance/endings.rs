@@ -51,7 +51,7 @@ fn an_image_that_takes_too_long_is_an_error_and_others_go_on() {
         assert!(message.contains("longer than"), "{message}");
     }
     let message = enhancer.enhance(&dark).unwrap_err().to_string();
-    assert!(message.contains("is not run any more"), "{message}");
+    assert!(message.contains("is no longer run"), "{message}");
     assert_eq!(enhancer.sizes().too_long, 5);
 }
 
@@ -69,7 +69,7 @@ fn an_image_that_takes_too_much_memory_is_an_error_and_others_go_on() {
         assert!(message.contains("--llie-options max-memory"), "{message}");
     }
     let message = enhancer.enhance(&dark).unwrap_err().to_string();
-    assert!(message.contains("is not run any more"), "{message}");
+    assert!(message.contains("is no longer run"), "{message}");
     assert_eq!(enhancer.sizes().too_long, 0);
 }
 

@@ -124,7 +124,7 @@ fn a_batch_gets_the_image_several_times() {
     let batch = onnx::of_size(&onnx::blurred(), 3, [24, 32]);
     let (_folder, mut enhancer) = loaded(&batch);
     let described = enhancer.describe();
-    assert!(described.contains("given 3 times"), "{described}");
+    assert!(described.contains("repeated 3 times"), "{described}");
     let (_folder, mut single) = loaded(&onnx::blurred());
     let image = image(24, 32);
     assert_eq!(

@@ -90,7 +90,7 @@ fn a_number_that_does_not_fit_is_refused_with_its_type() {
         (
             Type::Float,
             "{ map = 2 }",
-            "it is a single number: `factor = NUMBER`",
+            "it takes a single number: `factor = NUMBER`",
         ),
     ];
     check_rows(rows, |(element, value, part)| {
@@ -257,7 +257,7 @@ fn what_a_sidecar_lacks_is_named_with_its_lines() {
     let rows = [
         (
             onnx::times_input(Type::Int, &one),
-            "`factor = NUMBER`, its authors' value",
+            "`factor = NUMBER` (as in the model's code)",
         ),
         (
             onnx::times_input(Type::Bool, &one),
@@ -265,7 +265,7 @@ fn what_a_sidecar_lacks_is_named_with_its_lines() {
         ),
         (
             onnx::two_inputs(),
-            "`exposure = 0.2`, as preset pairlie has it",
+            "`exposure = 0.2` (as in preset pairlie)",
         ),
         (onnx::times_plane("ratio"), "`ratio = { map = 5.0 }`"),
         (
@@ -293,12 +293,9 @@ fn what_a_sidecar_lacks_is_named_with_its_lines() {
 #[test]
 fn a_sidecar_that_contradicts_itself_is_refused() {
     let rows = [
-        (
-            "output = \"output\"\nimage = \"output\"",
-            "state image alone",
-        ),
-        ("channels = \"y\"", "leave that line out"),
-        ("[extra]\ngamma = 1", "not one of its further inputs"),
+        ("output = \"output\"\nimage = \"output\"", "delete `output`"),
+        ("channels = \"y\"", "delete that line"),
+        ("[extra]\ngamma = 1", "not an input besides the image"),
     ];
     check_rows(rows, |(sidecar, part)| {
         let message = fault_of(&onnx::identity(), sidecar);

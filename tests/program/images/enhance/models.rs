@@ -104,7 +104,7 @@ fn other_conventions_are_refused_by_name() {
             onnx::shaped(Type::Float, &[Named("n"), Named("c"), any[0], any[1]]),
             "layout_in",
         ),
-        (onnx::no_image(), "24 channels, and an image has 3"),
+        (onnx::no_image(), "24 channels, but an image has 3"),
         (onnx::two_inputs(), "exposure = 0.2"),
     ];
     check_rows(rows, |(graph, part)| {

@@ -1,4 +1,4 @@
-//! Models whose images cannot be enhanced images: in an evaluation, and examined by `enhance doctor`.
+//! Models whose images are implausible: in an evaluation, and examined by `enhance doctor`.
 
 use std::fs;
 use std::path::Path;
@@ -145,10 +145,7 @@ fn random_graphs_residuals_and_other_outputs_are_named() {
             onnx::light_map(),
             "`image = \"clip(input / max(output, 0.001), 0, 1)\"`",
         ),
-        (
-            onnx::light_beside(),
-            "and \"L\", which has the image's size",
-        ),
+        (onnx::light_beside(), "and \"L\" of the same size is not"),
     ] {
         let bench = bench(&graph, "");
         let called = ask(&bench, "");
@@ -246,7 +243,7 @@ fn images_without_colour_are_refused() {
 
 #[test]
 fn a_wrong_statement_is_found_too() {
-    let right = "model.onnx.toml beside it, in place of what is stated: `range_in = \"0..1\"` and `range_out = \"0..1\"`";
+    let right = "model.onnx.toml next to it, replacing the present values: `range_in = \"0..1\"` and `range_out = \"0..1\"`";
     for wrong in [
         "range_in = \"-1..1\"\nrange_out = \"-1..1\"\n",
         "range_in = \"0..255\"\nrange_out = \"0..255\"\n",
@@ -259,7 +256,7 @@ fn a_wrong_statement_is_found_too() {
         assert!(called.stderr.contains(right), "{wrong}: {called:?}");
         bench.call(&words("enhance --doctor model.onnx rooms --out doctor"));
         let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();
-        assert!(page.contains(" out, as stated"), "{wrong}");
+        assert!(page.contains(" out, as set"), "{wrong}");
     }
 }
 
@@ -292,13 +289,13 @@ fn the_doctor_finds_a_wrong_order_of_colours_beside_stated_ranges() {
     assert!(
         called
             .stderr
-            .contains("in place of what is stated: `color_out = \"rgb\"`"),
+            .contains("replacing the present values: `color_out = \"rgb\"`"),
         "{called:?}"
     );
     let called = bench.call(&words("enhance --doctor model.onnx rooms --out doctor"));
     assert_eq!(called.code, Some(0), "{called:?}");
     let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();
-    assert!(page.contains("as stated") && page.contains("RGB in the output"));
+    assert!(page.contains("as set") && page.contains("RGB in the output"));
     assert!(
         called.stdout.contains("color_out = \"rgb\"") && !called.stdout.contains("range_in = "),
         "{called:?}"
@@ -334,7 +331,7 @@ fn the_doctor_proposes_a_sidecar_that_mends_the_model() {
             bench.file("model.onnx.toml", wrong);
             bench.call(&words("enhance --doctor model.onnx rooms --out wrong"));
             let page = fs::read_to_string(bench.path("wrong/doctor.html")).unwrap();
-            assert!(page.contains("0..255 in and -1..1 out, as stated"));
+            assert!(page.contains("0..255 in and -1..1 out, as set"));
             bench.file("model.onnx.toml", proposed);
         }
         if settled {
@@ -343,7 +340,12 @@ fn the_doctor_proposes_a_sidecar_that_mends_the_model() {
             // What is stated needs no other line.
             let again = bench.call(&words(line));
             assert_eq!(again.code, Some(0), "{again:?}");
-            assert!(again.stdout.contains("no sidecar is written"), "{again:?}");
+            assert!(
+                again
+                    .stdout
+                    .contains("not written, because no line is proposed"),
+                "{again:?}"
+            );
             // A sidecar is never replaced.
             bench.file("model.onnx.toml", "# mine");
             let again = bench.call(&words(line));

@@ -113,9 +113,9 @@ fn a_stated_output_is_taken_where_it_can_be_an_image() {
     // With a single output, any index is that one.
     assert_eq!(stated(&outputs[1..2], index(3)), Ok("2".into()));
     for (choice, part) in [
-        (index(3), "does not have"),
-        (OutputChoice::Name("x".into()), "does not have"),
-        (index(2), "not one of its image outputs"),
+        (index(3), "does not exist"),
+        (OutputChoice::Name("x".into()), "does not exist"),
+        (index(2), "is not an image"),
     ] {
         let message = stated(&outputs, choice).unwrap_err();
         assert!(message.contains(part), "{message}");
@@ -200,7 +200,7 @@ fn further_numbers_need_values() {
     let known = [image("x"), port("exposure", &[])];
     let message = signature(&known, &[image("y")]).unwrap_err();
     assert!(
-        message.contains("`exposure = 0.2`, as preset pairlie has it"),
+        message.contains("`exposure = 0.2` (as in preset pairlie)"),
         "{message}"
     );
     let switch = [image("x"), typed(ElementType::Bool, port("on", &[1]))];
@@ -216,7 +216,7 @@ fn further_numbers_need_values() {
     assert!(message.contains("its value is unknown"), "{message}");
     let message = given("[extra]\nstrength = 1\ngamma = 1").unwrap_err();
     assert!(
-        message.contains("\"gamma\", which is not one of its further inputs"),
+        message.contains("\"gamma\" under [extra], which is not an input"),
         "{message}"
     );
 }
@@ -251,12 +251,12 @@ fn further_inputs_take_what_fits_them() {
         (port("a", &[0, 0]), "{ map = 0.5 }", None),
         (small(plane()), "{ map = 0.5 }", Some("type int32")),
         (port("a", &[1, 4, 0, 0]), noise, None),
-        (small(plane()), noise, Some("export it with floats")),
+        (small(plane()), noise, Some("export it as float32")),
         (plane(), "{ from = \"max(image)\" }", None),
         (
             plane(),
             "{ from = \"1 - image\" }",
-            Some("max(…) or mean(…)"),
+            Some("mean(…) or max(…)"),
         ),
         (port("a", &[1, 3, 0, 0]), "{ from = \"1 - image\" }", None),
         (
@@ -267,7 +267,7 @@ fn further_inputs_take_what_fits_them() {
         (
             port("a", &[5, 1, 0, 0]),
             "{ map = 1 }",
-            Some("a dimension of 5"),
+            Some("dimension of 5"),
         ),
     ];
     for (further, value, problem) in rows {
@@ -298,7 +298,7 @@ fn what_a_further_input_may_be_is_told_by_its_shape_and_name() {
         (port("gray.1", &[1, 1, 0, 0]), "`\"gray.1\" = { from ="),
         (
             typed(ElementType::Other("string".into()), port("s", &[])),
-            "whose type is not supported",
+            "an unsupported type",
         ),
     ] {
         let name = further.to_string();
@@ -323,7 +323,7 @@ fn an_expression_of_the_image_names_outputs() {
     assert_eq!(read("L ^ 0.2 * R"), Ok(vec!["L".into(), "R".into()]));
     assert_eq!(read("R + 0 * input"), Ok(vec!["R".into()]));
     for (text, part) in [
-        ("L * Q", "names `Q`, which is not there"),
+        ("L * Q", "names `Q`, which is unknown"),
         ("c * R", "not an image of one or three channels"),
         ("input * 2", "names none of its outputs"),
     ] {
@@ -342,26 +342,29 @@ fn one_channel_must_be_stated_to_be_the_luma() {
     let found = stated("channels = \"y\"").unwrap();
     assert_eq!(found.input.layout, TensorLayout::Nchw);
     let message = stated("channels = \"y\"\nmean = [0, 0, 1]").unwrap_err();
-    assert!(message.contains("three different numbers"), "{message}");
+    assert!(message.contains("has different numbers"), "{message}");
     let colour = Signature::infer(&[image("a")], &outputs, &sidecar("channels = \"y\""));
-    assert!(colour.unwrap_err().contains("leave that line out"));
+    assert!(colour.unwrap_err().contains("delete that line"));
 }
 
 #[test]
 fn other_conventions_are_refused_by_name() {
     let double = typed(ElementType::Float64, image("double"));
     let cases = [
-        (vec![], "no image among its inputs; it has none"),
+        (
+            vec![],
+            "no input that can be an image; export it with an input of [1, 3, height, width]; inputs: none",
+        ),
         (vec![image("a"), image("b")], "\"b\" (float32 [1, 3, n, n])"),
         (vec![double], "float64"),
         (vec![port("a", &[2, 3, 0, 0])], "several images"),
-        (vec![port("a", &[])], "without dimensions"),
+        (vec![port("a", &[])], "without a shape"),
         (
             vec![port("a", &[1, 4, 0, 0])],
-            "4 channels, and an image has 3",
+            "4 channels, but an image has 3",
         ),
         (vec![port("a", &[1, 2, 3, 64, 64])], "several frames"),
-        (vec![port("a", &[1, 85])], "flat values"),
+        (vec![port("a", &[1, 85])], "a vector"),
     ];
     for (inputs, part) in cases {
         let message = signature(&inputs, &[image("out")]).unwrap_err();
@@ -377,5 +380,5 @@ fn a_model_without_an_image_is_refused() {
         message.contains("\"758\" (float32 [1, 85, 22, 22])"),
         "{message}"
     );
-    assert!(choose(&[]).unwrap_err().ends_with("it has none"));
+    assert!(choose(&[]).unwrap_err().ends_with("outputs: none"));
 }

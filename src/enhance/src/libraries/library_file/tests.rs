@@ -95,7 +95,7 @@ fn whole_libraries_pass_and_every_cut_is_seen() {
         let whole = library.len();
         for length in [whole - 1, whole - 50, 150, 60, 30, 8, 0] {
             let problem = check(format, &library[..length]).unwrap_err();
-            let expected = format!("is cut short: {length} ");
+            let expected = format!("is incomplete: {length} ");
             assert!(problem.starts_with(&expected), "{format:?}: {problem}");
         }
         let problem = check(format, &library[..whole - 1]).unwrap_err();
@@ -134,6 +134,6 @@ fn sizes_beyond_every_file_are_no_panic() {
         let mut library = elf(ENTRY);
         library[at..at + 8].copy_from_slice(&u64::MAX.to_le_bytes());
         let problem = check(LibraryFormat::Elf, &library).unwrap_err();
-        assert!(problem.contains("is cut short"), "{problem}");
+        assert!(problem.contains("is incomplete"), "{problem}");
     }
 }

@@ -42,7 +42,7 @@ impl Found {
     /// The ranges that are stated are plausible.
     pub(super) fn stated(pair: RangePair) -> Self {
         let conclusion = format!(
-            "With {pair}, as its sidecar, its preset or its types state, its images can be enhanced images."
+            "With {pair}, as set by MODEL.onnx.toml, the preset or the element types, its images are plausible."
         );
         Self {
             settled: Settled::Yes,
@@ -58,7 +58,7 @@ impl Found {
         }
         plausible.extend(others.iter().map(String::as_str));
         Self::nothing(format!(
-            "Which output is the image is not stated, and cannot be found: plausible are {}. State the one that its authors use, `output = \"NAME\"`, or name their preset.",
+            "It is unknown which output is the image; plausible: {}. Choose one in MODEL.onnx.toml next to it, `output = \"NAME\"`, or name its preset (PRESET:FILE).",
             if plausible.is_empty() {
                 "none".to_owned()
             } else {
@@ -70,13 +70,13 @@ impl Found {
     /// Names the other outputs whose images could be enhanced ones.
     pub(super) fn mention(&mut self, others: &[String]) {
         for output in others {
-            let found = " gives plausible images: check which output its authors use.";
+            let found = " gives plausible images, too; check which one the model's code uses.";
             self.conclusion += &[" The ", output, found].concat();
         }
     }
 
     fn ranges(pair: RangePair, conclusion: String) -> Self {
-        let reason = "the only value ranges with which its images can be enhanced images";
+        let reason = "with these value ranges its images are plausible";
         let lines = pair.lines().into_iter().map(|line| ProposedLine {
             line,
             reason: reason.to_owned(),
@@ -106,18 +106,17 @@ pub(super) fn propose(
                 .map(ToString::to_string)
                 .collect();
             return Found::nothing(format!(
-                "With {} its images can be enhanced images: a run assumes these usual ranges and says so. They can with {} too; compare them below with the model's own examples.",
+                "With {} its images are plausible; a run assumes these usual ranges and warns. They are with {}, too; compare the page with the model's own examples.",
                 probe.usual,
                 others.join("; ")
             ));
         }
         [pair] => {
             let stated = stated.map_or_else(String::new, |stated| {
-                format!(" Stated are {stated}, with which they cannot.")
+                format!(" With {stated}, as set, they are not.")
             });
-            let conclusion = format!(
-                "With {pair}, and with no other ranges, its images can be enhanced images.{stated}"
-            );
+            let conclusion =
+                format!("With {pair}, and with no other ranges, its images are plausible.{stated}");
             return Found::ranges(*pair, conclusion);
         }
         [] => {}
@@ -125,16 +124,16 @@ pub(super) fn propose(
             let list: Vec<String> = several.iter().map(ToString::to_string).collect();
             if let Some(pair) = probe.likeliest() {
                 let conclusion = format!(
-                    "With {pair} its images can be enhanced images, and black and white come out nearest to themselves. Other plausible ranges: {}.",
+                    "With {pair} its images are plausible, and black and white change least. Other plausible ranges: {}.",
                     list[1..].join("; ")
                 );
                 return Found::ranges(pair, conclusion);
             }
             let stated = stated.map_or_else(String::new, |pair| {
-                format!(" {pair}, which is stated, is not one of them.")
+                format!(" {pair}, as set, is not one of them.")
             });
             return Found::nothing(format!(
-                "Its images can be enhanced images with several value ranges: {}.{stated} Compare them below with the model's own examples, and state those that its authors use.",
+                "Its images are plausible with several value ranges: {}.{stated} Compare the page with the model's own examples, and set the ranges of its code.",
                 list.join("; ")
             ));
         }
@@ -151,7 +150,7 @@ pub(super) fn propose(
     if let Some(pair) = pair.filter(|_| is_hue) {
         let order_of_input = order.to_string().to_lowercase();
         let conclusion = format!(
-            "With {pair} and {order} in the output its images can be enhanced images; or in the input: `color = \"{order_of_input}\"` and the other order for `color_out`."
+            "With {pair} and {order} in the output its images are plausible; or with it in the input: `color = \"{order_of_input}\"` and the other order for `color_out`."
         );
         let mut found = Found::ranges(pair, conclusion);
         if stated == Some(pair) {
@@ -164,6 +163,6 @@ pub(super) fn propose(
         return found;
     }
     Found::nothing(
-        "With none of the conventions of the output that is read its images can be enhanced images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
+        "No value range or colour order gives plausible images. Perhaps another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
     )
 }
