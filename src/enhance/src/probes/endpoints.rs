@@ -1,8 +1,8 @@
 //! Output of a model for black and for white: [`Endpoints`].
 
 use super::plausible::Codes;
-use super::probe_run::made;
 use super::range_pair::RangePair;
+use super::trial_images::made;
 use crate::conventions::sidecar::ModelSidecar;
 use crate::enhancer::Enhancer;
 use darkqa_ground::error::Result;

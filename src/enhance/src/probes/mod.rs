@@ -8,6 +8,7 @@ mod plausible;
 mod probe;
 mod probe_run;
 mod range_pair;
+mod trial_images;
 mod usage;
 
 pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};

@@ -4,11 +4,12 @@ use super::findings::warn_of_untried;
 use super::plausible::Codes;
 use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, Ranges};
 use super::range_pair::RangePair;
+use super::trial_images::made;
 use super::usage::{ImageUse, Implausible, Seen, way_out};
 use crate::conventions::sidecar::{self, ADD, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
 use crate::enhancer::Enhancer;
-use crate::graphs::{Graph, RunResult};
+use crate::graphs::Graph;
 use crate::outputs::in_expression;
 use crate::planes::Planes;
 use darkqa_ground::error::Result;
@@ -59,18 +60,18 @@ impl Enhancer {
             (Some(problem), ..) => tracing::warn!("{}: {problem}", self.name()),
             (None, ..) => {}
         }
-        if problem.is_none() {
-            let remark = match self.remark_on_endpoints(probe.usual)? {
-                None => self.remark_on_name(),
-                remark => remark,
-            };
-            if let Some(remark) = remark {
-                self.remark(&remark);
-            }
+        let no_image = match &problem {
+            Some(_) => None,
+            None => self
+                .remark_on_endpoints(probe.usual)?
+                .or_else(|| self.remark_on_name()),
+        };
+        if let Some(remark) = &no_image {
+            self.remark(remark);
         }
         self.warn_of_remarks();
         if probe.conclusion() == Conclusion::Assumed {
-            self.warn_of_assumed(probe.usual);
+            self.warn_of_assumed(probe.usual, no_image.is_none());
         }
         let note = ProbeNote {
             frames: dark.len(),
@@ -254,12 +255,14 @@ impl Enhancer {
         Ok(())
     }
 
-    /// Says that nothing states the value ranges.
-    fn warn_of_assumed(&self, usual: RangePair) {
-        let words = format!(
-            "value ranges of {usual} assumed, because nothing sets them; its images of dark frames are plausible. To confirm, {ADD}: {}",
-            usual.stated()
+    /// Warns that nothing states the value ranges. Lines that confirm them are proposed if the output seems to be the image.
+    fn warn_of_assumed(&self, usual: RangePair, is_image: bool) {
+        let mut words = format!(
+            "value ranges of {usual} assumed, because nothing sets them; its images of dark frames are plausible"
         );
+        if is_image {
+            words += &format!(". To confirm, {ADD}: {}", usual.stated());
+        }
         let words = sidecar::named(&words, self.path());
         tracing::warn!("{}: {words}", self.name());
     }
@@ -285,27 +288,4 @@ impl Enhancer {
             .to_rgb(Rounding::Round)
             .ok_or_else(|| self.fault("a frame of the probe has no pixel"))
     }
-}
-
-/// Outputs of a model for each frame, read by each of these graphs, which share the input; `None` if it fails on a frame.
-pub(super) fn made(graphs: &[Graph], frames: &[Rgb]) -> Result<Option<Vec<Vec<Codes>>>> {
-    let mut all = vec![Vec::with_capacity(frames.len()); graphs.len()];
-    let Some(graph) = graphs.first() else {
-        return Ok(Some(all));
-    };
-    for frame in frames {
-        graph.restart_clock();
-        let readings = match graph.readings(frame, graphs)? {
-            RunResult::Output(readings) => readings,
-            RunResult::Failed(_) => return Ok(None),
-            // The rules about plausible images name it.
-            RunResult::Unusable(_) => {
-                vec![Codes::unusable([frame.height(), frame.width()]); graphs.len()]
-            }
-        };
-        for (made, codes) in all.iter_mut().zip(readings) {
-            made.push(codes);
-        }
-    }
-    Ok(Some(all))
 }
