@@ -1,5 +1,6 @@
 //! A site about many runs: [`site`]. Each run has the page of its report, and rows in a table with the runs that it can be compared with.
 
+mod choice_member;
 mod group_key;
 mod ranking;
 
@@ -14,24 +15,14 @@ use super::whole_report::without_hidden_models;
 use crate::error::{Error, Result};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::products::{PAGE, products};
-use crate::report::site::{
-    ChoiceRow, GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows,
-};
+use crate::report::site::{GroupRows, OpenRow, RunLink, Site, SiteGroup, choice_rows, open_rows};
 use crate::runs::stored::{AnyRun, StoredRun};
 use crate::types::manifests::RunManifest;
-use crate::types::{ChoiceDetail, OpenDetail, RunQuestion, Trials, Truths, Variant};
+use crate::types::{ChoiceDetail, OpenDetail, Trials, Truths, Variant};
 
+use choice_member::ChoiceMember;
 use group_key::{GroupKey, group_members};
 use ranking::ranked_rows;
-
-/// A run of questions with choices: its rows, and the trials by which models are compared.
-struct ChoiceMember {
-    key: GroupKey,
-    run: RunLink,
-    rows: Vec<ChoiceRow>,
-    trials: Trials<ChoiceDetail>,
-    questions: Vec<RunQuestion>,
-}
 
 /// A run of open questions, with its rows.
 struct OpenMember {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::ChoiceMember;
+use super::choice_member::ChoiceMember;
 use crate::report::site::{ChoiceRow, GroupRows, Ranking};
 use crate::run_reports::combine::clusters;
 use crate::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};

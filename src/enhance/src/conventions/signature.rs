@@ -64,7 +64,10 @@ impl Signature {
         let extras = inputs
             .iter()
             .filter(|port| port.name != image.name)
-            .map(|port| FurtherInput::new(port, convention.extra.get(&port.name), &input))
+            .map(|port| {
+                let value = convention.extra.get(&port.name);
+                FurtherInput::new(port, value, layout, input.takes_any_side())
+            })
             .collect::<Result<Vec<_>, String>>()?;
         let mut stated = convention.extra.keys();
         if let Some(name) =

@@ -4,7 +4,7 @@ use super::fed_image::FedImage;
 use super::noise;
 use super::tensor::{Tensor, TensorData};
 use crate::conventions::sidecar::ADD;
-use crate::conventions::{ElementType, ExtraValue, ImageInput, TensorLayout, preset};
+use crate::conventions::{ElementType, ExtraValue, TensorLayout, preset};
 use crate::graphs::{Dim, Port};
 
 /// An input in addition to the image, with its value.
@@ -88,12 +88,13 @@ impl FurtherInput {
     pub(crate) fn new(
         port: &Port,
         value: Option<&ExtraValue>,
-        image: &ImageInput,
+        image: TensorLayout,
+        image_takes_any_side: bool,
     ) -> Result<Self, String> {
-        let places = Places::for_port(port, image.layout);
+        let places = Places::for_port(port, image);
         if let Some(places) = places
             && places.are_fixed(port)
-            && image.takes_any_side()
+            && image_takes_any_side
         {
             return Err(format!(
                 "takes {port} in addition to the image, a tensor of a fixed size that is not the image's; export the model with its values as constants"

@@ -1,15 +1,10 @@
 //! Output of a model for black and for white: [`Endpoints`].
 
 use super::plausible::Codes;
-use super::range_pair::RangePair;
-use super::trial_images::made;
-use crate::conventions::sidecar::ModelSidecar;
-use crate::enhancer::Enhancer;
-use darkqa_ground::error::Result;
 use darkqa_ground::types::Rgb;
 
 /// Height and width of the image of black and white, in pixels, where the model takes any: that of the first frames of the probe.
-const SIZE: [usize; 2] = [96, 144];
+pub(super) const SIZE: [usize; 2] = [96, 144];
 
 /// Mean output of a model for black and for white, in codes of 0..255.
 ///
@@ -25,7 +20,7 @@ pub(super) struct Endpoints {
 
 impl Endpoints {
     /// The means of an output for [`black_and_white`], away from the edge between the halves and from the border.
-    fn from_codes(codes: &Codes) -> Self {
+    pub(super) fn from_codes(codes: &Codes) -> Self {
         let Codes { height, width, .. } = *codes;
         let rows = height / 4..(height - height / 4).max(1);
         let half = width / 2;
@@ -57,32 +52,12 @@ impl Endpoints {
 
 /// An image whose left half is black and whose right half is white, so that models that stretch an image to its darkest and brightest
 /// pixel do so.
-fn black_and_white([height, width]: [usize; 2]) -> Rgb {
+pub(super) fn black_and_white([height, width]: [usize; 2]) -> Rgb {
     let mut image = Rgb::black(height, width);
     for row in image.samples_mut().chunks_exact_mut(3 * width) {
         row[3 * (width / 2)..].fill(u8::MAX);
     }
     image
-}
-
-impl Enhancer {
-    /// The output for black and white by a convention with these ranges; `None` if the model fails on the image or its output has values
-    /// that are not finite.
-    ///
-    /// # Errors
-    /// If the runtime fails.
-    pub(super) fn endpoints(
-        &self,
-        convention: &ModelSidecar,
-        ranges: RangePair,
-    ) -> Result<Option<Endpoints>> {
-        let graph = self.read_by(convention, ranges)?;
-        let image = black_and_white(self.probe_size(SIZE));
-        let made = made(&[graph], &[image])?;
-        let codes = made.into_iter().flatten().flatten().next();
-        let endpoints = codes.as_ref().map(Endpoints::from_codes);
-        Ok(endpoints.filter(|endpoints| endpoints.distance.is_finite()))
-    }
 }
 
 #[cfg(test)]

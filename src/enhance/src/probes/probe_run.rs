@@ -1,5 +1,6 @@
 //! Running the probe of a model on dark frames: [`Enhancer::probe`].
 
+use super::endpoints::{self, Endpoints, black_and_white};
 use super::findings::warn_of_untried;
 use super::plausible::Codes;
 use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, Ranges};
@@ -265,6 +266,24 @@ impl Enhancer {
         }
         let words = sidecar::named(&words, self.path());
         tracing::warn!("{}: {words}", self.name());
+    }
+
+    /// The output for black and white by a convention with these ranges; `None` if the model fails on the image or its output has values
+    /// that are not finite.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn endpoints(
+        &self,
+        convention: &ModelSidecar,
+        ranges: RangePair,
+    ) -> Result<Option<Endpoints>> {
+        let graph = self.read_by(convention, ranges)?;
+        let image = black_and_white(self.probe_size(endpoints::SIZE));
+        let made = made(&[graph], &[image])?;
+        let codes = made.into_iter().flatten().flatten().next();
+        let endpoints = codes.as_ref().map(Endpoints::from_codes);
+        Ok(endpoints.filter(|endpoints| endpoints.distance.is_finite()))
     }
 
     /// The model, fed and read by a convention with these ranges.
