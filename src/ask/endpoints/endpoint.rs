@@ -262,6 +262,7 @@ impl Endpoint {
                 return Err(failed.with_attempts(attempts, lost));
             };
             avoided.clear();
+            failed_over = None;
             let base = self.replicas[turn.replica].base();
             let problem = &failed.failure.message;
             // Warn before the retries, which take a minute: the address may be mistyped.

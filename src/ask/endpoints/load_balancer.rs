@@ -21,6 +21,8 @@ const FIRST_BACKOFF: Duration = Duration::from_secs(5);
 
 /// Maximum time for which a replica is not used; chosen.
 const MAX_BACKOFF: Duration = Duration::from_mins(1);
+/// Longest wait stated by a replica that is kept; any longer one outlasts a run, and the clock cannot add all of them.
+const MAX_STATED_WAIT: Duration = Duration::from_hours(365 * 24);
 
 /// Load balancer over the replicas of an endpoint. Health and load are common to all models; a replica can be excluded for one model.
 #[derive(Debug)]
@@ -278,7 +280,7 @@ impl LoadBalancer {
         let replica = &mut state.replicas[index];
         // A limit per day or hour: other replicas may not have reached theirs.
         if let (Reach::Endpoint, Some(429), Some(wait)) = (failed.reach, status, failed.wait) {
-            replica.health = Health::BackoffUntil(now + wait);
+            replica.health = Health::BackoffUntil(now + wait.min(MAX_STATED_WAIT));
             return Failover::to_other_replica_if(state.any_accepts(model, |_| true));
         }
         let kind = failed.failure.kind;

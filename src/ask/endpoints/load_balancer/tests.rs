@@ -62,6 +62,19 @@ async fn requests_about_one_image_share_a_replica_within_the_load_limit() {
     );
 }
 
+#[tokio::test(start_paused = true)]
+async fn an_endless_stated_wait_is_no_panic() {
+    let all = new_balancer(2);
+    let limited = AskError {
+        wait: Some(Duration::MAX),
+        ..failed(FailureKind::RateLimit, Some(429), Reach::Endpoint)
+    };
+    assert_eq!(all.record_failure(ONE, 0, &limited), Failover::OtherReplica);
+    for image in 0..100 {
+        assert_eq!(choose(&all, image), 1);
+    }
+}
+
 #[test]
 fn removing_a_replica_moves_only_its_images() {
     let best = |affinity, replicas: &[usize]| {
