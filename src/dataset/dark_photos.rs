@@ -79,7 +79,7 @@ impl DarkField {
             };
             if let Some(ev) = ev.filter(|ev| !(ev.is_finite() && *ev > 0.0 && *ev <= 30.0)) {
                 return Err(format!(
-                    "dark {name}: an ev of {ev}; a number above 0 expected, the stops by which it was exposed darker than rgb"
+                    "dark {name}: an ev of {ev}; a number above 0, at most 30, expected, the stops by which it was exposed darker than rgb"
                 ));
             }
             if !names.insert(name.clone()) {
@@ -143,8 +143,9 @@ mod tests {
             (r#""high/0.png""#, "no such file"),
             (
                 r#"{"path":"low/0.png","ev":-2}"#,
-                "an ev of -2; a number above 0 expected",
+                "an ev of -2; a number above 0, at most 30, expected",
             ),
+            (r#"{"path":"low/0.png","ev":31}"#, "an ev of 31"),
             (
                 r#"{"path":"low/0.png","name":"L3-ev"}"#,
                 "not a valid name of a dark photograph",

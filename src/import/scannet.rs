@@ -242,7 +242,11 @@ fn intrinsics_file(folder: &Path, camera: &str) -> Option<PathBuf> {
 /// Reads the intrinsics in a file with a 4 × 4 matrix.
 fn read_intrinsics(path: &Path) -> Result<Intrinsics> {
     match read_numbers(path)?[..] {
-        [fx, _, cx, _, _, fy, cy, ..] => Ok(Intrinsics { fx, fy, cx, cy }),
+        [fx, _, cx, _, _, fy, cy, ..] if fx > 0.0 && fy > 0.0 => Ok(Intrinsics { fx, fy, cx, cy }),
+        [fx, _, _, _, _, fy, _, ..] => Err(Error::data(
+            path.display(),
+            format_args!("focal lengths of {fx} and {fy} pixels; numbers above 0 expected"),
+        )),
         _ => Err(Error::data(path.display(), "a 4 × 4 matrix expected")),
     }
 }
@@ -398,5 +402,21 @@ mod tests {
             Some([camera(1.0, 1.0), camera(3.0, 2.0)]),
         );
         assert_eq!(found.into_raw_vec_and_offset().0, [0, 3, 0]);
+    }
+
+    #[test]
+    fn focal_lengths_must_be_positive() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("intrinsic_color.txt");
+        for (fx, is_read) in [
+            ("577.87", true),
+            ("0", false),
+            ("-1", false),
+            ("nan", false),
+        ] {
+            let matrix = format!("{fx} 0 319.5 0\n0 577.87 239.5 0\n0 0 1 0\n0 0 0 1\n");
+            std::fs::write(&path, matrix).unwrap();
+            assert_eq!(read_intrinsics(&path).is_ok(), is_read, "{fx}");
+        }
     }
 }
