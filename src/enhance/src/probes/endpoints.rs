@@ -18,7 +18,15 @@ pub(super) struct Endpoints {
     pub(super) distance: f64,
 }
 
+/// Largest distance of black and white from themselves, in codes, at which they count as near. Chosen.
+const NEAR: f64 = 50.0;
+
 impl Endpoints {
+    /// Whether black and white stay near to themselves.
+    pub(super) fn are_near(self) -> bool {
+        self.distance <= NEAR
+    }
+
     /// The means of an output for [`black_and_white`], away from the edge between the halves and from the border.
     pub(super) fn from_codes(codes: &Codes) -> Self {
         let Codes { height, width, .. } = *codes;

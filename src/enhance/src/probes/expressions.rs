@@ -20,7 +20,8 @@ const EXPRESSIONS: [(&str, &str); 5] = [
     ("input + OUTPUT", "a residual"),
     ("input - OUTPUT", "a residual"),
     ("input * OUTPUT", "a gain"),
-    ("clip(input / max(OUTPUT, 0.001), 0, 1)", "a light map"),
+    // Without a clip, so that an output of small noise gives values out of range.
+    ("input / max(OUTPUT, 0.001)", "a light map"),
     ("1 - OUTPUT", "the negative"),
 ];
 

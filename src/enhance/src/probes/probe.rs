@@ -21,10 +21,6 @@ const NONE_FITS: &str =
 /// Placeholder for the output that is read, in the remedy for a flaw.
 pub(super) const OUTPUT: &str = "OUTPUT";
 
-/// Largest distance of black and white from themselves, in codes, at which a pair with a mean and a deviation is advised. Chosen: trained
-/// models are at most 20 off in their true ranges.
-const NEAR: f64 = 50.0;
-
 /// By how many codes black and white must be nearer to themselves with one pair than with the next for it to be advised alone. Chosen.
 const CLEAR: f64 = 25.0;
 
@@ -64,7 +60,7 @@ impl PairTrial {
 
     /// Whether black and white stay near to themselves.
     pub(super) fn is_near(&self) -> bool {
-        self.distance() <= NEAR
+        self.endpoints.is_some_and(Endpoints::are_near)
     }
 
     /// The ranges, and what black and white become with them, if it was measured.

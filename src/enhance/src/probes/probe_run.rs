@@ -14,8 +14,8 @@ use crate::graphs::Graph;
 use crate::outputs::in_expression;
 use crate::planes::Planes;
 use darkqa_ground::error::Result;
-use darkqa_ground::types::Rgb;
 use darkqa_ground::types::manifests::{ProbeNote, ProbeOutcome};
+use darkqa_ground::types::{Flaw, Rgb};
 
 /// Sizes that are tried one after another, longer and shorter side in pixels: most multiples that models need divide one of them.
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
@@ -91,9 +91,11 @@ impl Enhancer {
             Conclusion::Implausible(seen) | Conclusion::Doubtful(seen)
                 if !self.follows_preset() =>
             {
-                let better = match self.better_lines(dark)? {
-                    None => self.better_expression(dark, seen.example.flaw)?,
-                    lines => lines,
+                let better = match (self.better_lines(dark)?, seen.example.flaw) {
+                    // Noise, as of random weights, is no residual and no map.
+                    (None, Flaw::Shuffled) => None,
+                    (None, flaw) => self.better_expression(dark, flaw)?,
+                    (lines, _) => lines,
                 };
                 better.map(|better| format!("{seen}. {better}"))
             }
@@ -195,7 +197,7 @@ impl Enhancer {
             });
             let usual_pair = probes[0].usual_pair();
             if usual_pair.is_none_or(|pair| pair.verdict().is_some()) {
-                if self.may_be_normalised(input) {
+                if !self.is_dim(&probes[0], conventions[0])? && self.may_be_normalised(input) {
                     let pairs = RangePair::normalised(input, output);
                     for fed_alike in pairs.chunk_by(|a, b| a.input == b.input) {
                         // The sizes are those of the plain ranges, so what fails here is no reason to try others.
@@ -212,6 +214,16 @@ impl Enhancer {
             return Ok(Some(Trials { frames, probes }));
         }
         Ok(None)
+    }
+
+    /// Whether the images in the usual ranges are merely dim: not brighter, but with black and white near to themselves.
+    fn is_dim(&self, probe: &Probe, convention: &ModelSidecar) -> Result<bool> {
+        let verdict = probe.usual_pair().and_then(PairTrial::verdict);
+        if verdict.is_none_or(|seen| seen.example.flaw != Flaw::Unlit) {
+            return Ok(false);
+        }
+        let endpoints = self.endpoints(convention, probe.usual)?;
+        Ok(endpoints.is_some_and(Endpoints::are_near))
     }
 
     /// Images of the frames by each of these conventions, with each pair of ranges. The model runs once for each frame and input range.
@@ -258,12 +270,14 @@ impl Enhancer {
 
     /// Warns that nothing states the value ranges. Lines that confirm them are proposed if the output seems to be the image.
     fn warn_of_assumed(&self, usual: RangePair, is_image: bool) {
-        let mut words = format!(
-            "value ranges of {usual} assumed, because nothing sets them; its images of dark frames are plausible"
+        let lines = if is_image {
+            format!(". To confirm, {ADD}: {}", usual.stated())
+        } else {
+            String::new()
+        };
+        let words = format!(
+            "value ranges of {usual} assumed, because nothing sets them; its images of dark frames are plausible{lines}"
         );
-        if is_image {
-            words += &format!(". To confirm, {ADD}: {}", usual.stated());
-        }
         let words = sidecar::named(&words, self.path());
         tracing::warn!("{}: {words}", self.name());
     }
