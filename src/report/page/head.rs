@@ -12,6 +12,7 @@ use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{Effect, Finding, FindingGroups};
+use crate::sentences::capitalised;
 
 /// Half the width of a mark's drawing, in its own units; the largest interval end of all rows is drawn there.
 const MARK_REACH: f64 = 50.0;
@@ -68,6 +69,16 @@ impl PageHead {
         }))
     }
 
+    /// The summary alone.
+    pub(in crate::report) fn of_summary(summary: &str) -> Self {
+        Self {
+            summary: unbroken(summary),
+            chart: None,
+            rows: Vec::new(),
+            strip: None,
+        }
+    }
+
     /// The summary and the findings alone.
     pub(in crate::report) fn without_images(groups: &FindingGroups<'_>) -> Self {
         let first = groups.first();
@@ -77,15 +88,18 @@ impl PageHead {
             .flat_map(|[_, low, high]| [low.abs(), high.abs()])
             .fold(1.0, f64::max);
         Self {
-            summary: groups.summary(),
-            chart: None,
             rows: first
                 .iter()
                 .map(|(group, finding)| FindingRow::new(group, finding, reach))
                 .collect(),
-            strip: None,
+            ..Self::of_summary(&groups.summary())
         }
     }
+}
+
+/// A text in which no line ends between a number and its percent sign.
+fn unbroken(text: &str) -> String {
+    text.replace(" %", "\u{a0}%")
 }
 
 /// The difference of a finding with the ends of its interval, in points.
@@ -108,7 +122,10 @@ impl FindingRow {
             group,
             class: tone.class(),
             sign: tone.sign(),
-            text: finding.text(),
+            text: unbroken(&match finding.shown().scope.light {
+                Some(_) => capitalised(&finding.text()),
+                None => finding.text(),
+            }),
             effect,
             at: at.map_or_else(String::new, |at| format!("at {at}")),
             in_other_lights: others.iter().map(ToString::to_string).collect(),
@@ -148,6 +165,11 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
 mod tests {
     use super::*;
     use crate::sentences::{Scope, Sentence, Tone};
+
+    #[test]
+    fn a_percent_sign_stays_with_its_number() {
+        assert_eq!(unbroken("from 90.6 % at L0"), "from 90.6\u{a0}% at L0");
+    }
 
     #[test]
     fn marks_share_one_scale() {
