@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{Effect, Finding, FindingGroups};
 use crate::sentences::capitalised;
+use crate::tables::first_to_fail;
 
 /// Half the width of a mark's drawing, in its own units; the largest interval end of all rows is drawn there.
 const MARK_REACH: f64 = 50.0;
@@ -22,6 +23,8 @@ const MARK_REACH: f64 = 50.0;
 pub(in crate::report) struct PageHead {
     summary: String,
     chart: Option<Figure>,
+    /// What fails first, a line for each light.
+    first_to_fail: Vec<String>,
     rows: Vec<FindingRow>,
     strip: Option<Strip>,
 }
@@ -64,6 +67,7 @@ impl PageHead {
         }
         Ok(Some(Self {
             chart: chart(report)?,
+            first_to_fail: first_to_fail(report.findings),
             strip: Strip::new(&report.findings.grid, inputs)?,
             ..Self::without_images(groups)
         }))
@@ -74,6 +78,7 @@ impl PageHead {
         Self {
             summary: unbroken(summary),
             chart: None,
+            first_to_fail: Vec::new(),
             rows: Vec::new(),
             strip: None,
         }

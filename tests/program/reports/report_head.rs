@@ -101,7 +101,7 @@ fn training_data_of_an_enhancer_are_next_to_its_results() {
 }
 
 #[test]
-fn the_page_opens_with_its_summary() {
+fn the_page_opens_with_its_summary_and_what_fails_first() {
     let bench = Bench::with_questions(6);
     let mut replies = "{\"default\": \"C\"}\n".to_owned();
     for i in 0..6 {
@@ -123,6 +123,7 @@ fn the_page_opens_with_its_summary() {
         "class=\"summary\"",
         "class=\"alert\"",
         "class=\"lead\"",
+        "First to fail:<br>with noise: ",
     ];
     has_in_order(&page, &marks);
 }
