@@ -3,7 +3,7 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::sentences::Sentence;
+use crate::sentences::{Sentence, capitalised};
 use crate::text::words::{percent, points};
 
 /// A group of findings, by the kinds of its sentences.
@@ -166,16 +166,8 @@ impl<'a> FindingGroups<'a> {
         let bare = clauses
             .iter()
             .map(|clause| clause.strip_prefix(&prefix).unwrap_or(clause));
-        capitalized(&prefix) + &bare.collect::<Vec<_>>().join("; ") + "."
+        capitalised(&prefix) + &bare.collect::<Vec<_>>().join("; ") + "."
     }
-}
-
-/// A text with a capital at its beginning.
-fn capitalized(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| {
-        first.to_uppercase().chain(letters).collect()
-    })
 }
 
 impl<'a> FindingGroup<'a> {

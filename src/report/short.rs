@@ -112,6 +112,24 @@ fn models_and_people(grid: &Grid<'_>, models: Vec<&str>) -> String {
     names.join(", ")
 }
 
+/// Models under test and people as in [`who_is_judged`], then the references that ran with them.
+fn everyone(grid: &Grid<'_>) -> String {
+    let models = models(grid);
+    let judged = models_under_test(models.iter().copied());
+    let references = models
+        .into_iter()
+        .filter(|model| !judged.contains(model))
+        .collect::<Vec<_>>();
+    let references = match &references[..] {
+        [_, _, _, ..] => vec![counted(references.len(), "reference")],
+        few => few.iter().map(|name| (*name).to_owned()).collect(),
+    };
+    std::iter::once(who_is_judged(grid))
+        .chain(references)
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
 /// Head line of the report: models, questions, frames, replies, failures, and the unit of the intervals.
 pub(super) fn head(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
@@ -129,7 +147,7 @@ pub(super) fn head(report: &ChoiceReport<'_>) -> String {
     };
     format!(
         "{} · {} · {} · {replies}, {failed} failed · intervals by {}",
-        models_and_people(grid, models(grid)),
+        everyone(grid),
         counted(questions.len(), "question"),
         frames(grid),
         findings.unit

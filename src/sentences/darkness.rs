@@ -2,7 +2,9 @@
 
 use super::format::format_alone;
 use super::lights::{Topic, findings_of_kind, means_of_set};
-use super::pooled::{detail, mean_levels, reserved, runs, with_verdict};
+use super::pooled::{
+    UNCONFIRMED, detail, is_unconfirmed, mean_levels, reserved, runs, with_verdict,
+};
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use crate::text::words::light;
@@ -136,10 +138,19 @@ pub(super) fn with_variant(
             if let Some(format) = format_alone(levels, unit) {
                 return Some(format);
             }
-            let text = format!(
-                "no loss by {cause} was detected at any level{}.",
-                not_ruled_out(&found, &mut numbers)
-            );
+            let text = if is_unconfirmed(darkest) {
+                format!(
+                    "at {} accuracy is {} points {} than at L0{UNCONFIRMED}.",
+                    darkest.level,
+                    numbers.size("effect", size),
+                    if size < 0.0 { "lower" } else { "higher" },
+                )
+            } else {
+                format!(
+                    "no loss by {cause} was detected at any level{}.",
+                    not_ruled_out(&found, &mut numbers)
+                )
+            };
             let reserved = reserved(darkest, &mut numbers);
             (text, format!("; at {}{reserved}", darkest.level))
         }

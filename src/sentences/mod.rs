@@ -32,7 +32,7 @@ pub(crate) use sample::left_out;
 pub(crate) use self_agreement::self_agreement;
 #[cfg(test)]
 pub(crate) use sentence::Scope;
-pub(crate) use sentence::{Sentence, Tone};
+pub(crate) use sentence::{Sentence, Tone, capitalised};
 
 use std::collections::BTreeSet;
 

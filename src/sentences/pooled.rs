@@ -139,14 +139,25 @@ pub(super) fn noise(
         return vec![format];
     }
     let mut numbers = Numbers::new(unit);
-    let text = "No difference in accuracy between noise and the exposure drop alone was detected.";
+    let text = if is_unconfirmed(largest) {
+        let difference = largest.strict.difference.value;
+        format!(
+            "With noise, accuracy is {} points {} than by the exposure drop alone ({}){UNCONFIRMED}.",
+            numbers.size("effect", difference),
+            if difference < 0.0 { "lower" } else { "higher" },
+            largest.level
+        )
+    } else {
+        "No difference in accuracy between noise and the exposure drop alone was detected."
+            .to_owned()
+    };
     let more = format!(
         "; largest at {}{}",
         largest.level,
         reserved(largest, &mut numbers)
     );
     let detail = detail(largest, &mut numbers, &more);
-    vec![numbers.sentence("noise", Tone::NotShown, text.to_owned(), detail)]
+    vec![numbers.sentence("noise", Tone::NotShown, text, detail)]
 }
 
 /// The effects of each enhancer: a sentence for each verdict, with its levels.
@@ -211,7 +222,16 @@ fn no_effect(
     }
     let mut numbers = Numbers::new(unit);
     numbers.about(name);
-    let text = format!("{name} at {}: no effect detected.", runs(unshown, levels));
+    let at = runs(unshown, levels);
+    let text = if is_unconfirmed(largest) {
+        let difference = largest.strict.difference.value;
+        let up_to = if unshown.len() > 1 { "up to " } else { "" };
+        let size = numbers.size("effect", difference);
+        let word = if difference < 0.0 { "lower" } else { "higher" };
+        format!("{name} at {at}: accuracy {up_to}{size} points {word}{UNCONFIRMED}.")
+    } else {
+        format!("{name} at {at}: no effect detected.")
+    };
     let more = format!(
         "; largest at {}{}",
         largest.level,
@@ -224,6 +244,17 @@ fn no_effect(
 /// Whether a finding is about the observer alone. It has its own words: what it does not confirm need not be lost.
 fn is_observer(finding: &PooledFinding) -> bool {
     matches!(&finding.models[..], [one] if subject::is_observer(one))
+}
+
+/// The end of a sentence about an effect that [`is_unconfirmed`].
+pub(super) const UNCONFIRMED: &str = ", unconfirmed after correction for all tests";
+
+/// Whether nothing is detected although the interval excludes 0. The text then gives the effect, because "nothing was detected" next to
+/// such an interval reads as a contradiction.
+pub(super) fn is_unconfirmed(finding: &PooledFinding) -> bool {
+    let difference = finding.strict.difference;
+    let excludes_zero = difference.low > 0.0 || difference.high < 0.0;
+    excludes_zero && matches!(finding.claim(), Claim::Open | Claim::InOwnSet)
 }
 
 /// Why a finding is not among those detected although its own test or its interval detects it; empty otherwise.

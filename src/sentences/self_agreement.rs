@@ -64,8 +64,7 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let (_, all) = found.informative(model);
     let all = numbers.count("questions", all);
     let text = format!(
-        "This bank does not show what {model} sees: at L0 its answer to each of the {all} questions is the same about 95 % of the images \
-         or more."
+        "The questions do not show what {model} sees: at L0 it answers each of the {all} alike for 95 % of the images or more."
     );
     let images = found
         .questions
@@ -330,7 +329,7 @@ fn level_effects(
         ),
         (None, None) => (
             Tone::NotShown,
-            format!("That {enhancer} brings answers of {model} back is not shown ({of})."),
+            format!("No effect of {enhancer} on answers of {model} was detected ({of})."),
         ),
     }
 }
@@ -354,7 +353,7 @@ fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (T
         _ => (
             Tone::NotShown,
             format!(
-                "That {enhancer} changes answers of {model} to these photographs is not shown."
+                "No effect of {enhancer} on answers of {model} to these photographs was detected."
             ),
         ),
     }

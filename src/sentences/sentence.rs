@@ -284,7 +284,7 @@ pub(super) fn models(names: &[String], numbers: &mut Numbers) -> String {
 }
 
 /// A text with its first letter as a capital.
-pub(super) fn capitalised(text: &str) -> String {
+pub(crate) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
     letters
         .next()

@@ -125,23 +125,9 @@ struct FrameRow<'f> {
 /// The frames that keep the fewest right answers in each variant of raw images, first the worst. It is a description, no test.
 fn frames(findings: &Findings<'_>) -> Table {
     let variants = findings.grid.variants();
-    let rows = variants.into_iter().flat_map(|variant| {
-        let mut rows: Vec<FrameRow<'_>> = answers(findings, variant)
-            .into_iter()
-            .filter(|(_, answers)| answers.right >= MIN_RIGHT && answers.half().is_some())
-            .map(|(frame, answers)| FrameRow {
-                variant,
-                frame,
-                answers,
-            })
-            .collect();
-        rows.sort_by(|one, other| {
-            let share = |row: &FrameRow<'_>| row.answers.kept_share();
-            share(one).total_cmp(&share(other))
-        });
-        rows.truncate(MAX_FRAMES);
-        rows
-    });
+    let rows = variants
+        .into_iter()
+        .flat_map(|variant| frame_rows(findings, variant));
     let mut table = TableBuilder::new("frames_first", rows)
         .page(
             "accuracy",
@@ -169,6 +155,58 @@ fn frames(findings: &Findings<'_>) -> Table {
             Some("a description, no test: of many frames, some fail first by chance".to_owned());
     }
     table
+}
+
+/// The frames that keep the fewest right answers in a variant, first the worst.
+fn frame_rows<'f>(findings: &'f Findings<'_>, variant: &'f Variant) -> Vec<FrameRow<'f>> {
+    let mut rows: Vec<FrameRow<'_>> = answers(findings, variant)
+        .into_iter()
+        .filter(|(_, answers)| answers.right >= MIN_RIGHT && answers.half().is_some())
+        .map(|(frame, answers)| FrameRow {
+            variant,
+            frame,
+            answers,
+        })
+        .collect();
+    rows.sort_by(|one, other| {
+        let share = |row: &FrameRow<'_>| row.answers.kept_share();
+        share(one).total_cmp(&share(other))
+    });
+    rows.truncate(MAX_FRAMES);
+    rows
+}
+
+/// What fails first, a line for each variant: the families that lose at the lowest level, and the frame that loses most. Variants in
+/// which the same fails first share a line.
+pub(crate) fn first_to_fail(findings: &Findings<'_>) -> Vec<String> {
+    let findings = findings.shown();
+    let mut lines: Vec<(Vec<String>, String)> = Vec::new();
+    for variant in findings.grid.variants() {
+        let families = findings.grid.groups().into_iter().flatten();
+        let losses: Vec<(&Family, &PooledFinding)> = families
+            .filter_map(|family| Some((family, first_loss(findings, family, variant)?)))
+            .collect();
+        let lowest = losses.iter().map(|(_, loss)| loss.level).min();
+        let names: Vec<&str> = losses
+            .iter()
+            .filter(|(_, loss)| Some(loss.level) == lowest)
+            .map(|(family, _)| family_name(Some(family)))
+            .collect();
+        let families = lowest.map(|level| format!("{} at {level}", names.join(", ")));
+        let frames = frame_rows(findings, variant);
+        let frame = frames.first().map(|row| format!("frame {}", row.frame));
+        let failed: Vec<String> = families.into_iter().chain(frame).collect();
+        let failed = failed.join("; ");
+        match lines.iter_mut().find(|(_, other)| *other == failed) {
+            _ if failed.is_empty() => {}
+            Some((lights, _)) => lights.push(light(variant, None)),
+            None => lines.push((vec![light(variant, None)], failed)),
+        }
+    }
+    lines
+        .into_iter()
+        .map(|(lights, failed)| format!("{}: {failed}", lights.join(", ")))
+        .collect()
 }
 
 /// The answers to each frame by the models over which findings are pooled.

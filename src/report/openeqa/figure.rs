@@ -7,6 +7,7 @@ use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotL
 use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::text::words::counted;
 use crate::types::AxisLevel;
 use darkqa_score::open::{Group, OpenCell};
 use darkqa_score::subject::ModelInCondition;
@@ -25,8 +26,9 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
         .flat_map(|group| panels(report, group, &whole))
         .collect();
     let note = format!(
-        "bands and bars are 95 % intervals by {} ({} clusters)",
-        report.summary.unit, report.summary.clusters
+        "bands and bars are 95 % intervals by {}, {}",
+        report.summary.unit,
+        counted(report.summary.clusters, "cluster")
     );
     let chart = |panels: Vec<Panel>, columns: usize| Chart {
         measure: "score in %",
@@ -37,7 +39,11 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     let charts = [
         (
             "scores",
-            "Score by level. Broken lines: without images.",
+            if whole.without_level.is_empty() {
+                "Score by level."
+            } else {
+                "Score by level. Broken lines: without images."
+            },
             chart(panels(report, &Group::All, &whole), 1),
         ),
         ("categories", "Score by category.", chart(categories, 3)),

@@ -5,16 +5,22 @@ use std::collections::BTreeSet;
 use super::coverage::coverage;
 use super::items::packed;
 use super::open_report::OpenReport;
-use super::tables::SECTION;
+use super::tables::{SECTION, ladder};
 use crate::drawing::chart::Figure;
 use crate::error::Result;
 use crate::report::page::{OpenContent, page_of_open_questions};
 use crate::tables::Section;
 use crate::text::table::Table;
-use darkqa_score::open::AnswerOutcome;
+use crate::text::words::{counted, percent, points};
+use crate::types::degradations::Axis;
+use darkqa_score::open::{AnswerOutcome, Baseline, Group};
+use darkqa_score::subject::ModelInCondition;
 
 /// The sections of the page before the items.
 const SECTIONS: [Section; 1] = [(SECTION, "Scores", "", &["scores", "categories"])];
+
+/// Most clauses of the summary; chosen for one screen.
+const MAX_CLAUSES: usize = 3;
 
 /// The page as HTML.
 ///
@@ -30,6 +36,7 @@ pub(super) fn page(
             [(name, _)] => format!("OpenEQA in the dark: {name}"),
             several => format!("OpenEQA in the dark: {} runs compared", several.len()),
         },
+        summary: summary(report),
         intro: intro(report),
         alerts: &alerts(report),
         tables,
@@ -38,6 +45,45 @@ pub(super) fn page(
         items: packed(report)?,
     };
     page_of_open_questions(content, figures)
+}
+
+/// The scores at the darkest level in one sentence, with the differences from L0 and of each enhancer from raw frames. They are no
+/// verdicts: nothing is corrected over tests.
+fn summary(report: &OpenReport<'_>) -> Option<String> {
+    let whole = ladder(report.summary, &Group::All);
+    let change = |subject: &ModelInCondition, baseline| {
+        let change = report.summary.change(subject, baseline, &Group::All)?;
+        let difference = change.difference;
+        let [value, low, high] = [difference.value, difference.low, difference.high].map(points);
+        Some(format!("{value} [{low}, {high}]"))
+    };
+    let clauses: Vec<String> = whole
+        .series
+        .iter()
+        .filter(|(series, _)| series.axis() == Some(Axis::LIGHT))
+        .filter_map(|(series, cells)| {
+            let (level, cell) = cells.last_key_value()?;
+            let score = percent(cell.score?.value);
+            let model = report.summary.listing.label(series.model);
+            let light = series.light(&[]);
+            Some(if series.is_enhanced() {
+                let gain = change(&cell.subject, Baseline::Raw)?;
+                format!("{light}: {score} % ({gain} against raw)")
+            } else {
+                let loss = change(&cell.subject, Baseline::Clean)?;
+                format!("{model} {light} scores {score} % at {level} ({loss} against L0)")
+            })
+        })
+        .collect();
+    match clauses.len() {
+        0 => None,
+        count if count > MAX_CLAUSES => Some(format!(
+            "{}; {} more below.",
+            clauses[..MAX_CLAUSES].join("; "),
+            count - MAX_CLAUSES
+        )),
+        _ => Some(clauses.join("; ") + "."),
+    }
 }
 
 /// Warnings at the top of the page: missing marks, missing answers, no judge.
@@ -72,17 +118,17 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
 
 fn intro(report: &OpenReport<'_>) -> Vec<String> {
     let (summary, judge) = (report.summary, report.judge.unwrap_or("nobody"));
+    let walks: BTreeSet<_> = report
+        .questions
+        .iter()
+        .map(|question| &question.frame)
+        .collect();
     let mut lines = vec![
         format!(
-            "{} questions about {} walks. Score: 100 · mean((mark − 1) / 4), marks from 1 to 5 by {judge}, protocol {}. Intervals are \
+            "{} about {}. Score: 100 · mean((mark − 1) / 4), marks from 1 to 5 by {judge}, protocol {}. Intervals are \
              95 %, by {} ({} clusters); differences are of unrounded means, on the questions that are scored in both.",
-            report.questions.len(),
-            report
-                .questions
-                .iter()
-                .map(|question| &question.frame)
-                .collect::<BTreeSet<_>>()
-                .len(),
+            counted(report.questions.len(), "question"),
+            counted(walks.len(), "walk"),
             report.protocol,
             summary.unit,
             summary.clusters

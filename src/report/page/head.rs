@@ -12,6 +12,8 @@ use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{Effect, Finding, FindingGroups};
+use crate::sentences::capitalised;
+use crate::tables::first_to_fail;
 
 /// Half the width of a mark's drawing, in its own units; the largest interval end of all rows is drawn there.
 const MARK_REACH: f64 = 50.0;
@@ -21,6 +23,8 @@ const MARK_REACH: f64 = 50.0;
 pub(in crate::report) struct PageHead {
     summary: String,
     chart: Option<Figure>,
+    /// What fails first, a line for each light.
+    first_to_fail: Vec<String>,
     rows: Vec<FindingRow>,
     strip: Option<Strip>,
 }
@@ -63,9 +67,21 @@ impl PageHead {
         }
         Ok(Some(Self {
             chart: chart(report)?,
+            first_to_fail: first_to_fail(report.findings),
             strip: Strip::new(&report.findings.grid, inputs)?,
             ..Self::without_images(groups)
         }))
+    }
+
+    /// The summary alone.
+    pub(in crate::report) fn of_summary(summary: &str) -> Self {
+        Self {
+            summary: unbroken(summary),
+            chart: None,
+            first_to_fail: Vec::new(),
+            rows: Vec::new(),
+            strip: None,
+        }
     }
 
     /// The summary and the findings alone.
@@ -77,15 +93,18 @@ impl PageHead {
             .flat_map(|[_, low, high]| [low.abs(), high.abs()])
             .fold(1.0, f64::max);
         Self {
-            summary: groups.summary(),
-            chart: None,
             rows: first
                 .iter()
                 .map(|(group, finding)| FindingRow::new(group, finding, reach))
                 .collect(),
-            strip: None,
+            ..Self::of_summary(&groups.summary())
         }
     }
+}
+
+/// A text in which no line ends between a number and its percent sign.
+fn unbroken(text: &str) -> String {
+    text.replace(" %", "\u{a0}%")
 }
 
 /// The difference of a finding with the ends of its interval, in points.
@@ -108,7 +127,10 @@ impl FindingRow {
             group,
             class: tone.class(),
             sign: tone.sign(),
-            text: finding.text(),
+            text: unbroken(&match finding.shown().scope.light {
+                Some(_) => capitalised(&finding.text()),
+                None => finding.text(),
+            }),
             effect,
             at: at.map_or_else(String::new, |at| format!("at {at}")),
             in_other_lights: others.iter().map(ToString::to_string).collect(),
@@ -148,6 +170,11 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
 mod tests {
     use super::*;
     use crate::sentences::{Scope, Sentence, Tone};
+
+    #[test]
+    fn a_percent_sign_stays_with_its_number() {
+        assert_eq!(unbroken("from 90.6 % at L0"), "from 90.6\u{a0}% at L0");
+    }
 
     #[test]
     fn marks_share_one_scale() {

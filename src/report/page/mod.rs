@@ -38,6 +38,7 @@ use crate::types::flags::spelled_setting;
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::grid::Grid;
+use darkqa_score::subject::{ModelInCondition, models_under_test};
 
 /// The template of the page, its style and its script.
 const PAGE: &str = include_str!("page.html");
@@ -209,6 +210,8 @@ pub(crate) fn page_of<'a>(
 /// The content of the page of open questions, besides its figures.
 pub(in crate::report) struct OpenContent<'a> {
     pub(in crate::report) title: String,
+    /// The scores in one sentence; `None` without scores at two levels.
+    pub(in crate::report) summary: Option<String>,
     pub(in crate::report) intro: Vec<String>,
     pub(in crate::report) alerts: &'a [String],
     pub(in crate::report) tables: &'a [Table],
@@ -233,7 +236,7 @@ pub(in crate::report) fn page_of_open_questions(
             class: "",
             heading: content.title.clone(),
             title: content.title,
-            head: None,
+            head: content.summary.as_deref().map(PageHead::of_summary),
             family: "category",
             alerts: content.alerts.iter().map(String::as_str).collect(),
             findings: None,
@@ -258,7 +261,7 @@ pub(in crate::report) fn page_of_open_questions(
 fn heading(who: &str, inputs: &PageInputs<'_>) -> String {
     match &*inputs.runs {
         [_] => format!("{who} in the dark"),
-        several => format!("Seeing in the dark: {} runs compared", several.len()),
+        several => format!("{who} in the dark: {} runs compared", several.len()),
     }
 }
 
@@ -275,7 +278,15 @@ fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
     let grid = &report.findings.grid;
     let size = format!("{} (95 %) · strict parsing", head(report));
     let readings = NoiseProfiles::new(&grid.subjects);
+    let is_people = |subject: &ModelInCondition| grid.listing.is_people(&subject.model);
+    let models = grid.subjects.iter().map(|subject| &*subject.model);
+    let judged = models_under_test(models);
+    let has_people = grid.subjects.iter().any(is_people);
+    let has_models = judged.iter().any(|model| !grid.listing.is_people(model));
+    let people = (has_people && has_models)
+        .then(|| "The summary and the chart are about models, not about people.".to_owned());
     std::iter::once(size)
+        .chain(people)
         .chain(readings.open_question())
         .collect()
 }

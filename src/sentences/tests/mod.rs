@@ -188,7 +188,7 @@ fn each_kind_and_verdict_has_its_words() {
     let starts = [
         "− lift harms at L1–L2, by up to 8.1 points. (mean of these 2 models: −8.1 [−12.1, −4.1], p < 0.001; at L1;",
         "+ lift helps at L4–L5, by up to 5.6 points. (",
-        "· lift at L3: no effect detected. (mean of these 2 models: −5.0 [−9.0, −1.0], p = 0.062; largest at L3, not detected \
+        "· lift at L3: accuracy 5.0 points lower, unconfirmed after correction for all tests. (mean of these 2 models: −5.0 [−9.0, −1.0], p = 0.062; largest at L3, not detected \
          after correction (uncorrected p = 0.012); n = 1,237 in 30 scenes)",
     ];
     assert_eq!(said.len(), starts.len());
@@ -213,6 +213,27 @@ fn each_kind_and_verdict_has_its_words() {
         said[0].starts_with(
             "− In the dark the models are less often right than without images at L2. ("
         )
+    );
+}
+
+#[test]
+fn an_effect_whose_interval_excludes_zero_is_called_unconfirmed() {
+    let unit = ClusterUnit::Scene;
+    let all = findings(PooledKind::Darkness, &[(-0.05, NotShown)]);
+    let all: Vec<&PooledFinding> = all.iter().collect();
+    let said = checked(&darkness::with_variant(&all, None, None, unit).unwrap());
+    assert!(
+        said.starts_with(
+            "· At L1 accuracy is 5.0 points lower than at L0, unconfirmed after correction for all tests. ("
+        ),
+        "{said}"
+    );
+    let all = findings(PooledKind::Noise, &[(0.05, NotShown)]);
+    let all: Vec<&PooledFinding> = all.iter().collect();
+    let said = checked(&pooled::noise(&all, &[], unit)[0]);
+    assert!(
+        said.starts_with("· With noise, accuracy is 5.0 points higher than by the exposure drop alone (L1), unconfirmed after"),
+        "{said}"
     );
 }
 

@@ -245,7 +245,7 @@ fn a_bank_to_which_all_is_no_gives_no_verdict() {
     bench.file("no.jsonl", json!({"default": "B"}).to_string());
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "no.jsonl")));
     assert!(
-        on_one_line(&shown).contains("This bank does not show what script:no.jsonl sees"),
+        on_one_line(&shown).contains("The questions do not show what script:no.jsonl sees"),
         "{shown}"
     );
     assert!(!shown.contains("gives its answer at L0 to"), "{shown}");
@@ -272,7 +272,7 @@ fn a_model_that_cannot_be_read_in_the_light_is_held_against_nothing() {
         ),
         "{shown}"
     );
-    assert!(!shown.contains("This bank does not show"), "{shown}");
+    assert!(!shown.contains("The questions do not show"), "{shown}");
 }
 
 #[test]
@@ -439,7 +439,7 @@ fn photographs_in_the_dark() -> Bench {
 }
 
 /// What a reader is told of photographs in the dark.
-const NOTICE: &str = "These photographs are said to be from the dark (--light dark): L0 is each as photographed, there is no image in the light";
+const NOTICE: &str = "These photographs were taken in the dark (--light dark): L0 is each as photographed, there is no image in the light";
 
 #[test]
 fn photographs_in_the_dark_are_asked_as_they_are() {

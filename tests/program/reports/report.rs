@@ -56,7 +56,7 @@ fn several_runs_become_one_comparison() {
         );
     }
     let page = fs::read_to_string(bench.path("all/report.html")).unwrap();
-    assert!(page.contains("Seeing in the dark: 3 runs compared"));
+    assert!(page.contains(" in the dark: 3 runs compared"));
     let rows = [
         "summary.csv",
         "comparisons.csv",
@@ -411,6 +411,8 @@ fn people_enter_as_a_model() {
     assert!(records(&bench.path("people")) == imported);
     let both = bench.call(&["report", "run", "people", "--out", "both"]);
     assert_eq!(both.code, Some(0), "{both:?}");
+    let page = fs::read_to_string(bench.path("both/report.html")).unwrap();
+    assert!(page.contains("The summary and the chart are about models, not about people."));
     // Who cannot tell says so: that is no reply that cannot be read, and stays so if replies are read again.
     assert!(
         !both.stdout.contains("could not be read"),

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use crate::support::house::House;
 use crate::support::run::{Bench, words};
 use serde_json::{Value, json};
 
@@ -97,4 +98,46 @@ fn training_data_of_an_enhancer_are_next_to_its_results() {
     assert_eq!(lines.len() + 1, before);
     fs::write(&path, manifest.to_string()).unwrap();
     check();
+}
+
+#[test]
+fn the_page_opens_with_its_summary_and_what_fails_first() {
+    let bench = Bench::with_questions(6);
+    let mut replies = "{\"default\": \"C\"}\n".to_owned();
+    for i in 0..6 {
+        let line = json!({"question": format!("q{i}"), "condition": "L5-noise", "reply": "A"});
+        replies += &format!("{line}\n");
+    }
+    bench.file("m.jsonl", &replies);
+    let text = bench.complete(&words(
+        "--model script:m.jsonl --model random --data set.jsonl --levels L0,L5 --out run",
+    ));
+    // `random` is no model under test.
+    assert!(
+        text.starts_with("script:m.jsonl, random · 6 questions"),
+        "{text}"
+    );
+    let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
+    let marks = [
+        "<h1>",
+        "class=\"summary\"",
+        "class=\"alert\"",
+        "class=\"lead\"",
+        "First to fail:<br>with noise: ",
+    ];
+    has_in_order(&page, &marks);
+}
+
+#[test]
+fn the_page_of_open_questions_opens_with_its_scores() {
+    let house = House::new();
+    house.0.file("m.jsonl", "{\"default\": \"a sofa\"}\n");
+    house.0.file("j.jsonl", "{\"default\": \"4\"}\n");
+    let line = "--model script:m.jsonl --judge script:j.jsonl --levels L0,L4 --out run";
+    let called = house.call(&words(line));
+    assert_eq!(called.code, Some(0), "{called:?}");
+    let page = fs::read_to_string(house.0.path("run/report.html")).unwrap();
+    let summary = "<p class=\"summary\">script:m.jsonl with noise scores 75.0\u{a0}% at L4 (0.0 [";
+    has_in_order(&page, &[summary, "3 questions about 2 walks. "]);
+    assert!(!page.contains("Broken lines"));
 }

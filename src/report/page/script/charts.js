@@ -287,10 +287,17 @@ class Chart {
     ends.forEach((end, i) => {
       const group = draw_("g", { class: end.colour });
       group.append(draw_("path", { d: `M${(end.from ?? area.right) + 6} ${end.at}L${area.right + 10} ${places[i]}`, class: "leader" }));
-      const name = end.name.length > letters ? end.name.slice(0, Math.max(letters - 1, 1)) + "…" : end.name;
+      const name = end.name.length > letters ? this.shortened(end.name, ends, letters) : end.name;
       group.append(draw_("text", { x: area.right + 14, y: places[i] + 4, class: "name" }, name));
       svg.append(group);
     });
+  }
+
+  // A name in fewer letters. That of the only model without images goes without the model.
+  shortened(name, ends, letters) {
+    const blind = "without images", blinds = ends.filter((end) => end.name.endsWith(blind));
+    if (name.endsWith(blind) && blinds.length === 1 && blind.length <= letters) return blind;
+    return name.slice(0, Math.max(letters - 1, 1)) + "…";
   }
 
   // The values at the cursor: a row for each line, a column for each panel.

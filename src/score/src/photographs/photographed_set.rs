@@ -31,7 +31,7 @@ impl PhotographedSet {
             ""
         };
         Some(format!(
-            "These photographs are said to be from the dark (--light dark): L0 is each as photographed, there is no image in the light to \
+            "These photographs were taken in the dark (--light dark): L0 is each as photographed, there is no image in the light to \
              compare with, and no darkness threshold.{}{doubt}",
             brightness.unwrap_or_default()
         ))
