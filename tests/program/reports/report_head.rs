@@ -106,7 +106,8 @@ fn the_page_opens_with_its_summary_and_what_fails_first() {
     let mut replies = "{\"default\": \"C\"}\n".to_owned();
     for i in 0..6 {
         let line = json!({"question": format!("q{i}"), "condition": "L5-noise", "reply": "A"});
-        replies += &format!("{line}\n");
+        replies += &line.to_string();
+        replies.push('\n');
     }
     bench.file("m.jsonl", &replies);
     let text = bench.complete(&words(
