@@ -5,5 +5,5 @@ mod output;
 mod reading;
 
 pub(super) use composition::{Composition, ImageTensor, OutputTensor};
-pub(super) use output::{Output, in_expression};
+pub(super) use output::{Output, in_expression, light_map_line};
 pub(super) use reading::{OutOfRange, TensorSamples, nearest};

@@ -211,6 +211,11 @@ pub(crate) fn in_expression(name: &str) -> String {
     }
 }
 
+/// The line of a sidecar for a light map that the input is divided by; `term` is its output as expressions write it.
+pub(crate) fn light_map_line(term: &str) -> String {
+    format!("image = \"clip(input / max({term}, 0.001), 0, 1)\"")
+}
+
 /// Why none of the outputs is the image, and what to state or export.
 fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) -> bool) -> String {
     let wide = |port: &&Port| {
@@ -245,8 +250,8 @@ fn no_image(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) ->
         && let Some(port) = outputs.iter().find(|port| fits(port, 1))
     {
         return format!(
-            "gives {port}, one channel, not an image; if it is a light map that the input is divided by, {ADD}: `image = \"clip(input / max({0}, 0.001), 0, 1)\"`; if it is the enhanced luma, export it joined with the colours",
-            in_expression(&port.name)
+            "gives {port}, one channel, not an image; if it is a light map that the input is divided by, {ADD}: `{}`; if it is the enhanced luma, export it joined with the colours",
+            light_map_line(&in_expression(&port.name))
         );
     }
     if let [port] = outputs {

@@ -13,7 +13,7 @@ use super::probe_run::Trials;
 use super::range_pair::RangePair;
 use super::trial_images::made;
 use crate::conventions::sidecar::{self, ADD, ModelSidecar, OutputChoice};
-use crate::conventions::{ChannelOrder, ValueRange, ValueScale};
+use crate::conventions::{ChannelOrder, ValueScale};
 use crate::enhancer::Enhancer;
 use crate::graphs::Port;
 use crate::sizing::TakenSizes;
@@ -228,10 +228,7 @@ impl Enhancer {
 
     /// The plausible images that are made of input and output.
     fn expressions(&self, dark: &[Rgb]) -> Result<Vec<ExaminedConvention>> {
-        let ranges = self
-            .stated_ranges()
-            .map(|range| range.unwrap_or(ValueRange::Unit));
-        let trials = self.expression_trials(dark, ranges)?;
+        let trials = self.expression_trials(dark)?;
         Ok(trials
             .into_iter()
             .filter(|trial| trial.pair.is_clean())

@@ -1,5 +1,7 @@
 //! Output of a model for black and for white: [`Endpoints`].
 
+use std::ops::Range;
+
 use super::plausible::Codes;
 use darkqa_ground::types::Rgb;
 
@@ -29,33 +31,37 @@ impl Endpoints {
 
     /// The means of an output for [`black_and_white`], away from the edge between the halves and from the border.
     pub(super) fn from_codes(codes: &Codes) -> Self {
-        let Codes { height, width, .. } = *codes;
-        let rows = height / 4..(height - height / 4).max(1);
-        let half = width / 2;
+        let half = codes.width / 2;
         let quarter = half / 4;
-        let means = |start: usize, end: usize| {
-            let mut sums = [0.0; 3];
-            let mut pixels = 0_usize;
-            for row in rows.clone() {
-                let row = &codes.samples[3 * row * width..][..3 * width];
-                for pixel in row[3 * start..3 * end].chunks_exact(3) {
-                    for (sum, sample) in sums.iter_mut().zip(pixel) {
-                        *sum += f64::from(*sample);
-                    }
-                    pixels += 1;
-                }
-            }
-            sums.map(|sum| sum / pixels.max(1) as f64)
-        };
-        let black = means(quarter, half - quarter);
-        let white = means(half + quarter, width - quarter);
-        let mean = |channels: [f64; 3]| channels.iter().sum::<f64>() / 3.0;
+        let black = channel_means(codes, quarter..half - quarter);
+        let white = channel_means(codes, half + quarter..codes.width - quarter);
         Self {
             black: mean(black),
             white: mean(white),
             distance: mean(black.map(f64::abs)) + mean(white.map(|code| (code - 255.0).abs())),
         }
     }
+}
+
+/// Means of red, green and blue in these columns of the middle half of the rows, in codes.
+fn channel_means(codes: &Codes, columns: Range<usize>) -> [f64; 3] {
+    let Codes { height, width, .. } = *codes;
+    let rows = height / 4..(height - height / 4).max(1);
+    let pixels = rows.len() * columns.len();
+    let mut sums = [0.0; 3];
+    for row in rows {
+        let row = &codes.samples[3 * row * width..][..3 * width];
+        for pixel in row[3 * columns.start..3 * columns.end].chunks_exact(3) {
+            for (sum, sample) in sums.iter_mut().zip(pixel) {
+                *sum += f64::from(*sample);
+            }
+        }
+    }
+    sums.map(|sum| sum / pixels.max(1) as f64)
+}
+
+fn mean(channels: [f64; 3]) -> f64 {
+    channels.iter().sum::<f64>() / 3.0
 }
 
 /// An image whose left half is black and whose right half is white, so that models that stretch an image to its darkest and brightest

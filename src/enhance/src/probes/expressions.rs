@@ -7,7 +7,7 @@ use super::range_pair::RangePair;
 use crate::conventions::sidecar::ADD;
 use crate::conventions::{Channels, ValueRange};
 use crate::enhancer::Enhancer;
-use crate::outputs::in_expression;
+use crate::outputs::{in_expression, light_map_line};
 use darkqa_ground::error::Result;
 use darkqa_ground::types::{Flaw, Rgb};
 
@@ -70,18 +70,17 @@ pub(super) struct ExpressionTrial {
 }
 
 impl Enhancer {
-    /// The trials of [`EXPRESSIONS`] in these ranges; none if the image is an expression already, or if the model fails.
+    /// The trials of [`EXPRESSIONS`], in 0..1 where no range is stated; none if the image is an expression already, or if the model fails.
     ///
     /// # Errors
     /// If the runtime fails.
-    pub(super) fn expression_trials(
-        &self,
-        dark: &[Rgb],
-        ranges: [ValueRange; 2],
-    ) -> Result<Vec<ExpressionTrial>> {
+    pub(super) fn expression_trials(&self, dark: &[Rgb]) -> Result<Vec<ExpressionTrial>> {
         if !self.reads_plain_image() {
             return Ok(Vec::new());
         }
+        let ranges = self
+            .stated_ranges()
+            .map(|range| range.or(Some(ValueRange::Unit)));
         let name = in_expression(&self.graph().signature.outputs[0].port.name);
         let texts = EXPRESSIONS.map(|(text, _)| text.replace("OUTPUT", &name));
         let mut conventions = texts.clone().map(|_| self.convention().clone());
@@ -93,7 +92,7 @@ impl Enhancer {
             convention.image = Some(image);
         }
         let conventions = conventions.each_ref();
-        let Some(Trials { probes, .. }) = self.trials(dark, conventions, ranges.map(Some))? else {
+        let Some(Trials { probes, .. }) = self.trials(dark, conventions, ranges)? else {
             return Ok(Vec::new());
         };
         let mut trials = Vec::new();
@@ -121,10 +120,7 @@ impl Enhancer {
     /// # Errors
     /// If the runtime fails.
     pub(super) fn better_expression(&self, dark: &[Rgb], flaw: Flaw) -> Result<Option<String>> {
-        let ranges = self
-            .stated_ranges()
-            .map(|range| range.unwrap_or(ValueRange::Unit));
-        let mut found = self.expression_trials(dark, ranges)?;
+        let mut found = self.expression_trials(dark)?;
         found.retain(|trial| trial.pair.is_clean() && trial.pair.is_near());
         found.sort_by(|a, b| a.pair.distance().total_cmp(&b.pair.distance()));
         let lines: Vec<String> = found
@@ -170,7 +166,8 @@ impl Enhancer {
                 "its output is nearly black for a white image, like a residual; if the model's code adds it, {ADD}: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` shows both"
             ),
             OutputKind::Map => format!(
-                "its output is nearly as bright for black as for white, like a light map; if the model's code divides by it, {ADD}: `image = \"clip(input / max({name}, 0.001), 0, 1)\"`; `darkqa-eval enhance doctor` shows both"
+                "its output is nearly as bright for black as for white, like a light map; if the model's code divides by it, {ADD}: `{}`; `darkqa-eval enhance doctor` shows both",
+                light_map_line(&name)
             ),
         }))
     }
@@ -185,7 +182,8 @@ impl Enhancer {
         NAMES.iter().find(|word| lower_case.contains(**word))?;
         let term = in_expression(name);
         Some(format!(
-            "its output {name:?} is named like a map or a residual, but read as the image; {ADD} what the model's code does: `image = \"clip(input / max({term}, 0.001), 0, 1)\"`, `image = \"input + {term}\"` or `output = {name:?}`"
+            "its output {name:?} is named like a map or a residual, but read as the image; {ADD} what the model's code does: `{}`, `image = \"input + {term}\"` or `output = {name:?}`",
+            light_map_line(&term)
         ))
     }
 

@@ -9,6 +9,7 @@ use super::endpoints::Endpoints;
 use super::plausible::{Codes, Gravity, Verdict, judge};
 use super::range_pair::RangePair;
 use crate::conventions::sidecar::ADD;
+use crate::outputs::light_map_line;
 use darkqa_ground::types::Flaw;
 
 /// Number of dark frames that a model is tried on: with 6, none of 9 trained models was flagged; with one, 5 % were.
@@ -340,7 +341,8 @@ fn remedy(flaw: Flaw, ranges: Ranges) -> String {
             "If the model's code inverts the output, {ADD}: `image = \"1 - OUTPUT\"`; if it divides the input by it: `image = \"input / OUTPUT\"`; or another output is the image"
         ),
         (Flaw::Grey, _) => format!(
-            "If the output is a light map that the input is divided by, {ADD}: `image = \"clip(input / OUTPUT, 0, 1)\"`; or it is the luma alone"
+            "If the output is a light map that the input is divided by, {ADD}: `{}`; or it is the luma alone",
+            light_map_line(OUTPUT)
         ),
         (Flaw::Shuffled, _) => format!(
             "Perhaps another output is the image, or the dimensions have another order; {ADD} `output`, `layout_in` or `layout_out`"
