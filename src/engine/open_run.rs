@@ -485,7 +485,7 @@ pub(crate) fn pipeline<'a, E: Experiment>(
     };
     let implausible = experiment.settings().loading.probe.implausible();
     let mut pipeline = ImagePipeline::new(steps, enhancers, implausible);
-    pipeline.probe_sources = experiment.probe_sources();
+    pipeline.whole_run = experiment.probe_sources();
     pipeline
 }
 

@@ -45,7 +45,7 @@ pub(crate) struct ImagePipeline<'a> {
     /// The treatment of an enhancer whose output cannot be an enhanced image.
     implausible: Implausible,
     /// In a shard, the frames of the whole run that enhancers are tried on; empty for those of the plan.
-    pub(crate) probe_sources: &'a [Source],
+    pub(crate) whole_run: &'a [Source],
 }
 
 /// A source in progress.
@@ -71,7 +71,7 @@ impl<'a> ImagePipeline<'a> {
             resting: Vec::new(),
             sets: Vec::new(),
             implausible,
-            probe_sources: &[],
+            whole_run: &[],
         }
     }
 
@@ -107,7 +107,7 @@ impl<'a> ImagePipeline<'a> {
                     resting: self.resting.clone(),
                     sets: Vec::new(),
                     implausible: self.implausible,
-                    probe_sources: self.probe_sources,
+                    whole_run: self.whole_run,
                 };
                 scope.spawn(move || {
                     worker.install(|| {

@@ -21,7 +21,7 @@ impl<'a> DarkFrames<'a> {
     /// The frames of a whole run for the enhancer of this name, with the conditions that it enhances in a shard's plan, photographs in the
     /// dark apart. So all shards judge an enhancer alike, and one of them judges it for those that share its store. Without such frames
     /// or conditions, the frames of the plan.
-    pub(crate) fn of_whole_run<I>(
+    pub(crate) fn for_whole_run<I>(
         whole: &'a [Source],
         sources: &'a [Source],
         plan: &[SourcePlan<I>],

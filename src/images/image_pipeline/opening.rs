@@ -125,7 +125,7 @@ impl<'a> ImagePipeline<'a> {
     where
         'a: 's,
     {
-        DarkFrames::of_whole_run(self.probe_sources, sources, plan, name)
+        DarkFrames::for_whole_run(self.whole_run, sources, plan, name)
     }
 
     /// The stored state of a model.

@@ -74,7 +74,7 @@ impl PageHead {
     }
 
     /// The summary alone.
-    pub(in crate::report) fn of_summary(summary: &str) -> Self {
+    pub(in crate::report) fn from_summary(summary: &str) -> Self {
         Self {
             summary: unbroken(summary),
             chart: None,
@@ -97,7 +97,7 @@ impl PageHead {
                 .iter()
                 .map(|(group, finding)| FindingRow::new(group, finding, reach))
                 .collect(),
-            ..Self::of_summary(&groups.summary())
+            ..Self::from_summary(&groups.summary())
         }
     }
 }

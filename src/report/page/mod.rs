@@ -236,7 +236,7 @@ pub(in crate::report) fn page_of_open_questions(
             class: "",
             heading: content.title.clone(),
             title: content.title,
-            head: content.summary.as_deref().map(PageHead::of_summary),
+            head: content.summary.as_deref().map(PageHead::from_summary),
             family: "category",
             alerts: content.alerts.iter().map(String::as_str).collect(),
             findings: None,
