@@ -3,7 +3,7 @@
 use super::format::format_alone;
 use super::lights::{Topic, findings_of_kind, means_of_set};
 use super::pooled::{
-    UNCONFIRMED, detail, is_unconfirmed, mean_levels, reserved, runs, with_verdict,
+    UNCONFIRMED, detail, is_unconfirmed, lower_or_higher, mean_levels, reserved, runs, with_verdict,
 };
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
@@ -143,7 +143,7 @@ pub(super) fn with_variant(
                     "at {} accuracy is {} points {} than at L0{UNCONFIRMED}.",
                     darkest.level,
                     numbers.size("effect", size),
-                    if size < 0.0 { "lower" } else { "higher" },
+                    lower_or_higher(size),
                 )
             } else {
                 format!(

@@ -144,7 +144,7 @@ pub(super) fn noise(
         format!(
             "With noise, accuracy is {} points {} than by the exposure drop alone ({}){UNCONFIRMED}.",
             numbers.size("effect", difference),
-            if difference < 0.0 { "lower" } else { "higher" },
+            lower_or_higher(difference),
             largest.level
         )
     } else {
@@ -227,7 +227,7 @@ fn no_effect(
         let difference = largest.strict.difference.value;
         let up_to = if unshown.len() > 1 { "up to " } else { "" };
         let size = numbers.size("effect", difference);
-        let word = if difference < 0.0 { "lower" } else { "higher" };
+        let word = lower_or_higher(difference);
         format!("{name} at {at}: accuracy {up_to}{size} points {word}{UNCONFIRMED}.")
     } else {
         format!("{name} at {at}: no effect detected.")
@@ -248,6 +248,11 @@ fn is_observer(finding: &PooledFinding) -> bool {
 
 /// The end of a sentence about an effect that [`is_unconfirmed`].
 pub(super) const UNCONFIRMED: &str = ", unconfirmed after correction for all tests";
+
+/// How an accuracy with this difference compares with the other one.
+pub(super) fn lower_or_higher(difference: f64) -> &'static str {
+    if difference < 0.0 { "lower" } else { "higher" }
+}
 
 /// Whether nothing is detected although the interval excludes 0. The text then gives the effect, because "nothing was detected" next to
 /// such an interval reads as a contradiction.
