@@ -145,8 +145,11 @@ fn ladder<'py>(
     let shape = [levels.len()];
     if is_linear {
         let make = |index: usize, clean: &Rgb| {
-            let states = states[index].iter();
-            joined(states.map(|state| state.light(clean.into(), &keys[index], noise)))
+            joined(
+                states[index]
+                    .iter()
+                    .map(|state| state.light(clean.into(), &keys[index], noise)),
+            )
         };
         return output(py, &batch, &shape, threads, make);
     }
@@ -154,8 +157,11 @@ fn ladder<'py>(
         if noise == NoiseTerms::All {
             return together(&settings, &levels, clean, &keys[index]);
         }
-        let states = states[index].iter();
-        joined(states.map(|state| state.image(clean.into(), &keys[index], noise)))
+        joined(
+            states[index]
+                .iter()
+                .map(|state| state.image(clean.into(), &keys[index], noise)),
+        )
     };
     output(py, &batch, &shape, threads, make)
 }
