@@ -1,10 +1,10 @@
 //! The lights that sentences are about, and the findings about one of them.
 
 use super::sample::is_impossible;
-use super::sentence::{Sentence, capitalised};
+use super::sentence::Sentence;
 use crate::text::words::light;
 use crate::types::Variant;
-use crate::types::degradations::{Axis, Kind};
+use crate::types::degradations::Kind;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 
@@ -49,26 +49,10 @@ impl<'f> Topic<'f> {
     pub(super) fn named(&self, variant: &Variant, mut sentence: Sentence) -> Sentence {
         if self.lights.len() > 1 || self.shares_levels {
             let light = light(variant, None);
-            sentence.text = format!("{light}: {}", after_colon(&sentence.text));
+            sentence.text = format!("{light}: {}", sentence.text);
             sentence.scope.light = Some(light);
         }
         sentence
-    }
-}
-
-/// Words that begin a sentence and are no names.
-const FIRST_WORDS: [&str; 5] = ["At", "In", "No", "Over", "With"];
-
-/// A sentence as it continues after a colon: in lower case, unless it begins with a name.
-fn after_colon(text: &str) -> String {
-    let first = text.split(' ').next().unwrap_or_default();
-    let is_cause = Axis::ALL
-        .iter()
-        .any(|axis| capitalised(axis.cause) == first);
-    if is_cause || FIRST_WORDS.contains(&first) {
-        first.to_lowercase() + &text[first.len()..]
-    } else {
-        text.to_owned()
     }
 }
 
@@ -121,20 +105,4 @@ pub(super) fn findings_of_kind<'f>(
         .flatten()
         .copied()
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_sentence_goes_on_in_lower_case_unless_it_begins_with_a_name() {
-        for (text, expected) in [
-            ("No loss was detected.", "no loss was detected."),
-            ("Darkness costs 5 points.", "darkness costs 5 points."),
-            ("Zero-DCE helps at L3.", "Zero-DCE helps at L3."),
-        ] {
-            assert_eq!(after_colon(text), expected);
-        }
-    }
 }
