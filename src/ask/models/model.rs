@@ -1,5 +1,7 @@
 //! Remote and built-in models: [`Model`].
 
+use std::sync::LazyLock;
+
 use serde_json::Value;
 
 use super::local::Local;
@@ -13,6 +15,10 @@ use crate::ask::failures::AskError;
 use crate::ask::requests::{Call, Message, Parameters};
 use crate::error::Result;
 use crate::types::{Digest, Reply};
+
+/// Number of CPU cores that the process may use; `None` if unknown. Counted once, because counting reads files of the control group.
+static CORES: LazyLock<Option<usize>> =
+    LazyLock::new(|| std::thread::available_parallelism().ok().map(usize::from));
 
 /// A model, at an endpoint or in this process.
 #[derive(Debug)]
@@ -64,7 +70,7 @@ impl Model {
         match self {
             Self::Remote(model) => Some(model.width()),
             // The function uses the CPU of this machine.
-            Self::Local(_) => std::thread::available_parallelism().ok().map(usize::from),
+            Self::Local(_) => *CORES,
             Self::Random(_) | Self::Script(_) => None,
         }
     }
