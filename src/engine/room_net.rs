@@ -87,7 +87,8 @@ impl RoomNet {
             return Ok(None);
         };
         let frame = self.predictions.get(&image.facts().digest, || {
-            Ok::<_, Error>(Arc::new(self.predict(&image.decode()?)?))
+            let pixels = image.shared_pixels()?;
+            Ok::<_, Error>(Arc::new(self.predict(&pixels)?))
         })?;
         Ok(frame.answer(question, &self.rules, &self.palette))
     }

@@ -23,6 +23,8 @@ pub struct Payload {
     file: Bytes,
     /// The file as a data URL, encoded when it is first sent.
     data_url: OnceLock<Bytes>,
+    /// The pixels, decoded when a model of this process first looks at them; `Some(None)` if that failed.
+    pixels: OnceLock<Option<Arc<Rgb>>>,
 }
 
 impl Payload {
@@ -65,6 +67,7 @@ impl Payload {
             },
             file: file.into(),
             data_url: OnceLock::new(),
+            pixels: OnceLock::new(),
         }
     }
 
@@ -132,6 +135,18 @@ impl Payload {
             .into_rgb8();
         let (height, width) = (image.height() as usize, image.width() as usize);
         Rgb::new(height, width, image.into_raw())
+    }
+
+    /// The pixels as by [`Self::decode`], decoded once and kept as long as the payload, for several models of this process.
+    ///
+    /// # Errors
+    /// As of [`Self::decode`].
+    pub fn shared_pixels(&self) -> Result<Arc<Rgb>> {
+        let decode = || self.decode().map(Arc::new);
+        match self.pixels.get_or_init(|| decode().ok()) {
+            Some(pixels) => Ok(Arc::clone(pixels)),
+            None => decode(),
+        }
     }
 
     /// The pixels as by [`Self::decode`]; a lossless payload whose pixels are passed in is not decoded.
