@@ -306,7 +306,7 @@ fn write_frame(
         scene: &frame.scene,
         frame: &frame.frame,
     };
-    let mut line = output.line((rgb.width(), rgb.height()));
+    let mut line = output.line(rgb.width(), rgb.height());
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
     // Files other than plain PNG are copied unchanged, so that they are decoded as everywhere else.

@@ -204,7 +204,8 @@ impl<'a> FrameWriter<'a> {
             scene: &scene,
             frame: &frame.name,
         };
-        let mut line = output.line(encoded.size);
+        let (width, height) = encoded.size;
+        let mut line = output.line(width, height);
         let path = output
             .write("rgb", encoded.ending, &encoded.bytes)
             .map_err(|e| e.to_string())?;
