@@ -91,10 +91,6 @@ pub(super) fn choose_split(
 /// Lists the splits with their numbers of rows, such as `test (rows: 1000)`. Rows are counted for Parquet files in a folder, which have
 /// the count in their footer; other splits get the number of files.
 fn list_splits(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
-    let rows = |file: &&Path| match (tree, &*extension(file)) {
-        (Tree::Folder { .. }, "parquet") => parquet::count(&tree.full_path(file)).ok(),
-        _ => None,
-    };
     splits
         .iter()
         .map(|(split, files)| {
@@ -103,7 +99,13 @@ fn list_splits(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
             } else {
                 split
             };
-            let counts: Option<u64> = files.iter().map(rows).sum();
+            let counts: Option<u64> = files
+                .iter()
+                .map(|file| match (tree, &*extension(file)) {
+                    (Tree::Folder { .. }, "parquet") => parquet::count(&tree.full_path(file)).ok(),
+                    _ => None,
+                })
+                .sum();
             match counts {
                 Some(rows) => format!("{name} (rows: {rows})"),
                 None => format!("{name} (files: {})", files.len()),

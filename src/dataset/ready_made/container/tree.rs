@@ -30,10 +30,6 @@ impl Tree {
     /// If the cache does not name a snapshot.
     pub(super) fn from_folder(place: &Path) -> Result<Self> {
         let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
-        let is_cached_repository = |path: &Path| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            name.starts_with("datasets--")
-        };
         if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
             let repository = canonical
                 .ancestors()
@@ -118,6 +114,11 @@ impl Tree {
     pub(super) fn full_path(&self, path: &Path) -> PathBuf {
         self.place().join(path)
     }
+}
+
+fn is_cached_repository(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with("datasets--")
 }
 
 /// Scan of a folder and its subfolders.
