@@ -63,14 +63,15 @@ fn gap_in_second_column_hides_no_difference() {
     assert!(refusal(&path, &skipping()).contains("\"label\" differ"));
 }
 
-#[test]
-fn yes_no_columns_are_compared_where_both_have_answers() {
-    let rows = |other: &str, gap: Value| -> Vec<Value> {
-        (0..40).map(|at| {
+fn rows(other: &str, gap: Value) -> Vec<Value> {
+    (0..40).map(|at| {
             let answer = if at == 5 { gap.clone() } else { json!("yes") };
             json!({"id": at, "question": "Is it red?", "answer": answer, "label": other, "image": base64(1)})
         }).collect()
-    };
+}
+
+#[test]
+fn yes_no_columns_are_compared_where_both_have_answers() {
     let (_folder, path) = with(rows("no", json!("")));
     assert!(refusal(&path, &skipping()).contains("\"answer\" and \"label\" differ"));
     // Numbers mean no and yes if they agree with the other column.

@@ -55,9 +55,14 @@ fn scene_column_is_read_in_every_format() {
         "set.jsonl",
         &rows("house", [3, 3, 3, 3, 4, 4].map(|n| json!(n))),
     );
-    let read = |args: &SetArgs| scenes(&open(&path, args).unwrap());
-    assert_eq!(read(&SetArgs::default()), ["", "", ""]);
-    assert_eq!(read(&map("scene=house")), ["3", "3", "4"]);
+    assert_eq!(
+        scenes(&open(&path, &SetArgs::default()).unwrap()),
+        ["", "", ""]
+    );
+    assert_eq!(
+        scenes(&open(&path, &map("scene=house")).unwrap()),
+        ["3", "3", "4"]
+    );
 }
 
 #[test]
