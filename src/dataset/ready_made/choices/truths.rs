@@ -97,12 +97,12 @@ fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
             },
         )
         .collect();
-    let is_option = |answer: &String| {
-        [AnswerFormat::Letter, AnswerFormat::Text]
-            .iter()
-            .any(|format| format.choice_index(answer, options).is_some())
-    };
-    answers.iter().any(|answer| yes_no_index(answer).is_some()) && !answers.iter().any(is_option)
+    answers.iter().any(|answer| yes_no_index(answer).is_some())
+        && !answers.iter().any(|answer| {
+            [AnswerFormat::Letter, AnswerFormat::Text]
+                .iter()
+                .any(|format| format.choice_index(answer, options).is_some())
+        })
 }
 
 /// True if the table is in this program's own format, in which the answer is the text of a choice.
