@@ -167,9 +167,9 @@ fn mme_question(number: usize) -> Map<String, Value> {
 fn presets_have_groups() {
     let rows: Vec<Map<String, Value>> = (0..4).map(mme_question).collect();
     let (_folder, path) = made(&rows);
-    let dataset = open_preset("mme_question", &path, &SetArgs::default());
+    let dataset = open_preset("mme", &path, &SetArgs::default());
     assert_eq!(groups(&dataset)[0], Some(("colour_0.png", 2)));
-    let own = open_preset("mme_question", &path, &map("group=question"));
+    let own = open_preset("mme", &path, &map("group=question"));
     assert_eq!(groups(&own)[0], Some(("Is it 0?", 1)));
     // Without the column, a note says that there are no groups.
     let without = rows.into_iter().map(|mut row| {
@@ -177,7 +177,7 @@ fn presets_have_groups() {
         row
     });
     let (_folder, path) = made(&without.collect::<Vec<_>>());
-    let dataset = open_preset("mme_question", &path, &SetArgs::default());
+    let dataset = open_preset("mme", &path, &SetArgs::default());
     assert_eq!(groups(&dataset), [None; 4]);
     let said = dataset.summary().join("\n");
     assert!(

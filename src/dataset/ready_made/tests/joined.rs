@@ -201,7 +201,7 @@ fn equal_rows_with_different_answers_are_refused() {
     let (_folder, path) = set("set.jsonl", &rows_with_answers(["x", "y"]));
     let problem = refusal(&path, &SetArgs::default());
     assert!(
-        problem.contains("2 of 40 rows_with_answers are broken")
+        problem.contains("2 of 40 rows are broken")
             && problem.contains("line 1 (\"x\")")
             && problem.contains("line 2 (\"y\") ask the same of the same image, and their answers differ; --skip bad"),
         "{problem}"
@@ -216,7 +216,7 @@ fn equal_rows_with_different_answers_are_refused() {
         dataset
             .summary()
             .join("\n")
-            .contains("left out: 2 of 40 rows_with_answers")
+            .contains("left out: 2 of 40 rows")
     );
     // An exact repeat is asked again, with a note.
     let (_folder, path) = set("set.jsonl", &rows_with_answers(["x", "x"]));
@@ -267,7 +267,7 @@ fn contradictions_are_found_with_ids_too() {
             .unwrap_err()
             .to_string();
         assert!(
-            problem.contains("3 of 60 |last| rows_ending_with(&same, last) are broken")
+            problem.contains("3 of 60 rows are broken")
                 && problem.contains("line 39 (\"x\")")
                 && problem.contains("line 41 (\"y\") ask the same of the same image"),
             "{problem}"

@@ -187,7 +187,7 @@ fn card_with_split_fields_and_folder_is_read() {
     };
     open_with_card(folder.path(), mapping).unwrap();
     assert_eq!(open(folder.path(), &train).unwrap().questions().len(), 2);
-    // If the |text| open_with_card(folder.path(), text) cannot be parsed, a note says that file names decide.
+    // If the card cannot be parsed, a note says that file names decide.
     fs::rename(
         folder.path().join("data/inner/test-a.csv"),
         folder.path().join("test.csv"),

@@ -165,7 +165,7 @@ fn digits_mean_yes_or_no_only_in_yes_no_sets() {
         .map(|read| read.4)
         .collect();
     assert_eq!(truths, ["yes", "no"]);
-    // The answer to "how many" is a number: the yes_no_question is open, not a yes/no yes_no_question.
+    // The answer to "how many" is a number: the question is open, not a yes/no question.
     let rows = [
         yes_no_question("How many cups?", "1", 1),
         yes_no_question("How many cats?", "0", 2),
