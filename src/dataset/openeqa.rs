@@ -43,9 +43,12 @@ impl OpenQuestion {
 pub(crate) fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     let text = bytes(path)?;
     let questions: Vec<OpenQuestion> = serde_json::from_slice(&text).map_err(|e| {
-        Error::data(path.display(), format_args!(
-            "{e}; a JSON array of {{\"question_id\", \"question\", \"answer\", \"category\", \"episode_history\"}} expected"
-        ))
+        Error::data(
+            path.display(),
+            format_args!(
+                "{e}; a JSON array of {{\"question_id\", \"question\", \"answer\", \"category\", \"episode_history\"}} expected"
+            ),
+        )
     })?;
     if questions.is_empty() {
         return Err(Error::data(path.display(), "no questions in it"));

@@ -210,24 +210,24 @@ mod tests {
         }
     }
 
-    fn failed_batch(errors: Value) -> RemoteBatch {
+    fn failed_batch(errors: &Value) -> RemoteBatch {
         let object = json!({"id": "b", "status": "failed", "errors": errors});
         RemoteBatch::from_json(&object, &Scrub::default()).unwrap()
     }
 
     #[test]
     fn a_failed_batch_has_its_line_or_quota() {
-        let line = failed_batch(json!({"object": "list", "data": [
+        let line = failed_batch(&json!({"object": "list", "data": [
             {"code": "invalid_json_line", "message": "not JSON", "param": null, "line": 7},
         ]}));
         assert_eq!(line.problem, "line 7: not JSON (invalid_json_line)");
         assert_eq!(line.quota, None);
         let full = failed_batch(
-            json!({"data": [{"code": "token_limit_exceeded", "line": null, "message":
+            &json!({"data": [{"code": "token_limit_exceeded", "line": null, "message":
             "Enqueued token limit reached for m in organization o. Limit: 2,000,000 enqueued tokens."}]}),
         );
         let quota = full.quota.unwrap();
         assert_eq!(quota.limit, Some(2_000_000));
-        assert_eq!(failed_batch(Value::Null).quota, None);
+        assert_eq!(failed_batch(&Value::Null).quota, None);
     }
 }

@@ -96,9 +96,12 @@ impl FromStr for BaseUrl {
     /// Parses a URL. Errors do not show it, because it may contain a password.
     fn from_str(text: &str) -> Result<Self> {
         let url = Url::parse(text.trim()).map_err(|error| {
-            Error::usage("--base-url", format_args!(
-                "not an address ({error}); expected for example https://api.openai.com/v1 or http://127.0.0.1:8000/v1"
-            ))
+            Error::usage(
+                "--base-url",
+                format_args!(
+                    "not an address ({error}); expected for example https://api.openai.com/v1 or http://127.0.0.1:8000/v1"
+                ),
+            )
         })?;
         if !matches!(url.scheme(), "http" | "https") || url.host_str().is_none() {
             return Err(Error::usage(

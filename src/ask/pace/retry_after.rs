@@ -55,34 +55,39 @@ mod tests {
         retry_after(&headers, now)
     }
 
-    fn ms(ms: u64) -> Option<Duration> {
-        Some(Duration::from_millis(ms))
-    }
-
     #[test]
     fn waits_of_every_form_are_parsed() {
         for (pairs, expected) in [
-            (vec![("retry-after", "2")], ms(2000)),
-            (vec![("retry-after", " 0.25 ")], ms(250)),
+            (
+                vec![("retry-after", "2")],
+                Some(Duration::from_millis(2000)),
+            ),
+            (
+                vec![("retry-after", " 0.25 ")],
+                Some(Duration::from_millis(250)),
+            ),
             (
                 vec![("retry-after", "30"), ("retry-after-ms", "1500")],
-                ms(1500),
+                Some(Duration::from_millis(1500)),
             ),
-            (vec![("retry-after", "0"), ("retry-after-ms", "50")], ms(50)),
+            (
+                vec![("retry-after", "0"), ("retry-after-ms", "50")],
+                Some(Duration::from_millis(50)),
+            ),
             (
                 vec![("retry-after", "2"), ("retry-after-ms", "soon")],
-                ms(2000),
+                Some(Duration::from_millis(2000)),
             ),
             (
                 vec![("retry-after", "Sun, 06 Nov 1994 08:49:47 GMT")],
-                ms(10_000),
+                Some(Duration::from_millis(10_000)),
             ),
             (
                 vec![
                     ("retry-after", "Sun, 06 Nov 1994 08:59:47 GMT"),
                     ("date", "Sun, 06 Nov 1994 08:59:45 GMT"),
                 ],
-                ms(2000),
+                Some(Duration::from_millis(2000)),
             ),
             (vec![("retry-after", "Sun, 06 Nov 1994 08:49:37 GMT")], None),
             (vec![("retry-after", "Sun, 06 Nov 1904 08:49:37 GMT")], None),

@@ -173,18 +173,18 @@ mod tests {
         }
     }
 
-    fn prompt_tokens(usage: Value) -> Option<u64> {
-        read(Some(&usage)).unwrap().prompt_tokens
+    fn prompt_tokens(usage: &Value) -> Option<u64> {
+        read(Some(usage)).unwrap().prompt_tokens
     }
 
     #[test]
     fn caches_outside_the_prompt_are_added() {
         let large =
             json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 2000});
-        assert_eq!(prompt_tokens(large), Some(2100));
+        assert_eq!(prompt_tokens(&large), Some(2100));
         let within =
             json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 60});
-        assert_eq!(prompt_tokens(within), Some(100));
+        assert_eq!(prompt_tokens(&within), Some(100));
     }
 
     #[test]

@@ -93,7 +93,6 @@ impl Preset {
         let map = self.map.as_deref().and_then(|map| map.parse().ok());
         args.map.splice(0..0, map);
         args.preset_config.clone_from(&self.config);
-
         if args.multi_image.is_none() && self.skip.contains(&Skip::MultiImage) {
             args.multi_image = Some(SeveralImages::Skip);
         }

@@ -28,7 +28,6 @@ impl FamilySource {
                 return column.clone().map_or(Self::None, Self::Column);
             }
         };
-
         let varying = columns.iter().find(|column| {
             has_several_values(
                 questions

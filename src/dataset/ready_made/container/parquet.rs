@@ -182,16 +182,16 @@ fn convert_field(field: Field) -> Cell {
         Field::Bytes(bytes) => Cell::Bytes(bytes.data().into()),
         Field::Float(value) if value.is_nan() => Cell::Absent,
         Field::Double(value) if value.is_nan() => Cell::Absent,
-        Field::Float(value) => number(value.to_string()),
-        Field::Double(value) => number(value.to_string()),
-        Field::Byte(value) => number(value.to_string()),
-        Field::Short(value) => number(value.to_string()),
-        Field::Int(value) => number(value.to_string()),
-        Field::Long(value) => number(value.to_string()),
-        Field::UByte(value) => number(value.to_string()),
-        Field::UShort(value) => number(value.to_string()),
-        Field::UInt(value) => number(value.to_string()),
-        Field::ULong(value) => number(value.to_string()),
+        Field::Float(value) => number(&value),
+        Field::Double(value) => number(&value),
+        Field::Byte(value) => number(&value),
+        Field::Short(value) => number(&value),
+        Field::Int(value) => number(&value),
+        Field::Long(value) => number(&value),
+        Field::UByte(value) => number(&value),
+        Field::UShort(value) => number(&value),
+        Field::UInt(value) => number(&value),
+        Field::ULong(value) => number(&value),
         Field::Group(record) => Cell::Fields(
             record
                 .into_columns()
@@ -206,7 +206,7 @@ fn convert_field(field: Field) -> Cell {
     }
 }
 
-fn number(value: impl ToString) -> Cell {
+fn number(value: &impl ToString) -> Cell {
     Cell::Number(value.to_string().into())
 }
 

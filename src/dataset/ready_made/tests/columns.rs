@@ -63,21 +63,21 @@ fn gap_in_second_column_hides_no_difference() {
     assert!(refusal(&path, &skipping()).contains("\"label\" differ"));
 }
 
-fn rows(other: &str, gap: Value) -> Vec<Value> {
-    (0..40).map(|at| {
-            let answer = if at == 5 { gap.clone() } else { json!("yes") };
-            json!({"id": at, "question": "Is it red?", "answer": answer, "label": other, "image": base64(1)})
-        }).collect()
+fn rows(other: &str, gap: &Value) -> Vec<Value> {
+    (0..40)
+        .map(|at| (at, if at == 5 { gap.clone() } else { json!("yes") }))
+        .map(|(at, answer)| json!({"id": at, "question": "Is it red?", "answer": answer, "label": other, "image": base64(1)}))
+        .collect()
 }
 
 #[test]
 fn yes_no_columns_are_compared_where_both_have_answers() {
-    let (_folder, path) = with(rows("no", json!("")));
+    let (_folder, path) = with(rows("no", &json!("")));
     assert!(refusal(&path, &skipping()).contains("\"answer\" and \"label\" differ"));
     // Numbers mean no and yes if they agree with the other column.
-    let (_folder, path) = with(rows("1", json!("yes")));
+    let (_folder, path) = with(rows("1", &json!("yes")));
     assert_eq!(read(&open(&path, &skipping()).unwrap())[0].4, "yes");
-    let (_folder, path) = with(rows("0", json!("yes")));
+    let (_folder, path) = with(rows("0", &json!("yes")));
     assert!(refusal(&path, &skipping()).contains("differ"));
     // A column of correctness is not an answer column.
     let (_folder, path) = with(vec![

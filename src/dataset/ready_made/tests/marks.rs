@@ -112,7 +112,7 @@ fn empty_options_map_keeps_the_whole_question() {
     );
 }
 
-fn open_with_options(options: Value) -> Result<Read, String> {
+fn open_with_options(options: &Value) -> Result<Read, String> {
     let (_folder, path) = with(vec![
         json!({"question": "?", "options": options, "answer": "B", "image": base64(1)}),
     ]);
@@ -130,7 +130,7 @@ fn object_with_letter_keys_has_options() {
         json!("{'A': 'red', 'B': 'green', 'C': None}"),
         json!({"A": "A. red", "B": "B. green"}),
     ] {
-        let found = open_with_options(options.clone()).unwrap();
+        let found = open_with_options(&options).unwrap();
         assert_eq!(
             (found.3.as_slice(), found.4.as_str()),
             (&["red".to_owned(), "green".to_owned()][..], "green"),
@@ -156,7 +156,7 @@ fn object_with_letter_keys_has_options() {
         ),
         (json!({"A": "red", "B": ["green"]}), "hold no text at B"),
     ] {
-        let problem = open_with_options(options.clone()).unwrap_err();
+        let problem = open_with_options(&options).unwrap_err();
         assert!(
             problem.contains(says) && problem.contains("object 1"),
             "{options}: {problem}"
