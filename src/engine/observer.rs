@@ -43,7 +43,6 @@ impl Observer {
         questions: &[Question],
         rules: Rules,
     ) -> Result<Arc<Self>> {
-        let unusable = |problem: String| Error::usage("--model", format!("{OBSERVER}: {problem}"));
         let labels = Dataset::labels_at(place)?.ok_or_else(|| {
             unusable(format!(
                 "{} has no maps: frames with segments or classes (frames.jsonl, classes.json) are needed",
@@ -83,10 +82,14 @@ impl Observer {
         let mut parts = vec![VERSION.to_le_bytes().to_vec(), rules.as_bytes().to_vec()];
         parts.extend(control.map(|control| control.name().as_bytes().to_vec()));
         let digest = Digest::from_parts(parts.iter().map(|part| &part[..]));
-        let opinion = move |question: &Question, call: &Call<'_>| {
-            observer.answer(question, call, control, seed)
-        };
-        Local::new(name(control), digest, prior, Box::new(opinion))
+        Local::new(
+            name(control),
+            digest,
+            prior,
+            Box::new(move |question: &Question, call: &Call<'_>| {
+                observer.answer(question, call, control, seed)
+            }),
+        )
     }
 
     fn observed_frame(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
@@ -126,6 +129,10 @@ impl Observer {
             guessed: false,
         })
     }
+}
+
+fn unusable(problem: String) -> Error {
+    Error::usage("--model", format!("{OBSERVER}: {problem}"))
 }
 
 /// The part of an observation that the record of an answer stores.
