@@ -43,9 +43,10 @@ enum Primitive {
 /// Returns a definition if it may have fields about exposure, else an empty one to save memory.
 pub(super) fn relevant_definition(definition: &[u8]) -> Vec<u8> {
     let text = definition.to_ascii_lowercase();
-    let contains = |word: &[u8]| text.windows(word.len()).any(|part| part == word);
     let is_relevant = definition.len() <= MAX_DEFINITION_BYTES
-        && (contains(b"exposure") || contains(b"gain") || contains(b"json_data"));
+        && [&b"exposure"[..], b"gain", b"json_data"]
+            .iter()
+            .any(|word| text.windows(word.len()).any(|part| part == *word));
     if is_relevant {
         definition.to_vec()
     } else {
