@@ -204,9 +204,12 @@ mod tests {
         }
     }
 
+    fn number(n: u32) -> NonZeroU32 {
+        NonZeroU32::new(n).unwrap()
+    }
+
     #[test]
     fn shares_of_the_shards_that_run_at_once_sum_up() {
-        let number = |n| NonZeroU32::new(n).unwrap();
         let parts: Vec<Shard> = Shard::all(number(3)).collect();
         let whole = Quota {
             requests: Some(number(500)),

@@ -114,11 +114,6 @@ impl TableDetail for OpenDetail {
 impl Marks {
     /// The answer of a record, with its mark.
     fn marked_answer(&self, record: &Record<OpenDetail>) -> MarkedAnswer {
-        let unmarked = |outcome| MarkedAnswer {
-            answer: None,
-            outcome,
-            judge: None,
-        };
         let state = if record.failed() {
             AnswerState::Missing
         } else {
@@ -140,6 +135,14 @@ impl Marks {
             outcome,
             judge: self.judge.clone().filter(|_| mark.is_some()),
         }
+    }
+}
+
+fn unmarked(outcome: AnswerOutcome) -> MarkedAnswer {
+    MarkedAnswer {
+        answer: None,
+        outcome,
+        judge: None,
     }
 }
 
