@@ -174,10 +174,15 @@ fn selected_topics(
 
 /// A topic as part of a file name.
 fn slug(topic: &str) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '.');
     let name: String = topic
         .chars()
-        .map(|c| if is_plain(c) { c } else { '_' })
+        .map(|c| {
+            if c.is_alphanumeric() || matches!(c, '-' | '.') {
+                c
+            } else {
+                '_'
+            }
+        })
         .collect();
     name.trim_matches(['_', '.']).to_owned()
 }

@@ -53,9 +53,13 @@ impl<'a> OpenSetup<'a> {
         let selected = select(all, &config.chosen)?;
         let ids = selected.iter().map(|question| question.id.clone());
         let question_places = ids.zip(0..).collect();
-        let walk = |question: &OpenQuestion| question.episode.clone();
-        let (questions, part) =
-            shard_questions(selected, job.shard, walk, |_| String::new(), |_| 1)?;
+        let (questions, part) = shard_questions(
+            selected,
+            job.shard,
+            |question: &OpenQuestion| question.episode.clone(),
+            |_| String::new(),
+            |_| 1,
+        )?;
         let models = models::open_all(&job.ask, &[], |name| {
             models::open(name, None, &Parameters::new(String::new()))
         })?;
@@ -86,8 +90,13 @@ impl<'a> OpenSetup<'a> {
             check_enhanced(&conditions, &job.enhancers)?;
             (sources, conditions)
         } else {
-            let unseen = |name| Source::unseen(FrameId(name));
-            (names.into_iter().map(unseen).collect(), Vec::new())
+            (
+                names
+                    .into_iter()
+                    .map(|name| Source::unseen(FrameId(name)))
+                    .collect(),
+                Vec::new(),
+            )
         };
         recipe.check(&sources, &conditions)?;
         let mut setup = Self {

@@ -91,12 +91,16 @@ fn compare_pair(
     let real_residuals = Residuals::new(&real, &exposure)?;
     let compare_image = |image: &Rgb| -> Result<(ImageComparison, Residuals)> {
         let residuals = Residuals::new(image, &exposure)?;
-        let kl = |rule| divergence(&real_residuals, &residuals, args.kl_bins, rule);
         let comparison = ImageComparison {
             psnr: psnr(&real, image)?,
             ssim: ssim(&real, image)?,
-            kl: kl(args.kl_empty),
-            kl_other: kl(args.kl_empty.other()),
+            kl: divergence(&real_residuals, &residuals, args.kl_bins, args.kl_empty),
+            kl_other: divergence(
+                &real_residuals,
+                &residuals,
+                args.kl_bins,
+                args.kl_empty.other(),
+            ),
         };
         Ok((comparison, residuals))
     };
