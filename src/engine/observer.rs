@@ -44,7 +44,7 @@ impl Observer {
         rules: Rules,
     ) -> Result<Arc<Self>> {
         let labels = Dataset::labels_at(place)?.ok_or_else(|| {
-            unusable(format!(
+            unusable(&format!(
                 "{} has no maps: frames with segments or classes (frames.jsonl, classes.json) are needed",
                 dataset.name()
             ))
@@ -53,7 +53,7 @@ impl Observer {
             .iter()
             .find(|question| !is_in_rulebook(question, &rules))
         {
-            return Err(unusable(format!(
+            return Err(unusable(&format!(
                 "the question {:?} ({:?}) is not one of the rulebook's, and the observer understands no others; if another \
                  rulebook made it, name that with --rules",
                 unknown.id.0, unknown.text
@@ -70,7 +70,9 @@ impl Observer {
             observations: Recent::new(OBSERVATIONS),
         };
         if let Some(first) = questions.first() {
-            observer.observed_frame(&first.frame).map_err(unusable)?;
+            observer
+                .observed_frame(&first.frame)
+                .map_err(|problem| unusable(&problem))?;
         }
         Ok(Arc::new(observer))
     }
@@ -131,7 +133,7 @@ impl Observer {
     }
 }
 
-fn unusable(problem: String) -> Error {
+fn unusable(problem: &str) -> Error {
     Error::usage("--model", format!("{OBSERVER}: {problem}"))
 }
 

@@ -238,16 +238,16 @@ impl Baseline {
             return Ok(true);
         }
         if let Some(missing) = self.missing_sentence() {
-            return refuse(missing);
+            return refuse(&missing);
         }
         if models.is_empty() {
-            return refuse(format!(
+            return refuse(&format!(
                 "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
                  observer do not count)"
             ));
         }
         if !models.iter().any(|row| row.significance.is_possible()) {
-            return refuse(format!(
+            return refuse(&format!(
                 "no verdict against {old} is possible: {}",
                 no_verdict(&models, unit)
             ));
@@ -256,7 +256,7 @@ impl Baseline {
     }
 }
 
-fn refuse(problem: String) -> Result<bool> {
+fn refuse(problem: &str) -> Result<bool> {
     let problem = format!("{problem}; leave the flag out to see the report");
     Err(Error::usage(FAIL_IF_WORSE, problem))
 }

@@ -159,8 +159,10 @@ mod tests {
 
     fn resolved(text: Option<&str>, variables: &[(&str, &str)]) -> Result<Shard> {
         Shard::resolve(text, |name| {
-            let found = variables.iter().find(|(known, _)| *known == name);
-            found.map(|(_, value)| (*value).to_owned())
+            variables
+                .iter()
+                .find(|(known, _)| *known == name)
+                .map(|(_, value)| (*value).to_owned())
         })
     }
 

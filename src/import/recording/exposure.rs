@@ -62,8 +62,9 @@ impl ExposureFields {
         }
         let text = std::str::from_utf8(definition).ok()?;
         // The definitions of nested types follow after a line of equals signs.
-        let own = text.split("\n===").next()?;
-        let mut lines = own
+        let mut lines = text
+            .split("\n===")
+            .next()?
             .lines()
             .map(|line| line.split('#').next().unwrap_or_default().trim())
             .filter(|line| !line.is_empty() && !line.contains('='))

@@ -48,11 +48,17 @@ impl<'a> OpenSetup<'a> {
     pub(super) fn open(config: &'a OpenEqa, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
         let all = openeqa::read_questions(&config.questions)?;
-        let ids = all.iter().map(|question| question.id.clone());
-        let file_places = ids.zip(0..).collect();
+        let file_places = all
+            .iter()
+            .map(|question| question.id.clone())
+            .zip(0..)
+            .collect();
         let selected = select(all, &config.chosen)?;
-        let ids = selected.iter().map(|question| question.id.clone());
-        let question_places = ids.zip(0..).collect();
+        let question_places = selected
+            .iter()
+            .map(|question| question.id.clone())
+            .zip(0..)
+            .collect();
         let (questions, part) = shard_questions(
             selected,
             job.shard,

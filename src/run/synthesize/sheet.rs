@@ -101,9 +101,12 @@ fn footer(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) 
     }
     if has_kind(degradations, Kind::has_readings) {
         let key = NoiseKey::new(light.kinds.sensor.seed, frame);
-        let readings = light.kinds.sensor.readings.iter();
         facts.extend(
-            readings
+            light
+                .kinds
+                .sensor
+                .readings
+                .iter()
                 .map(|(name, synthesis)| format!("{name}: {}", gain_and_ratio(synthesis, &key))),
         );
     }

@@ -238,14 +238,15 @@ fn is_metadata(path: &Path) -> bool {
 /// # Errors
 /// If there are no files, or files of several kinds.
 fn files_by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
-    let (metadata, others): (Vec<PathBuf>, Vec<PathBuf>) =
-        files.into_iter().partition(|path| is_metadata(path));
+    let (metadata, others) = files
+        .into_iter()
+        .partition::<Vec<PathBuf>, _>(|path| is_metadata(path));
     if !metadata.is_empty() {
         return require_one_kind(tree, metadata);
     }
-    let (parquet, others): (Vec<PathBuf>, Vec<PathBuf>) = others
+    let (parquet, others) = others
         .into_iter()
-        .partition(|path| extension(path) == "parquet");
+        .partition::<Vec<PathBuf>, _>(|path| extension(path) == "parquet");
     if !parquet.is_empty() {
         return Ok(parquet);
     }

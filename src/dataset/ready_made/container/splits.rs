@@ -42,8 +42,10 @@ pub(super) fn split_in_name(path: &Path) -> String {
 
 /// The usual word for a split; the name itself if there is none.
 fn usual_word(name: &str) -> &str {
-    let known = SPLIT_WORDS.iter().find(|(word, _)| *word == name);
-    known.map_or(name, |(_, usual)| usual)
+    SPLIT_WORDS
+        .iter()
+        .find(|(word, _)| *word == name)
+        .map_or(name, |(_, usual)| usual)
 }
 
 /// Files of the wanted split, or of all splits for `all`. The default is the only split, or `test` if several exist.
