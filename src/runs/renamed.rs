@@ -198,11 +198,6 @@ fn left_out(
     let has = |name: &str| {
         now.contains_key(name) || manifest.models.iter().any(|model| model.name == name)
     };
-    let is_listed = |name: &str| {
-        // Controls are asked together with the observer.
-        let asked = Control::from_model_name(name).map_or(name, |_| OBSERVER);
-        has(name) || has(asked)
-    };
     manifest
         .columns
         .get("model")
@@ -210,7 +205,11 @@ fn left_out(
         .flatten()
         .map(|(name, _)| name)
         .filter(|name| settings == SettingsChange::Allowed || left_out_before.contains(*name))
-        .filter(|name| !is_listed(name))
+        .filter(|name| {
+            // Controls are asked together with the observer.
+            let asked = Control::from_model_name(name).map_or(name.as_str(), |_| OBSERVER);
+            !has(name) && !has(asked)
+        })
         .cloned()
         .collect()
 }

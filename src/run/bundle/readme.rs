@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-use crate::runs::stored::AnyRun;
+use crate::runs::stored::{AnyRun, text_setting};
 use crate::types::flags::keyed_form;
 use crate::types::manifests::{RunManifest, judge_flag};
 use crate::types::text::shown;
@@ -151,10 +151,6 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     file.map_or(command.clone(), |file| {
         format!("cat > models.toml <<'END'\n{file}END\n{command}")
     })
-}
-
-fn text_setting<'a>(manifest: &'a RunManifest, name: &str) -> Option<&'a str> {
-    manifest.settings.get(name).and_then(Value::as_str)
 }
 
 /// The settings of the models at endpoints, by name.

@@ -217,14 +217,17 @@ mod tests {
     #[test]
     fn links_lead_from_the_page_to_the_image() {
         let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        fs::create_dir_all(at("data/a b")).unwrap();
-        fs::create_dir_all(at("out")).unwrap();
-        fs::write(at("data/a b/#1.png"), "").unwrap();
+        let root = folder.path();
+        fs::create_dir_all(root.join("data/a b")).unwrap();
+        fs::create_dir_all(root.join("out")).unwrap();
+        fs::write(root.join("data/a b/#1.png"), "").unwrap();
         assert_eq!(
-            link(&at("out"), &at("data/a b/#1.png")),
+            link(&root.join("out"), &root.join("data/a b/#1.png")),
             "../data/a%20b/%231.png"
         );
-        assert_eq!(link(&at("data"), &at("data/a b/#1.png")), "a%20b/%231.png");
+        assert_eq!(
+            link(&root.join("data"), &root.join("data/a b/#1.png")),
+            "a%20b/%231.png"
+        );
     }
 }

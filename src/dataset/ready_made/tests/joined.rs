@@ -168,12 +168,16 @@ fn zip_file_has_its_own_name_and_map() {
 fn ambiguous_image_in_zip_is_refused() {
     let table = b"id,question,image,A,B,answer\n1,Which?,images/0.png,x,y,B\n";
     let (near, top) = (png(3), png(5));
-    let of = |files: &[(&str, &[u8])]| zip(&[files, &[("data/metadata.csv", table)]].concat());
+    let metadata: (&str, &[u8]) = ("data/metadata.csv", table);
     for (name, image, red) in [("data/images/0.png", &near, 3), ("images/0.png", &top, 5)] {
-        let (_folder, path) = of(&[(name, image)]);
+        let (_folder, path) = zip(&[(name, image), metadata]);
         assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].5, red);
     }
-    let (_folder, path) = of(&[("data/images/0.png", &near), ("images/0.png", &top)]);
+    let (_folder, path) = zip(&[
+        ("data/images/0.png", &near),
+        ("images/0.png", &top),
+        metadata,
+    ]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(
         problem.contains("may be \"data/images/0.png\" or \"images/0.png\"")

@@ -373,26 +373,34 @@ fn pair(text: &str, family: &str) -> (String, String) {
     (text.to_owned(), family.to_owned())
 }
 
+/// A path in the folder; its parent is created.
+fn path_in(folder: &std::path::Path, name: &str) -> std::path::PathBuf {
+    let path = folder.join(name);
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    path
+}
+
 #[test]
 fn repository_has_configurations_splits_and_shards() {
     let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| {
-        let path = folder.path().join(name);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        path
-    };
     let card = "---\nconfigs:\n- config_name: one\n  data_files:\n  - split: test\n    path: one/test-*\n- config_name: two\n  data_files:\n  - split: val\n    path: two/*.parquet\n  - split: train\n    path: two/b.csv\n---\n";
-    fs::write(at("README.md"), card).unwrap();
+    fs::write(path_in(folder.path(), "README.md"), card).unwrap();
     write(
-        &at("one/test-00000-of-00002.parquet"),
+        &path_in(folder.path(), "one/test-00000-of-00002.parquet"),
         &[choice_question("first", 1)],
     );
     write(
-        &at("one/test-00001-of-00002.parquet"),
+        &path_in(folder.path(), "one/test-00001-of-00002.parquet"),
         &[choice_question("second", 2)],
     );
-    write(&at("two/a.parquet"), &[choice_question("third", 3)]);
-    write(&at("two/b.csv"), &[choice_question("fourth", 4)]);
+    write(
+        &path_in(folder.path(), "two/a.parquet"),
+        &[choice_question("third", 3)],
+    );
+    write(
+        &path_in(folder.path(), "two/b.csv"),
+        &[choice_question("fourth", 4)],
+    );
     assert!(
         texts_and_families(folder.path(), None, None)
             .unwrap_err()
@@ -426,7 +434,7 @@ fn repository_has_configurations_splits_and_shards() {
             pair("fourth", "two")
         ]
     );
-    fs::remove_file(at("one/test-00001-of-00002.parquet")).unwrap();
+    fs::remove_file(path_in(folder.path(), "one/test-00001-of-00002.parquet")).unwrap();
     assert!(
         texts_and_families(folder.path(), Some("one"), None)
             .unwrap_err()
