@@ -53,8 +53,8 @@ impl OtherShards {
                 return Err(Error::Run {
                     path: path.clone(),
                     problem: format!(
-                        "another process is writing to this part of another division, and both might ask the same; wait for it, or end it, before \
-                     --shard {} begins",
+                        "another process is writing to this part of another division, and both might ask the same; wait for it, or end it, \
+                         before --shard {} begins",
                         manifest.shard.as_deref().unwrap_or_default()
                     ),
                 });

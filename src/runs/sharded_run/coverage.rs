@@ -37,7 +37,11 @@ impl Coverage {
         };
         for (shard, folder, manifest) in shards {
             let Some(part) = &manifest.part else {
-                return Err(Error::Run { path: folder.to_owned(), problem: ("the part does not say which frames it has: an earlier version made it; run it again".to_owned()) });
+                let problem = "the part does not say which frames it has: an earlier version made it; run it again";
+                return Err(Error::Run {
+                    path: folder.to_owned(),
+                    problem: problem.to_owned(),
+                });
             };
             let place = part.place;
             if coverage.shards.is_empty() {
