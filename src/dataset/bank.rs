@@ -352,7 +352,7 @@ mod tests {
 
     #[test]
     fn errors_name_the_invalid_line() {
-        for (rest, says) in [
+        for (rest, message) in [
             ("{", "bank.jsonl, line 4: EOF"),
             (
                 r#"{"id":3,"question":"?","choices":["x","y"],"answer":"x"}"#,
@@ -401,7 +401,7 @@ mod tests {
         ] {
             let text = format!("{}{rest}", TWO.trim_start_matches('\u{feff}'));
             let error = bank(&text).unwrap_err().to_string();
-            assert!(error.contains(says), "{rest}: {error}");
+            assert!(error.contains(message), "{rest}: {error}");
         }
         let error = bank("\n").unwrap_err().to_string();
         assert_eq!(error, "bank.jsonl: no questions in it");

@@ -451,7 +451,7 @@ mod tests {
 
     #[test]
     fn missing_or_invalid_maps_are_errors() {
-        for (keys, says) in [
+        for (keys, message) in [
             (r#","depth":"no.png","depth_scale":1"#, "no.png"),
             (r#","sem":"no.png""#, "no such file: "),
             (r#","over":"""#, "the path is empty"),
@@ -467,7 +467,7 @@ mod tests {
                 .unwrap_err()
                 .to_string();
             assert!(
-                error.contains("frames.jsonl, line 2: ") && error.contains(says),
+                error.contains("frames.jsonl, line 2: ") && error.contains(message),
                 "{error}"
             );
         }

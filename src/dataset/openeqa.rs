@@ -138,7 +138,7 @@ mod tests {
         let loaded = read_text(file.path(), &format!("[{one}, {extra}]")).unwrap();
         assert_eq!((loaded[0].split(), &loaded[0].extra), ("hm3d-v0", &None));
         assert_eq!(loaded[1].extra.as_deref(), Some(&["here".to_owned()][..]));
-        for (text, says) in [
+        for (text, message) in [
             ("[]", "no questions in it"),
             ("{}", "a JSON array of"),
             (
@@ -147,7 +147,7 @@ mod tests {
             ),
         ] {
             let error = read_text(file.path(), text).unwrap_err().to_string();
-            assert!(error.contains(says), "{error}");
+            assert!(error.contains(message), "{error}");
         }
     }
 

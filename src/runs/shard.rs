@@ -192,7 +192,7 @@ mod tests {
             let shard = resolved(text, variables).unwrap();
             assert_eq!(shard.to_string(), expected, "{text:?}");
         }
-        for (text, variables, says) in [
+        for (text, variables, message) in [
             (Some("0/4"), &[][..], "a part expected, as 2/4"),
             (Some("5/4"), &[], "a part expected"),
             (Some("1"), &[], "a part expected"),
@@ -202,7 +202,7 @@ mod tests {
             (None, &pod, "--shard auto/N"),
         ] {
             let error = resolved(text, variables).unwrap_err().to_string();
-            assert!(error.contains(says), "{text:?}: {error}");
+            assert!(error.contains(message), "{text:?}: {error}");
         }
     }
 

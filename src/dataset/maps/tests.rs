@@ -168,7 +168,7 @@ fn segment_maps_are_read_in_every_format() {
 
 #[test]
 fn map_size_error_names_both_sizes() {
-    let says = "1 × 2 pixels (height × width), but its image has 2 × 1";
+    let message = "1 × 2 pixels (height × width), but its image has 2 × 1";
     let (_folder, png) = temporary_file("m.png", &deep([1, 2], &[1, 2]));
     let (_folder, npy) = temporary_file("m.npy", &npy_file("|u1", "(1, 2)", &[1, 2]));
     let units = deep([1, 2], &[1, 2]);
@@ -179,7 +179,7 @@ fn map_size_error_names_both_sizes() {
         segments(&npy, (2, 1)).unwrap_err(),
     ] {
         let error = error.to_string();
-        assert!(error.contains(says) && error.contains("m."), "{error}");
+        assert!(error.contains(message) && error.contains("m."), "{error}");
     }
 }
 

@@ -99,7 +99,7 @@ fn damaged_parquet_file_is_an_error() {
 #[test]
 fn errors_in_text_files_name_the_line() {
     let (folder, _) = set("set.json", &[]);
-    for (name, content, says) in [
+    for (name, content, message) in [
         ("a.jsonl", &b"{\"id\": 1}\n{\n"[..], "a.jsonl, line 2: EOF"),
         ("a.json", b"[{\"id\": 1}, {\"id\"", "the file ends at byte"),
         ("b.json", b"3", "neither a list nor an object"),
@@ -130,7 +130,7 @@ fn errors_in_text_files_name_the_line() {
         let path = folder.path().join(name);
         fs::write(&path, content).unwrap();
         let problem = refusal(&path, &SetArgs::default());
-        assert!(problem.contains(says), "{name}: {problem}");
+        assert!(problem.contains(message), "{name}: {problem}");
     }
 }
 
@@ -174,8 +174,8 @@ fn columns_by_index_and_in_lists_are_read() {
     let (_folder, path) = set("set.jsonl", &[by_index(0), by_index(1)]);
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions[1].choices.truth(), Some(1));
-    let said = json!([{"value": "Which? (A) x (B) y"}, {"value": "B"}]);
-    let listed = row(json!({"id": 1, "conversations": said, "image": base64(1)}));
+    let turns = json!([{"value": "Which? (A) x (B) y"}, {"value": "B"}]);
+    let listed = row(json!({"id": 1, "conversations": turns, "image": base64(1)}));
     let (_folder, path) = set("set.jsonl", &[listed]);
     let map = "question=conversations.0.value,answer=conversations.1.value";
     let args = SetArgs {
@@ -184,17 +184,17 @@ fn columns_by_index_and_in_lists_are_read() {
     };
     let dataset = open(&path, &args).unwrap();
     assert_eq!(dataset.questions[0].choices.truth(), Some(1));
-    let beside = row(
+    let with_pixels = row(
         json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": "none.png", "pixels": bytes(1)}),
     );
-    let (_folder, path) = set("set.parquet", &[beside]);
+    let (_folder, path) = set("set.parquet", &[with_pixels]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(problem.contains("image=pixels"), "{problem}");
 }
 
 #[test]
 fn outside_paths_and_invalid_images_are_errors() {
-    for (image, says) in [
+    for (image, message) in [
         ("../secret.png", "lies outside"),
         ("/etc/hostname", "lies outside"),
         ("https://example.org/0.png", "download them first"),
@@ -204,10 +204,10 @@ fn outside_paths_and_invalid_images_are_errors() {
         for form in ["tsv", "jsonl", "parquet"] {
             let (_folder, path) = set(&format!("set.{form}"), &[question(1, image)]);
             let problem = refusal(&path, &SetArgs::default());
-            assert!(problem.contains(says), "{form}: {problem}");
+            assert!(problem.contains(message), "{form}: {problem}");
         }
     }
-    for (cell, says) in [
+    for (cell, message) in [
         (base64(1)[..80].to_owned(), "not a"),
         ("QUJD".repeat(40), "not an image"),
     ] {
@@ -218,7 +218,7 @@ fn outside_paths_and_invalid_images_are_errors() {
             .and_then(|picture| picture.decode());
         let problem = picture.unwrap_err().to_string();
         assert!(
-            problem.contains("set.tsv, line 2: ") && problem.contains(says),
+            problem.contains("set.tsv, line 2: ") && problem.contains(message),
             "{problem}"
         );
     }
@@ -246,7 +246,7 @@ fn line(image: &str) -> String {
 #[test]
 fn malicious_archives_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, entries, says) in [
+    for (name, entries, message) in [
         (
             "a.zip",
             vec![("../a.png", "x".to_owned())],
@@ -285,7 +285,7 @@ fn malicious_archives_are_refused() {
             .collect();
         super::shapes::pack(&path, &entries);
         let problem = refusal(&path, &SetArgs::default());
-        assert!(problem.contains(says), "{name}: {problem}");
+        assert!(problem.contains(message), "{name}: {problem}");
     }
     let path = folder.path().join("g.zip");
     fs::write(&path, b"PK no").unwrap();

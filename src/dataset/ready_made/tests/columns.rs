@@ -103,11 +103,11 @@ fn printed_flags_are_quoted_for_the_shell() {
         let (_, command) = problem.split_once("; --map ").unwrap();
         let (command, _) = command.split_once(" or --map ").unwrap();
         let mut shell = std::process::Command::new("sh");
-        let said = shell
+        let output = shell
             .args(["-c", &format!("printf %s {command}")])
             .output()
             .unwrap();
-        let pasted = String::from_utf8(said.stdout).unwrap();
+        let pasted = String::from_utf8(output.stdout).unwrap();
         assert_eq!(
             read(&open(&path, &map(&pasted)).unwrap())[0].4,
             "y",

@@ -59,10 +59,10 @@ fn groups_follow_column_template_or_run_of_numbers() {
     );
     // The open question is left out, and its group is incomplete.
     assert_eq!(groups(&by_image)[4], Some(("2.png", 2)));
-    let said = by_image.summary().join("\n");
+    let summary = by_image.summary().join("\n");
     assert!(
-        said.contains("group = image: 3 groups of 2 questions, 1 with questions that are left out, never complete"),
-        "{said}"
+        summary.contains("group = image: 3 groups of 2 questions, 1 with questions that are left out, never complete"),
+        "{summary}"
     );
     let template = open(&path, &with("id=nr,group={set}_{figure}")).unwrap();
     assert_eq!(
@@ -75,16 +75,16 @@ fn groups_follow_column_template_or_run_of_numbers() {
             Some(("s1_1", 1))
         ]
     );
-    let said = template.summary().join("\n");
+    let summary = template.summary().join("\n");
     assert!(
-        said.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete; 1 question without a group"),
-        "{said}"
+        summary.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete; 1 question without a group"),
+        "{summary}"
     );
     let alone = open(&path, &with("id=nr,group={nr:1}")).unwrap();
-    let said = alone.summary().join("\n");
+    let summary = alone.summary().join("\n");
     assert!(
-        said.contains("5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"),
-        "{said}"
+        summary.contains("5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"),
+        "{summary}"
     );
     let from_one: Vec<&str> = vec!["0", "0", "1", "1", "2"];
     let runs = open(&path, &with("id=nr,group={nr:2 from 1}")).unwrap();
@@ -107,7 +107,7 @@ fn groups_follow_column_template_or_run_of_numbers() {
 #[test]
 fn invalid_group_error_names_expected() {
     let (_folder, path) = made(&rows());
-    for (text, says) in [
+    for (text, message) in [
         (
             "group=figures",
             "names the column \"figures\", which is not there",
@@ -118,7 +118,7 @@ fn invalid_group_error_names_expected() {
         ("group={nr:0}", "{COLUMN:2} or {COLUMN:2 from 1} expected"),
     ] {
         let problem = refusal(&path, &with(text));
-        assert!(problem.contains(says), "{text}: {problem}");
+        assert!(problem.contains(message), "{text}: {problem}");
     }
 }
 
@@ -179,9 +179,9 @@ fn presets_have_groups() {
     let (_folder, path) = made(&without.collect::<Vec<_>>());
     let dataset = open_preset("mme", &path, &SetArgs::default());
     assert_eq!(groups(&dataset), [None; 4]);
-    let said = dataset.summary().join("\n");
+    let summary = dataset.summary().join("\n");
     assert!(
-        said.contains("no groups: MME scores questions together by {category}_{question_id} or"),
-        "{said}"
+        summary.contains("no groups: MME scores questions together by {category}_{question_id} or"),
+        "{summary}"
     );
 }

@@ -39,10 +39,10 @@ fn names_of_rows_become_ids() {
     let mut ids: Vec<String> = read(&dataset).into_iter().map(|read| read.0).collect();
     ids.sort();
     assert_eq!(ids, ["q2", "q7"]);
-    let said = dataset.summary().join("\n");
+    let summary = dataset.summary().join("\n");
     assert!(
-        said.contains("id = id") && said.contains("the names of the rows"),
-        "{said}"
+        summary.contains("id = id") && summary.contains("the names of the rows"),
+        "{summary}"
     );
     // A column of ids takes precedence.
     let text = json!({"q7": question(json!({"question_id": 1})), "q2": question(json!({"question_id": 2}))}).to_string();

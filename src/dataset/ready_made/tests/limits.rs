@@ -199,10 +199,10 @@ fn card_with_split_fields_and_folder_is_read() {
     )
     .unwrap();
     assert_eq!(read(&dataset).len(), 1);
-    let said = dataset.summary().join("\n");
+    let summary = dataset.summary().join("\n");
     assert!(
-        said.contains("README.md cannot be read") && said.contains("names of files decide"),
-        "{said}"
+        summary.contains("README.md cannot be read") && summary.contains("names of files decide"),
+        "{summary}"
     );
     let named = SetArgs {
         config_name: Some("default".to_owned()),

@@ -137,7 +137,7 @@ fn object_with_letter_keys_has_options() {
             "{options}"
         );
     }
-    for (options, says) in [
+    for (options, message) in [
         (
             json!({"A": "red", "C": "green"}),
             "have C where B is expected",
@@ -158,7 +158,7 @@ fn object_with_letter_keys_has_options() {
     ] {
         let problem = open_with_options(&options).unwrap_err();
         assert!(
-            problem.contains(says) && problem.contains("object 1"),
+            problem.contains(message) && problem.contains("object 1"),
             "{options}: {problem}"
         );
     }

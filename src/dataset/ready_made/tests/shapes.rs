@@ -255,11 +255,11 @@ fn rows_that_cannot_be_asked_need_a_flag() {
     );
     let (_folder, path) = set("set.parquet", &rows);
     let problem = super::refusal(&path, &SetArgs::default());
-    for says in [
+    for message in [
         "1 of 3 rows show 2 images; --multi-image skip",
         "no image in 1 of 3 rows; --skip no-image",
     ] {
-        assert!(problem.contains(says), "{problem}");
+        assert!(problem.contains(message), "{problem}");
     }
     let summary = open(&path, &args).unwrap().summary().join("\n");
     assert!(

@@ -155,13 +155,13 @@ fn template_has_a_number_width() {
         let args = map(&format!("image={template}"));
         assert_eq!(read(&open(&path, &args).unwrap())[0].5, 5, "{template}");
     }
-    for (template, says) in [
+    for (template, message) in [
         ("val/{image_id:099}.png", "a width of at most 64"),
         ("val/{image_id:x}.png", "image_id:x"),
         ("val/{image_id", "'}' is missing"),
     ] {
         let problem = refusal(&path, &map(&format!("image={template}")));
-        assert!(problem.contains(says), "{problem}");
+        assert!(problem.contains(message), "{problem}");
     }
 }
 
