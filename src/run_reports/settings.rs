@@ -354,19 +354,18 @@ pub(super) fn is_digest(text: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn seed_settings(value: Option<&str>) -> Option<Settings> {
-        let pair = value.map(|value| ("--seed".to_owned(), value.to_owned()));
-        Some(pair.into_iter().collect::<Settings>())
+    fn seed_settings(value: &str) -> Settings {
+        Settings::from([("--seed".to_owned(), value.to_owned())])
     }
 
     #[test]
     fn setting_lists_each_value_once() {
         let runs = [
-            seed_settings(Some("0")),
-            seed_settings(Some("1")),
-            seed_settings(Some("0")),
+            Some(seed_settings("0")),
+            Some(seed_settings("1")),
+            Some(seed_settings("0")),
             None,
-            seed_settings(None),
+            Some(Settings::new()),
         ];
         let names = ["a", "b", "c", "d", "e"].map(str::to_owned);
         let [setting] = &*differing_settings(&runs) else {

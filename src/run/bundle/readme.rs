@@ -284,16 +284,18 @@ mod tests {
         assert_eq!(fenced("a ``` b"), "````sh\na ``` b\n````\n");
     }
 
-    fn words(value: serde_json::Value) -> Vec<String> {
-        flag_words("--x", &value)
-    }
-
     #[test]
     fn flags_are_words_of_a_shell() {
-        assert_eq!(words(serde_json::json!("a b")), ["--x", "'a b'"]);
-        assert_eq!(words(serde_json::json!(["a", 2])), ["--x", "a", "--x", "2"]);
-        assert_eq!(words(serde_json::json!(true)), ["--x"]);
-        assert!(words(Value::Null).is_empty());
+        assert_eq!(
+            flag_words("--x", &serde_json::json!("a b")),
+            ["--x", "'a b'"]
+        );
+        assert_eq!(
+            flag_words("--x", &serde_json::json!(["a", 2])),
+            ["--x", "a", "--x", "2"]
+        );
+        assert_eq!(flag_words("--x", &serde_json::json!(true)), ["--x"]);
+        assert!(flag_words("--x", &Value::Null).is_empty());
         let gain = flag_words("--gain", &serde_json::json!(0.5));
         assert_eq!(gain, ["--noise", "gain=0.5"]);
         let fixed = flag_words("--fixed", &serde_json::json!(true));
