@@ -177,10 +177,13 @@ mod tests {
         }
     }
 
+    fn read_line(line: &str) -> BatchLine {
+        BatchLine::read(line).unwrap()
+    }
+
     #[test]
     fn lines_with_replies_and_failures_are_read() {
-        let read = |line: &str| BatchLine::read(line).unwrap();
-        let answered = read(
+        let answered = read_line(
             r#"{"id":"batch_req_1","custom_id":"k","response":{"status_code":200,"request_id":"r","body":{"choices":[{"message":{"content":"B"},"finish_reason":"stop"}],"usage":{"prompt_tokens":9}}},"error":null}"#,
         );
         assert_eq!(answered.id, "k");
@@ -191,7 +194,7 @@ mod tests {
             let line = format!(
                 r#"{{"custom_id":"k","response":{{"status_code":200,"body":{{"choices":[{{"message":{{"content":"B"}},"finish_reason":"stop"}}]}}}},"error":{empty}}}"#
             );
-            assert_eq!(read(&line).result.unwrap().text, "B", "{empty}");
+            assert_eq!(read_line(&line).result.unwrap().text, "B", "{empty}");
         }
         for (line, kind, message) in [
             (
@@ -216,7 +219,7 @@ mod tests {
             ),
             (r#"{"custom_id":"k"}"#, FailureKind::Response, "neither"),
         ] {
-            let failure = read(line).result.unwrap_err();
+            let failure = read_line(line).result.unwrap_err();
             assert_eq!(failure.kind, kind, "{line}");
             assert!(failure.message.contains(message), "{}", failure.message);
         }

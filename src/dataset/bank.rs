@@ -210,7 +210,6 @@ impl BankQuestion {
 
 /// Parses and checks one line; `number` is its line number.
 fn parse_line(line: &str, opt_out: OptOut, path: &Path, number: usize) -> Result<BankQuestion> {
-    let wrong = |problem: String| Error::line(path, number, problem);
     let value: Value =
         serde_json::from_str(line).map_err(|e| Error::json_line(path, number, &e))?;
     for (field, instead) in [
@@ -229,7 +228,7 @@ fn parse_line(line: &str, opt_out: OptOut, path: &Path, number: usize) -> Result
     ] {
         if value.get(field).is_some() {
             let problem = format!("a question of --ask has no {field:?}: {instead}");
-            return Err(wrong(problem));
+            return Err(Error::line(path, number, problem));
         }
     }
     let mut line: BankLine =
@@ -238,14 +237,22 @@ fn parse_line(line: &str, opt_out: OptOut, path: &Path, number: usize) -> Result
         Value::String(id) if !id.trim().is_empty() => id,
         Value::Number(id) => id.to_string(),
         other => {
-            return Err(wrong(format!(
-                "the id {} is neither text nor a number",
-                excerpt(&other.to_string(), 60)
-            )));
+            return Err(Error::line(
+                path,
+                number,
+                format_args!(
+                    "the id {} is neither text nor a number",
+                    excerpt(&other.to_string(), 60)
+                ),
+            ));
         }
     };
     if line.question.trim().is_empty() {
-        return Err(wrong(format!("question {:?} is empty", excerpt(&id, 60))));
+        return Err(Error::line(
+            path,
+            number,
+            format_args!("question {:?} is empty", excerpt(&id, 60)),
+        ));
     }
     for choice in &mut line.choices {
         *choice = one_line(choice);
@@ -286,8 +293,13 @@ mod tests {
         let home = Bank::open(&"home".parse().unwrap()).unwrap();
         let uncertain = Bank::open(&"home:uncertain".parse().unwrap()).unwrap();
         assert_eq!((home.len(), uncertain.len()), (25, 25));
-        let presence = |question: &&BankQuestion| question.family == Family::Presence;
-        assert_eq!(home.questions.iter().filter(presence).count(), 15);
+        assert_eq!(
+            home.questions
+                .iter()
+                .filter(|question| question.family == Family::Presence)
+                .count(),
+            15
+        );
         for (bare, with_opt_out) in home.questions.iter().zip(&uncertain.questions) {
             assert!(
                 !bare
@@ -317,30 +329,30 @@ mod tests {
         assert_eq!(asked[0].evidence, json!({"bank_id": "lamp"}));
     }
 
+    fn drawn(home: &Bank, frames: &[FrameId], per_image: usize) -> BTreeSet<String> {
+        home.questions_about(frames, NonZeroUsize::new(per_image))
+            .into_iter()
+            .map(|question| question.id.0)
+            .collect()
+    }
+
     #[test]
     fn questions_per_image_are_drawn_by_photograph_name() {
         let home = Bank::open(&BankPlace::Home(OptOut::None)).unwrap();
         let frames = frames(&["a.png", "b.png", "c.png"]);
-        let drawn = |frames: &[FrameId], per_image| -> BTreeSet<String> {
-            home.questions_about(frames, NonZeroUsize::new(per_image))
-                .into_iter()
-                .map(|question| question.id.0)
-                .collect()
-        };
-        let (five, six) = (drawn(&frames, 5), drawn(&frames, 6));
+        let (five, six) = (drawn(&home, &frames, 5), drawn(&home, &frames, 6));
         assert_eq!((five.len(), six.len()), (15, 18));
         assert!(five.is_subset(&six));
-        assert!(drawn(&frames[1..], 5).is_subset(&five));
+        assert!(drawn(&home, &frames[1..], 5).is_subset(&five));
         // The questions differ between photographs.
         let questions: BTreeSet<&str> = five.iter().filter_map(|id| id.split('@').next()).collect();
         assert!(questions.len() > 5, "{questions:?}");
-        assert_eq!(drawn(&frames, 99).len(), 75);
+        assert_eq!(drawn(&home, &frames, 99).len(), 75);
     }
 
     #[test]
     fn errors_name_the_invalid_line() {
-        let line = |rest: &str| format!("{}{rest}", TWO.trim_start_matches('\u{feff}'));
-        for (rest, says) in [
+        for (rest, message) in [
             ("{", "bank.jsonl, line 4: EOF"),
             (
                 r#"{"id":3,"question":"?","choices":["x","y"],"answer":"x"}"#,
@@ -387,8 +399,9 @@ mod tests {
                 "line 4: the family \"all\" is the name",
             ),
         ] {
-            let error = bank(&line(rest)).unwrap_err().to_string();
-            assert!(error.contains(says), "{rest}: {error}");
+            let text = format!("{}{rest}", TWO.trim_start_matches('\u{feff}'));
+            let error = bank(&text).unwrap_err().to_string();
+            assert!(error.contains(message), "{rest}: {error}");
         }
         let error = bank("\n").unwrap_err().to_string();
         assert_eq!(error, "bank.jsonl: no questions in it");
@@ -401,9 +414,12 @@ mod tests {
         );
     }
 
+    fn digest(text: &str) -> Digest {
+        bank(text).unwrap().digest().unwrap()
+    }
+
     #[test]
     fn digest_covers_questions_but_not_blank_lines() {
-        let digest = |text: &str| bank(text).unwrap().digest().unwrap();
         assert_eq!(digest(TWO), digest(&TWO.replace("\n\n", "\n")));
         for other in [
             TWO.replace("red", "pink"),

@@ -112,9 +112,12 @@ mod tests {
             .collect())
     }
 
+    fn named(name: &str, ev: Option<f64>) -> (String, Option<f64>) {
+        (name.to_owned(), ev)
+    }
+
     #[test]
     fn default_names_are_numbered_by_position() {
-        let named = |name: &str, ev| (name.to_owned(), ev);
         for (json, expected) in [
             (r#""low/0.png""#, vec![named("dark", None)]),
             ("[]", vec![]),

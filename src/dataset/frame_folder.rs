@@ -29,7 +29,7 @@ type ListLine = Map<String, Value>;
 
 impl FrameOutput<'_> {
     /// Starts the line of the frame with its scene, name, width and height.
-    pub(crate) fn line(&self, (width, height): (usize, usize)) -> ListLine {
+    pub(crate) fn line(&self, width: usize, height: usize) -> ListLine {
         let facts = [
             ("scene", json!(self.scene)),
             ("frame", json!(self.frame)),

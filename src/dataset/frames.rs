@@ -275,11 +275,11 @@ pub(super) fn other_question_files(folder: &Path) -> impl Iterator<Item = PathBu
 
 /// True if the place is a folder of frames, not a ready-made set.
 pub(super) fn is_folder_of_frames(place: &Path, questions: Option<&Path>) -> bool {
-    let has = |name: &str| place.join(name).exists();
     place.is_dir()
         && (questions.is_some()
-            || has(FRAMES)
-            || has(QUESTIONS)
+            || [FRAMES, QUESTIONS]
+                .iter()
+                .any(|name| place.join(name).exists())
             || !ready_made::is_set_folder(place))
 }
 
@@ -388,16 +388,16 @@ mod tests {
     /// A folder of one image, its maps and a `frames.jsonl` of one line with these extra keys.
     fn folder(keys: &str) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        RgbImage::new(2, 1).save(at("rgb.png")).unwrap();
+        let root = folder.path();
+        RgbImage::new(2, 1).save(root.join("rgb.png")).unwrap();
         let ids = GrayImage::from_raw(2, 1, vec![3, 4]).unwrap();
-        ids.save(at("sem.png")).unwrap();
+        ids.save(root.join("sem.png")).unwrap();
         let units = ImageBuffer::<Luma<u16>, _>::from_raw(2, 1, vec![0, 1500]).unwrap();
-        units.save(at("deep.png")).unwrap();
+        units.save(root.join("deep.png")).unwrap();
         let line = format!(r#"{{"scene":"a","frame":"0","rgb":"rgb.png"{keys}}}"#);
-        fs::write(at(FRAMES), format!("\n{line}\n")).unwrap();
+        fs::write(root.join(FRAMES), format!("\n{line}\n")).unwrap();
         let question = r#"{"id":1,"frame":"a/0","question":"?","choices":["x","y"],"answer":"x"}"#;
-        fs::write(at(QUESTIONS), question).unwrap();
+        fs::write(root.join(QUESTIONS), question).unwrap();
         folder
     }
 
@@ -423,26 +423,35 @@ mod tests {
         assert_eq!(frame.segments.unwrap(), array![[0, 1500]]);
     }
 
+    fn refusal(folder: &Path) -> String {
+        sources(folder, &[], MissingFiles::Refuse)
+            .err()
+            .unwrap()
+            .to_string()
+    }
+
     #[test]
     fn folder_without_images_suggests_a_subfolder() {
         let folder = tempfile::tempdir().unwrap();
-        let problem = || {
-            sources(folder.path(), &[], MissingFiles::Refuse)
-                .err()
-                .unwrap()
-                .to_string()
-        };
-        assert!(problem().ends_with("in this folder"), "{}", problem());
+        assert!(
+            refusal(folder.path()).ends_with("in this folder"),
+            "{}",
+            refusal(folder.path())
+        );
         fs::create_dir(folder.path().join("inner")).unwrap();
         RgbImage::new(2, 1)
             .save(folder.path().join("inner/a.png"))
             .unwrap();
-        assert!(problem().ends_with("inner"), "{}", problem());
+        assert!(
+            refusal(folder.path()).ends_with("inner"),
+            "{}",
+            refusal(folder.path())
+        );
     }
 
     #[test]
     fn missing_or_invalid_maps_are_errors() {
-        for (keys, says) in [
+        for (keys, message) in [
             (r#","depth":"no.png","depth_scale":1"#, "no.png"),
             (r#","sem":"no.png""#, "no such file: "),
             (r#","over":"""#, "the path is empty"),
@@ -458,7 +467,7 @@ mod tests {
                 .unwrap_err()
                 .to_string();
             assert!(
-                error.contains("frames.jsonl, line 2: ") && error.contains(says),
+                error.contains("frames.jsonl, line 2: ") && error.contains(message),
                 "{error}"
             );
         }

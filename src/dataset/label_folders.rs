@@ -93,20 +93,26 @@ fn classes(folder: &Path) -> Result<BTreeMap<String, Vec<PathBuf>>> {
 /// # Errors
 /// If `choices` is not from 2 to the number of classes, or is not given for too many classes.
 fn choice_count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) -> Result<usize> {
-    let wrong = |problem: String| Err(Error::usage("--choices", problem));
     match choices.map(usize::from) {
-        None if classes > Choices::MOST => wrong(format!(
-            "{} has {classes} classes, and a question at most {} choices; --choices 4 asks with the own class and 3 others",
-            folder.display(),
-            Choices::MOST
+        None if classes > Choices::MOST => Err(Error::usage(
+            "--choices",
+            format_args!(
+                "{} has {classes} classes, and a question at most {} choices; --choices 4 asks with the own class and 3 others",
+                folder.display(),
+                Choices::MOST
+            ),
         )),
         None => Ok(classes),
-        Some(count) if !(2..=Choices::MOST).contains(&count) => {
-            wrong(format!("a question has 2 to {} choices", Choices::MOST))
-        }
-        Some(count) if count > classes => wrong(format!(
-            "{} has only {classes} classes; leave out --choices to offer them all",
-            folder.display()
+        Some(count) if !(2..=Choices::MOST).contains(&count) => Err(Error::usage(
+            "--choices",
+            format_args!("a question has 2 to {} choices", Choices::MOST),
+        )),
+        Some(count) if count > classes => Err(Error::usage(
+            "--choices",
+            format_args!(
+                "{} has only {classes} classes; leave out --choices to offer them all",
+                folder.display()
+            ),
         )),
         Some(count) => Ok(count),
     }
@@ -132,9 +138,12 @@ mod tests {
 
     const NAMES: [&str; 5] = ["Bicycle", "Boat", "Cup", "Dog", "Table"];
 
+    fn draw(content: &[u8]) -> Vec<&'static str> {
+        draw_choices(&NAMES, "Cup", 3, &Digest::from_bytes(content))
+    }
+
     #[test]
     fn drawn_choices_depend_on_content_and_include_truth() {
-        let draw = |content: &[u8]| draw_choices(&NAMES, "Cup", 3, &Digest::from_bytes(content));
         let mut seen = std::collections::BTreeSet::new();
         for content in 0..40_u8 {
             let names = draw(&[content]);
@@ -146,12 +155,12 @@ mod tests {
         assert_eq!(seen.len(), NAMES.len(), "every class is drawn");
     }
 
+    fn count(classes: usize, choices: usize) -> Result<usize, String> {
+        choice_count(Path::new("d"), classes, NonZeroUsize::new(choices)).map_err(|e| e.to_string())
+    }
+
     #[test]
     fn wrong_numbers_of_choices_are_errors() {
-        let count = |classes, choices| {
-            choice_count(Path::new("d"), classes, NonZeroUsize::new(choices))
-                .map_err(|e| e.to_string())
-        };
         assert_eq!(count(12, 0), Ok(12));
         assert_eq!(count(30, 4), Ok(4));
         for (classes, choices, part) in [

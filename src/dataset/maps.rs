@@ -191,14 +191,17 @@ impl MapPaths {
     /// # Errors
     /// If a file cannot be read; the error names it.
     pub(crate) fn read(&self) -> Result<MapFiles<'_>> {
-        let read = |path: Option<&Path>| path.map(reading::bytes).transpose();
         Ok(MapFiles {
             maps: self,
-            depth: read(self.depth.as_ref().map(DepthFile::path))?,
-            semantic: read(self.semantic.as_deref())?,
-            segments: read(self.segments.as_deref())?,
+            depth: optional_bytes(self.depth.as_ref().map(DepthFile::path))?,
+            semantic: optional_bytes(self.semantic.as_deref())?,
+            segments: optional_bytes(self.segments.as_deref())?,
         })
     }
+}
+
+fn optional_bytes(path: Option<&Path>) -> Result<Option<Vec<u8>>> {
+    path.map(reading::bytes).transpose()
 }
 
 /// Bytes of a frame's map files.

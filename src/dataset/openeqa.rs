@@ -42,18 +42,23 @@ impl OpenQuestion {
 /// If the file cannot be read, is not such an array, is empty, or has two questions with the same id.
 pub(crate) fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     let text = bytes(path)?;
-    let wrong = |problem: String| Error::data(path.display(), problem);
     let questions: Vec<OpenQuestion> = serde_json::from_slice(&text).map_err(|e| {
-        wrong(format!(
-            "{e}; a JSON array of {{\"question_id\", \"question\", \"answer\", \"category\", \"episode_history\"}} expected"
-        ))
+        Error::data(
+            path.display(),
+            format_args!(
+                "{e}; a JSON array of {{\"question_id\", \"question\", \"answer\", \"category\", \"episode_history\"}} expected"
+            ),
+        )
     })?;
     if questions.is_empty() {
-        return Err(wrong("no questions in it".to_owned()));
+        return Err(Error::data(path.display(), "no questions in it"));
     }
     let mut seen = BTreeSet::new();
     if let Some(twice) = questions.iter().find(|question| !seen.insert(&question.id)) {
-        return Err(wrong(format!("two questions have the id {:?}", twice.id.0)));
+        return Err(Error::data(
+            path.display(),
+            format_args!("two questions have the id {:?}", twice.id.0),
+        ));
     }
     Ok(questions)
 }
@@ -117,22 +122,23 @@ mod tests {
         assert!(sample_indices(0, 4).is_empty());
     }
 
+    fn read_text(path: &Path, text: &str) -> Result<Vec<OpenQuestion>> {
+        fs::write(path, text).unwrap();
+        read_questions(path)
+    }
+
     #[test]
     fn questions_are_read_and_checked() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let read = |text: &str| {
-            fs::write(file.path(), text).unwrap();
-            read_questions(file.path())
-        };
         let one = r#"{"question": "Where?", "answer": "there", "category": "object localization",
             "question_id": "a", "episode_history": "hm3d-v0/000-x"}"#;
         let extra =
             one.replace("\"a\"", "\"b\"")
                 .replacen('{', "{\"extra_answers\": [\"here\"], ", 1);
-        let loaded = read(&format!("[{one}, {extra}]")).unwrap();
+        let loaded = read_text(file.path(), &format!("[{one}, {extra}]")).unwrap();
         assert_eq!((loaded[0].split(), &loaded[0].extra), ("hm3d-v0", &None));
         assert_eq!(loaded[1].extra.as_deref(), Some(&["here".to_owned()][..]));
-        for (text, says) in [
+        for (text, message) in [
             ("[]", "no questions in it"),
             ("{}", "a JSON array of"),
             (
@@ -140,8 +146,8 @@ mod tests {
                 "two questions have the id \"a\"",
             ),
         ] {
-            let error = read(text).unwrap_err().to_string();
-            assert!(error.contains(says), "{error}");
+            let error = read_text(file.path(), text).unwrap_err().to_string();
+            assert!(error.contains(message), "{error}");
         }
     }
 

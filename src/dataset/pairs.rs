@@ -51,13 +51,10 @@ impl Pairs {
     /// If no pair is found, or two images of the same side have the same name.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let entries = entries(folder)?;
-        let subfolder = |name: &str| {
-            entries
-                .iter()
-                .find(|path| path.is_dir() && file_name(path).eq_ignore_ascii_case(name))
-        };
         for [normal, low] in FOLDERS {
-            if let (Some(normal), Some(low)) = (subfolder(normal), subfolder(low)) {
+            if let (Some(normal), Some(low)) =
+                (subfolder(&entries, normal), subfolder(&entries, low))
+            {
                 return Self::from_folders(normal, low);
             }
         }
@@ -113,6 +110,13 @@ impl Pairs {
     }
 }
 
+/// The folder with this name, in any case.
+fn subfolder<'a>(entries: &'a [PathBuf], name: &str) -> Option<&'a PathBuf> {
+    entries
+        .iter()
+        .find(|path| path.is_dir() && file_name(path).eq_ignore_ascii_case(name))
+}
+
 /// Adds an image to a side of the pairs.
 ///
 /// # Errors
@@ -145,17 +149,13 @@ fn split_side(stem: &str) -> (String, Option<PairSide>) {
         ("low", PairSide::Low),
     ];
     let lower = stem.to_ascii_lowercase();
-    let is_word_boundary = |at: usize| {
-        let (before, after) = stem.split_at(at);
-        !are_in_one_word(before.chars().next_back(), after.chars().next())
-    };
     let prefix = WORDS.iter().find(|(word, _)| {
         let rest = lower.strip_prefix(word);
-        rest.is_some_and(|rest| rest.starts_with("light") || is_word_boundary(word.len()))
+        rest.is_some_and(|rest| rest.starts_with("light") || is_word_boundary(stem, word.len()))
     });
     let suffix = WORDS.iter().find(|(word, side)| {
         lower.ends_with(word)
-            && is_word_boundary(stem.len() - word.len())
+            && is_word_boundary(stem, stem.len() - word.len())
             && prefix.is_none_or(|(_, prefix_side)| prefix_side == side)
     });
     let start = prefix.map_or(0, |(word, _)| word.len());
@@ -169,6 +169,11 @@ fn split_side(stem: &str) -> (String, Option<PairSide>) {
         Some((_, side)) => (String::new(), Some(*side)),
         None => (stem.to_owned(), None),
     }
+}
+
+fn is_word_boundary(stem: &str, at: usize) -> bool {
+    let (before, after) = stem.split_at(at);
+    !are_in_one_word(before.chars().next_back(), after.chars().next())
 }
 
 /// The image files among the paths of a folder. Warns of images in formats that are not supported.

@@ -190,29 +190,28 @@ mod tests {
         let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         save(folder.path(), "in/a.png");
         save(outside.path(), "secret.png");
-        let link = |target: &Path, name: &str| symlink(target, folder.path().join(name)).unwrap();
-        link(&outside.path().join("secret.png"), "secret.png");
-        link(outside.path(), "out");
-        link(folder.path(), "in/again");
-        link(&folder.path().join("in/a.png"), "b.png");
+        for (target, name) in [
+            (&*outside.path().join("secret.png"), "secret.png"),
+            (outside.path(), "out"),
+            (folder.path(), "in/again"),
+            (&folder.path().join("in/a.png"), "b.png"),
+        ] {
+            symlink(target, folder.path().join(name)).unwrap();
+        }
         assert_eq!(found(folder.path()).unwrap().0, ["b.png", "in/a.png"]);
     }
 
     #[test]
     fn folder_without_image_is_refused_and_its_questions_ignored() {
         let folder = tempfile::tempdir().unwrap();
-        let problem = || found(folder.path()).unwrap_err().to_string();
+        let problem = found(folder.path()).unwrap_err().to_string();
         assert!(
-            problem().ends_with("image in this folder or below"),
-            "{}",
-            problem()
+            problem.ends_with("image in this folder or below"),
+            "{problem}"
         );
         fs::write(folder.path().join("a.heic"), "").unwrap();
-        assert!(
-            problem().contains("1 file looks like an image"),
-            "{}",
-            problem()
-        );
+        let problem = found(folder.path()).unwrap_err().to_string();
+        assert!(problem.contains("1 file looks like an image"), "{problem}");
         save(folder.path(), "a.png");
         fs::write(folder.path().join("questions.jsonl"), "not read").unwrap();
         let (names, notes) = found(folder.path()).unwrap();

@@ -319,7 +319,7 @@ mod tests {
     fn invalid_paths_are_refused() {
         let outer = test_folder();
         let root = Root::new(outer.path(), &[]).unwrap();
-        for (spelled, says) in [
+        for (spelled, message) in [
             ("", "empty"),
             ("a\0b", "zero byte"),
             ("https://example.org/a.png", "download them first"),
@@ -328,7 +328,7 @@ mod tests {
             ("set", "no such file"),
         ] {
             let problem = root.image(outer.path(), spelled).unwrap_err();
-            assert!(problem.contains(says), "{spelled:?}: {problem}");
+            assert!(problem.contains(message), "{spelled:?}: {problem}");
         }
     }
 

@@ -537,8 +537,9 @@ impl<I: Item> ReplySink<'_, I> {
         if !model.model.is_remote() || self.dispatcher.settings.set_light == SetLight::Dark {
             return;
         }
-        let wording = || Digest::from_parts(trial.prompt.parts().map(str::as_bytes));
-        let reply = LitReply::from_record(record, wording);
+        let reply = LitReply::from_record(record, || {
+            Digest::from_parts(trial.prompt.parts().map(str::as_bytes))
+        });
         let found = reply.and_then(|reply| self.dependence[trial.model].add(reply));
         if let Some(found) = found {
             tracing::warn!("{}", found.words(&model.name));

@@ -58,7 +58,7 @@ pub(crate) fn columns<'a>(
     });
     let enhancers = enhancers.chain(elsewhere);
     let degradations = settings.light.degradations();
-    let readings: BTreeSet<&ReadingName> = degradations
+    let profiles: BTreeSet<&ReadingName> = degradations
         .iter()
         .flatten()
         .filter_map(Degradation::reading)
@@ -79,7 +79,7 @@ pub(crate) fn columns<'a>(
         .sensor
         .readings
         .iter()
-        .filter(|(name, _)| readings.contains(name))
+        .filter(|(name, _)| profiles.contains(name))
         .map(|(name, content)| (name.to_string(), noise_definition(content)));
     let columns: [(&str, BTreeMap<String, Value>); 4] = [
         ("model", models.collect()),

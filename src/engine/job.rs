@@ -240,8 +240,10 @@ fn restore_manifest<E: Experiment>(
 ) -> Result<()> {
     let planned = planned_keys(experiment, folder)?;
     let trials = store::read_trials(folder)?;
-    let replies = trials.iter().filter(|trial| !trial.failed());
-    let (own, others): (Vec<_>, Vec<_>) = replies.partition(|trial| planned.contains(&trial.key));
+    let (own, others) = trials
+        .iter()
+        .filter(|trial| !trial.failed())
+        .partition::<Vec<_>, _>(|trial| planned.contains(&trial.key));
     if !others.is_empty() {
         let problem = format!(
             "{damage}, and {} of {} replies are not of this command: the records are intact; call the command that made them, with all its \

@@ -147,12 +147,10 @@ pub(crate) fn open_all(
 /// Refuses two models whose trials would have the same keys.
 fn refuse_same_trials(models: &[ModelUnderTest]) -> Result<()> {
     for (i, model) in models.iter().enumerate() {
-        let mut before = models[..i].iter();
-        let facts = |model: &ModelUnderTest| {
-            let name = model.model.name().to_owned();
-            (model.view, name, Arc::clone(&model.digest))
-        };
-        if let Some(other) = before.find(|other| facts(other) == facts(model)) {
+        if let Some(other) = models[..i]
+            .iter()
+            .find(|other| have_same_trials(other, model))
+        {
             let how = match model.view {
                 View::Image => "",
                 View::Blind => " without images",
@@ -166,6 +164,10 @@ fn refuse_same_trials(models: &[ModelUnderTest]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+fn have_same_trials(one: &ModelUnderTest, other: &ModelUnderTest) -> bool {
+    one.view == other.view && one.model.name() == other.model.name() && one.digest == other.digest
 }
 
 /// The opened endpoints. Each is opened once, so that its models share its connections and its pauses.

@@ -43,9 +43,8 @@ impl Observer {
         questions: &[Question],
         rules: Rules,
     ) -> Result<Arc<Self>> {
-        let unusable = |problem: String| Error::usage("--model", format!("{OBSERVER}: {problem}"));
         let labels = Dataset::labels_at(place)?.ok_or_else(|| {
-            unusable(format!(
+            unusable(&format!(
                 "{} has no maps: frames with segments or classes (frames.jsonl, classes.json) are needed",
                 dataset.name()
             ))
@@ -54,7 +53,7 @@ impl Observer {
             .iter()
             .find(|question| !is_in_rulebook(question, &rules))
         {
-            return Err(unusable(format!(
+            return Err(unusable(&format!(
                 "the question {:?} ({:?}) is not one of the rulebook's, and the observer understands no others; if another \
                  rulebook made it, name that with --rules",
                 unknown.id.0, unknown.text
@@ -71,7 +70,9 @@ impl Observer {
             observations: Recent::new(OBSERVATIONS),
         };
         if let Some(first) = questions.first() {
-            observer.observed_frame(&first.frame).map_err(unusable)?;
+            observer
+                .observed_frame(&first.frame)
+                .map_err(|problem| unusable(&problem))?;
         }
         Ok(Arc::new(observer))
     }
@@ -83,10 +84,14 @@ impl Observer {
         let mut parts = vec![VERSION.to_le_bytes().to_vec(), rules.as_bytes().to_vec()];
         parts.extend(control.map(|control| control.name().as_bytes().to_vec()));
         let digest = Digest::from_parts(parts.iter().map(|part| &part[..]));
-        let opinion = move |question: &Question, call: &Call<'_>| {
-            observer.answer(question, call, control, seed)
-        };
-        Local::new(name(control), digest, prior, Box::new(opinion))
+        Local::new(
+            name(control),
+            digest,
+            prior,
+            Box::new(move |question: &Question, call: &Call<'_>| {
+                observer.answer(question, call, control, seed)
+            }),
+        )
     }
 
     fn observed_frame(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
@@ -126,6 +131,10 @@ impl Observer {
             guessed: false,
         })
     }
+}
+
+fn unusable(problem: &str) -> Error {
+    Error::usage("--model", format!("{OBSERVER}: {problem}"))
 }
 
 /// The part of an observation that the record of an answer stores.

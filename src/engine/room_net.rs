@@ -71,15 +71,19 @@ impl RoomNet {
             ROOM_NET,
             self.rules.digest().as_bytes(),
         ]);
-        let opinion = move |question: &Question, call: &Call<'_>| {
-            let choice = net.answer(question, call).map_err(|e| e.to_string())?;
-            Ok(LocalAnswer {
-                choice,
-                observed: None,
-                guessed: choice.is_none(),
-            })
-        };
-        Local::new(NAME.to_owned(), digest, prior, Box::new(opinion))
+        Local::new(
+            NAME.to_owned(),
+            digest,
+            prior,
+            Box::new(move |question: &Question, call: &Call<'_>| {
+                let choice = net.answer(question, call).map_err(|e| e.to_string())?;
+                Ok(LocalAnswer {
+                    choice,
+                    observed: None,
+                    guessed: choice.is_none(),
+                })
+            }),
+        )
     }
 
     fn answer(&self, question: &Question, call: &Call<'_>) -> Result<Option<usize>> {

@@ -381,21 +381,13 @@ impl RunPlace {
                 return Err(Error::usage("--resume", problem));
             }
         };
-        let not_writable = |folder: &Path, e: &dyn Display| {
-            let folder = folder.display();
-            let remedy = "--out DIR names another folder";
-            Error::usage(
-                flag,
-                format_args!("cannot write to {folder}: {e}; {remedy}"),
-            )
-        };
-        let absolute = path::absolute(path).map_err(|e| not_writable(path, &e))?;
+        let absolute = path::absolute(path).map_err(|e| not_writable(flag, path, &e))?;
         let existing = absolute
             .ancestors()
             .find(|folder| folder.exists())
             .unwrap_or(&absolute);
         // An unnamed temporary file, which the system deletes when it is closed.
-        tempfile::tempfile_in(existing).map_err(|e| not_writable(existing, &e))?;
+        tempfile::tempfile_in(existing).map_err(|e| not_writable(flag, existing, &e))?;
         Ok(self)
     }
 
@@ -408,4 +400,13 @@ impl RunPlace {
             place => place.clone(),
         }
     }
+}
+
+fn not_writable(flag: &str, folder: &Path, e: &dyn Display) -> Error {
+    let folder = folder.display();
+    let remedy = "--out DIR names another folder";
+    Error::usage(
+        flag,
+        format_args!("cannot write to {folder}: {e}; {remedy}"),
+    )
 }

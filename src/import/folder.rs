@@ -113,17 +113,13 @@ impl Folder {
             || "scene".into(),
             |name| name.to_string_lossy().into_owned(),
         );
-        let files_in_first = |names: &[&str], endings: &[&str]| match first_folder(folder, names) {
-            Some(folder) => files(&folder, endings),
-            None => Ok(BTreeMap::new()),
-        };
-        let images = files_in_first(&RGB, &IMAGES)?;
+        let images = files_in_first(folder, &RGB, &IMAGES)?;
         if let Some(folder) = first_folder(folder, &RGB) {
             self.image_folder_files.extend(entries(&folder)?);
         }
-        let mut depths = files_in_first(&DEPTH, &MAPS)?;
-        let mut classes = files_in_first(&CLASSES, &MAPS)?;
-        let mut segments = files_in_first(&SEGMENTS, &MAPS)?;
+        let mut depths = files_in_first(folder, &DEPTH, &MAPS)?;
+        let mut classes = files_in_first(folder, &CLASSES, &MAPS)?;
+        let mut segments = files_in_first(folder, &SEGMENTS, &MAPS)?;
         for (frame, rgb) in images {
             self.maps.push(MapFiles {
                 depth: depths.remove(&frame),
@@ -145,6 +141,18 @@ impl Folder {
             ));
         }
         Ok(())
+    }
+}
+
+/// Files in the first of these subfolders that exists, by stem.
+fn files_in_first(
+    folder: &Path,
+    names: &[&str],
+    endings: &[&str],
+) -> Result<BTreeMap<String, PathBuf>> {
+    match first_folder(folder, names) {
+        Some(folder) => files(&folder, endings),
+        None => Ok(BTreeMap::new()),
     }
 }
 

@@ -122,17 +122,18 @@ impl Habitat {
         };
         let content = text(&path)?;
         self.scene_files.push(path.clone());
-        let at_line = |(line, problem): (usize, String)| Error::line(&path, line, problem);
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let (names, rooms) = if extension == "house" {
-            let house = mp3d::parse(&content, &self.listing.labels.expressible).map_err(at_line)?;
+            let house = mp3d::parse(&content, &self.listing.labels.expressible)
+                .map_err(|(line, problem)| Error::line(&path, line, problem))?;
             (house.names, house.rooms)
         } else if extension == "json" {
             let names = replica::parse(&content, &mut self.listing.unlisted)
                 .map_err(|problem| Error::data(path.display(), problem))?;
             (names, BTreeMap::new())
         } else {
-            let names = hm3d::parse(&content, &mut self.listing.unlisted).map_err(at_line)?;
+            let names = hm3d::parse(&content, &mut self.listing.unlisted)
+                .map_err(|(line, problem)| Error::line(&path, line, problem))?;
             (names, BTreeMap::new())
         };
         if names.is_empty() {

@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn errors_name_the_invalid_line() {
-        for (text, line, says) in [
+        for (text, line, message) in [
             ("", 1, "HM3D Semantic"),
             ("id,colour\n", 1, "HM3D Semantic"),
             (
@@ -105,7 +105,7 @@ mod tests {
         ] {
             let (found, problem) = parse(text, &mut BTreeMap::new()).unwrap_err();
             assert!(
-                found == line && problem.contains(says),
+                found == line && problem.contains(message),
                 "{found}: {problem}"
             );
         }

@@ -102,13 +102,6 @@ fn evenly_spaced(frames: Vec<ListedFrame>, count: usize) -> Vec<ListedFrame> {
 
 /// Chooses the first frame of each interval.
 fn one_per_interval(frames: Vec<ListedFrame>, seconds: f64) -> Result<Vec<ListedFrame>> {
-    let untimed = |frame: &ListedFrame| {
-        let problem = format_args!(
-            "the frame {}/{} has no time; state the frames per second with --fps, or use --count N, which needs no time",
-            frame.scene, frame.frame
-        );
-        Error::usage("--every", problem)
-    };
     let (mut chosen, mut next, mut start) = (Vec::new(), 0.0, None);
     for frame in frames {
         let time = frame.time.ok_or_else(|| untimed(&frame))?;
@@ -123,6 +116,14 @@ fn one_per_interval(frames: Vec<ListedFrame>, seconds: f64) -> Result<Vec<Listed
         }
     }
     Ok(chosen)
+}
+
+fn untimed(frame: &ListedFrame) -> Error {
+    let problem = format_args!(
+        "the frame {}/{} has no time; state the frames per second with --fps, or use --count N, which needs no time",
+        frame.scene, frame.frame
+    );
+    Error::usage("--every", problem)
 }
 
 #[cfg(test)]

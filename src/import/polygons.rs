@@ -65,9 +65,8 @@ fn crossings(corners: &[(f64, f64)], y: f64) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn small_polygons_are_drawn_over_large_ones() {
-        let square = |left: f64, side: f64, value: u8| Polygon {
+    fn square(left: f64, side: f64, value: u8) -> Polygon<u8> {
+        Polygon {
             corners: vec![
                 (left, 0.0),
                 (left + side, 0.0),
@@ -75,7 +74,11 @@ mod tests {
                 (left, side),
             ],
             value,
-        };
+        }
+    }
+
+    #[test]
+    fn small_polygons_are_drawn_over_large_ones() {
         let map = draw(&[square(1.0, 1.0, 7), square(0.0, 3.0, 5)], [4, 3]);
         assert_eq!(
             map.into_raw_vec_and_offset().0,

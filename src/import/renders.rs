@@ -81,13 +81,13 @@ mod tests {
 
     #[test]
     fn invalid_records_are_refused() {
-        for (content, says) in [
+        for (content, message) in [
             ("{", "scenes.json"),
             (r#"{"schema": "darkqa.renders/2"}"#, "darkqa.renders/1"),
             (r#"{"schema": "darkqa.renders/1"}"#, "a list of scenes"),
         ] {
             let problem = read_text(content).unwrap_err().to_string();
-            assert!(problem.contains(says), "{problem}");
+            assert!(problem.contains(message), "{problem}");
         }
     }
 }

@@ -184,13 +184,11 @@ fn read_label_table(path: &Path) -> Result<Labels> {
         .headers()
         .map_err(|e| Error::data(path.display(), e))?
         .clone();
-    let column = |name: &str| {
-        header
-            .iter()
-            .position(|column| column == name)
-            .ok_or_else(|| Error::data(path.display(), format_args!("no column {name:?}")))
-    };
-    let [id, raw, class] = [column("id")?, column("raw_category")?, column("mpcat40")?];
+    let [id, raw, class] = [
+        column_index(path, &header, "id")?,
+        column_index(path, &header, "raw_category")?,
+        column_index(path, &header, "mpcat40")?,
+    ];
     let known = canonical();
     let mut labels = Labels {
         space: "scannet".into(),
@@ -199,11 +197,10 @@ fn read_label_table(path: &Path) -> Result<Labels> {
     };
     for row in reader.records() {
         let row = row.map_err(|e| Error::data(path.display(), e))?;
-        let cell = |column: usize| row.get(column).unwrap_or_default().trim();
-        let Ok(id) = cell(id).parse::<u16>() else {
+        let Ok(id) = cell(&row, id).parse::<u16>() else {
             continue;
         };
-        let class = overridden(cell(raw)).unwrap_or(cell(class));
+        let class = overridden(cell(&row, raw)).unwrap_or(cell(&row, class));
         if matches!(class, "void" | "unlabeled") {
             labels.void.insert(id);
             continue;
@@ -214,7 +211,7 @@ fn read_label_table(path: &Path) -> Result<Labels> {
             UNKNOWN
         };
         let label = Label {
-            name: cell(raw).to_owned(),
+            name: cell(&row, raw).to_owned(),
             canonical: class.to_owned(),
         };
         labels.labels.insert(id, label);
@@ -226,6 +223,17 @@ fn read_label_table(path: &Path) -> Result<Labels> {
         .map(|label| label.canonical.clone())
         .collect::<BTreeSet<String>>();
     Ok(labels)
+}
+
+fn column_index(path: &Path, header: &csv::StringRecord, name: &str) -> Result<usize> {
+    header
+        .iter()
+        .position(|column| column == name)
+        .ok_or_else(|| Error::data(path.display(), format_args!("no column {name:?}")))
+}
+
+fn cell(row: &csv::StringRecord, column: usize) -> &str {
+    row.get(column).unwrap_or_default().trim()
 }
 
 /// File with the intrinsics of the `color` or `depth` camera, if it exists.
@@ -305,10 +313,17 @@ fn number_segments(
     labels: &Array2<u16>,
     instances: &Array2<u16>,
 ) -> Result<Array2<u32>, ShapeError> {
-    let pairs = || labels.iter().copied().zip(instances.iter().copied());
-    let distinct: BTreeSet<(u16, u16)> = pairs().filter(|(_, instance)| *instance != 0).collect();
+    let distinct: BTreeSet<(u16, u16)> = labels
+        .iter()
+        .copied()
+        .zip(instances.iter().copied())
+        .filter(|(_, instance)| *instance != 0)
+        .collect();
     let numbers: BTreeMap<(u16, u16), u32> = distinct.into_iter().zip(1..).collect();
-    let ids = pairs()
+    let ids = labels
+        .iter()
+        .copied()
+        .zip(instances.iter().copied())
         .map(|pair| numbers.get(&pair).copied().unwrap_or(0))
         .collect();
     Array2::from_shape_vec(labels.dim(), ids)
@@ -376,6 +391,15 @@ impl Adapter for Scannet {
 mod tests {
     use super::*;
 
+    fn camera(fx: f64, cx: f64) -> Intrinsics {
+        Intrinsics {
+            fx,
+            fy: 1.0,
+            cx,
+            cy: 0.0,
+        }
+    }
+
     #[test]
     fn depth_is_resampled_to_image_pixels() {
         let depth = Array2::from_shape_vec((1, 2), vec![7, 9]).unwrap();
@@ -384,12 +408,6 @@ mod tests {
         assert_eq!(found.into_raw_vec_and_offset().0, [7, 7, 9, 9, 7, 7, 9, 9]);
         // A colour camera with half the field of view sees the middle of the depth map.
         let deep = Array2::from_shape_vec((1, 5), vec![1, 2, 3, 4, 5]).unwrap();
-        let camera = |fx, cx| Intrinsics {
-            fx,
-            fy: 1.0,
-            cx,
-            cy: 0.0,
-        };
         let found = resample(
             &deep,
             &Rgb::black(1, 3),

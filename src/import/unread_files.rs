@@ -47,9 +47,6 @@ impl UnreadFiles {
 
     /// Counts a file, given by its relative path.
     fn count(&mut self, path: &Path) {
-        let text = |part: Option<&std::ffi::OsStr>| {
-            part.unwrap_or_default().to_string_lossy().into_owned()
-        };
         let folder = text(path.parent().and_then(Path::file_name));
         let name = match path.extension() {
             Some(ending) => format!("*.{}", ending.to_string_lossy()),
@@ -104,33 +101,40 @@ impl UnreadFiles {
     }
 }
 
+fn text(part: Option<&std::ffi::OsStr>) -> String {
+    part.unwrap_or_default().to_string_lossy().into_owned()
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;
 
     use super::*;
 
+    fn write(folder: &Path, name: &str) -> PathBuf {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "").unwrap();
+        path
+    }
+
     #[test]
     fn unread_files_are_counted_by_kind() {
         let folder = tempfile::tempdir().unwrap();
-        let write = |name: &str| {
-            let path = folder.path().join(name);
-            fs::create_dir_all(path.parent().unwrap()).unwrap();
-            fs::write(&path, "").unwrap();
-            path
-        };
-        let read: BTreeSet<PathBuf> = ["s0/rgb/0.png", "s0/rgb/1.png"].map(write).into();
+        let read: BTreeSet<PathBuf> = ["s0/rgb/0.png", "s0/rgb/1.png"]
+            .map(|name| write(folder.path(), name))
+            .into();
         assert_eq!(
             UnreadFiles::in_folder(folder.path(), &read).unwrap().line(),
             ""
         );
         for name in ["s0/sem/0.tif", "s1/sem/1.tif", "s0/note", "README.md"] {
-            write(name);
+            write(folder.path(), name);
         }
         let unread = UnreadFiles::in_folder(folder.path(), &read).unwrap();
         assert_eq!(unread.line(), "not read: 2 sem/*.tif, README.md, s0/note\n");
         for number in 0..9 {
-            write(&format!("more/{number}.e{number}"));
+            write(folder.path(), &format!("more/{number}.e{number}"));
         }
         let line = UnreadFiles::in_folder(folder.path(), &read).unwrap().line();
         assert!(line.ends_with(", 4 more\n"), "{line}");

@@ -306,7 +306,7 @@ fn write_frame(
         scene: &frame.scene,
         frame: &frame.frame,
     };
-    let mut line = output.line((rgb.width(), rgb.height()));
+    let mut line = output.line(rgb.width(), rgb.height());
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
     // Files other than plain PNG are copied unchanged, so that they are decoded as everywhere else.
@@ -372,7 +372,6 @@ fn depth_note(written: &[WrittenFrame]) -> Result<String> {
     };
     medians.sort_unstable();
     let typical = medians[middle / 2];
-    let metres = |depth: u32| f64::from(depth) / 1000.0;
     if !ROOM_DEPTHS.contains(&typical) {
         let problem = format_args!(
             "the typical depth of the frames is {} m, but that of rooms is between {} and {} m; set --depth-scale to the metres per unit of depth",
@@ -383,6 +382,10 @@ fn depth_note(written: &[WrittenFrame]) -> Result<String> {
         return Err(Error::data("depth", problem));
     }
     Ok(format!("typical depth: {:.2} m\n", metres(typical)))
+}
+
+fn metres(depth: u32) -> f64 {
+    f64::from(depth) / 1000.0
 }
 
 /// The note about frames without a map, for each kind of map that only some frames have, and about missing class maps.

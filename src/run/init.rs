@@ -66,12 +66,16 @@ Replace the images and the lines with your own, then run the check again.
 /// # Errors
 /// If a file exists already, or cannot be read or written.
 pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
-    let at = |name: &str| args.folder.join(name);
+    let folder = &args.folder;
     let mut files = vec!["README.txt", "questions.csv", "dataset.json"];
     if args.frames.is_none() {
         files.extend(ROOM_FILES);
     }
-    if let Some(exists) = files.iter().map(|name| at(name)).find(|path| path.exists()) {
+    if let Some(exists) = files
+        .iter()
+        .map(|name| folder.join(name))
+        .find(|path| path.exists())
+    {
         return Err(Error::data(exists.display(), EXISTS));
     }
     let rows = match &args.frames {
@@ -79,26 +83,32 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         None => room_rows(&args.folder, progress)?,
     };
     let mut table = csv::Writer::from_writer(Vec::new());
-    let wrong = |e: csv::Error| Error::data("questions.csv", e);
     let header = [
         "image", "question", "A", "B", "C", "D", "answer", "category",
     ];
-    table.write_record(header).map_err(wrong)?;
+    table
+        .write_record(header)
+        .map_err(|e| Error::data("questions.csv", e))?;
     for row in &rows {
-        table.write_record(row).map_err(wrong)?;
+        table
+            .write_record(row)
+            .map_err(|e| Error::data("questions.csv", e))?;
     }
     let table = table
         .into_inner()
         .map_err(|e| Error::data("questions.csv", e))?;
-    write(&at("questions.csv"), &table)?;
+    write(&folder.join("questions.csv"), &table)?;
     let name = args
         .folder
         .file_name()
         .unwrap_or_default()
         .to_string_lossy();
     let info = json!({"schema": "darkqa.dataset/1", "name": name});
-    write(&at("dataset.json"), format!("{info:#}\n").as_bytes())?;
-    write(&at("README.txt"), README.as_bytes())?;
+    write(
+        &folder.join("dataset.json"),
+        format!("{info:#}\n").as_bytes(),
+    )?;
+    write(&folder.join("README.txt"), README.as_bytes())?;
     let folder = args.folder.display().to_string();
     let data = shell_word(&folder);
     Ok(Outcome::wrote(

@@ -99,7 +99,7 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
         scene: &frame.scene,
         frame: room.view(),
     };
-    let mut line = output.line((frame.rgb.width(), frame.rgb.height()));
+    let mut line = output.line(frame.rgb.width(), frame.rgb.height());
     let codes = output.write("rgb", "png", &png(&frame.rgb)?)?;
     // The EXR file is the frame if the room has one; the PNG file is then only a preview.
     let image = match room.light() {

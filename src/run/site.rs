@@ -83,10 +83,9 @@ fn check_distinct(folders: &[PathBuf]) -> Result<()> {
 
 /// Refuses a folder with other files than a site, and a folder of pages that is a symbolic link.
 fn check_target(out: &Path) -> Result<()> {
-    let unreadable = |e: std::io::Error| Error::file(out, "read", e);
     let mut entries = match fs::read_dir(out) {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
-        entries => entries.map_err(unreadable)?,
+        entries => entries.map_err(|e| Error::file(out, "read", e))?,
     };
     let is_empty =
         entries.all(|entry| entry.is_ok_and(|entry| files::is_unfinished(&entry.file_name())));
@@ -116,10 +115,11 @@ fn check_target(out: &Path) -> Result<()> {
 /// Pages in the folder of a site that belong to no run of the site, sorted.
 fn stale_pages(out: &Path, names: &BTreeSet<String>) -> Result<Vec<String>> {
     let pages = out.join(PAGES);
-    let unreadable = |e: std::io::Error| Error::file(&pages, "read", e);
     let mut stale = Vec::new();
-    for entry in fs::read_dir(&pages).map_err(unreadable)? {
-        let name = entry.map_err(unreadable)?.file_name();
+    for entry in fs::read_dir(&pages).map_err(|e| Error::file(&pages, "read", e))? {
+        let name = entry
+            .map_err(|e| Error::file(&pages, "read", e))?
+            .file_name();
         let name = format!("{PAGES}/{}", name.to_string_lossy());
         if !names.contains(&name) {
             stale.push(name);

@@ -95,9 +95,8 @@ impl Baseline {
         check_comparable(&runs)?;
         // Models and conditions are matched by name: a new model is compared with the old one of the same name.
         let alerts = run_alerts(&join(runs, |_| true)?);
-        let mark = |model: &str| format!("{model} (baseline {name})");
         let (mut trials, mut old_trials) = (combined.trials.clone(), old.trials);
-        old_trials.rename(|model| Some(mark(model)));
+        old_trials.rename(|model| Some(baseline_name(&name, model)));
         let logs = trials.logs();
         for trial in old_trials.iter() {
             trials.copy(trial, logs);
@@ -113,14 +112,14 @@ impl Baseline {
             .filter(|(_, subject)| !is_control(&subject.model))
             .filter_map(|(index, subject)| {
                 let old = ModelInCondition {
-                    model: mark(combined.model_names.original_name(&subject.model)),
+                    model: baseline_name(&name, combined.model_names.original_name(&subject.model)),
                     ..subject.in_any_light()
                 };
                 Some((index, grid.find(&old)?))
             })
             .collect();
         let mut costs = SubjectCosts::from_joined(combined)?;
-        let suffix = mark("");
+        let suffix = baseline_name(&name, "");
         let mut old_run = PricedRun::new(&old.manifest)?;
         for trial in old_trials.iter() {
             let marked = trial.model();
@@ -178,13 +177,13 @@ impl Baseline {
         };
         let named = first_names(&missing, MAX_NAMED);
         let conditions = format!("{named} of {old} {are} not compared");
-        let is_renamed = |subject: &ModelInCondition| {
-            !self
-                .rows
-                .iter()
-                .any(|row| row.subject.model == subject.model)
-        };
-        let reason = if !self.added.is_empty() && self.missing.iter().all(is_renamed) {
+        let reason = if !self.added.is_empty()
+            && self.missing.iter().all(|subject| {
+                !self
+                    .rows
+                    .iter()
+                    .any(|row| row.subject.model == subject.model)
+            }) {
             let added: Vec<&str> = self.added.iter().map(String::as_str).collect();
             format!(
                 "the new model is {}, and models are compared by their names, which `name` in a file of --models sets",
@@ -232,10 +231,6 @@ impl Baseline {
             .filter(|row| !row.subject.is_reference())
             .collect();
         let old = &self.old;
-        let refuse = |problem: String| {
-            let problem = format!("{problem}; leave the flag out to see the report");
-            Err(Error::usage(FAIL_IF_WORSE, problem))
-        };
         if models
             .iter()
             .any(|row| row.significance == Significance::Worse)
@@ -243,20 +238,29 @@ impl Baseline {
             return Ok(true);
         }
         if let Some(missing) = self.missing_sentence() {
-            return refuse(missing);
+            return refuse(&missing);
         }
         if models.is_empty() {
-            return refuse(format!(
+            return refuse(&format!(
                 "no model can be compared with {old}: none answered the same question about the same image in both (random and the \
                  observer do not count)"
             ));
         }
         if !models.iter().any(|row| row.significance.is_possible()) {
-            return refuse(format!(
+            return refuse(&format!(
                 "no verdict against {old} is possible: {}",
                 no_verdict(&models, unit)
             ));
         }
         Ok(false)
     }
+}
+
+fn refuse(problem: &str) -> Result<bool> {
+    let problem = format!("{problem}; leave the flag out to see the report");
+    Err(Error::usage(FAIL_IF_WORSE, problem))
+}
+
+fn baseline_name(name: &str, model: &str) -> String {
+    format!("{model} (baseline {name})")
 }

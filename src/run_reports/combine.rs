@@ -241,10 +241,6 @@ fn check_one_measure(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
 pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     check_one_measure(runs)?;
     let mut questions = BTreeMap::<&QuestionId, (usize, BTreeSet<&String>, Option<&String>)>::new();
-    let wrong = |run: &StoredRun<ChoiceDetail>, problem: String| {
-        let path = run.folder.clone();
-        Err(Error::Run { path, problem })
-    };
     for (index, run) in runs.iter().enumerate() {
         let (mut shared, others) = (false, !questions.is_empty());
         for item in run.trials.items().into_iter().flatten() {
@@ -255,7 +251,7 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
                     "a record of the question {} has no true choice",
                     item.question
                 );
-                return wrong(run, problem);
+                return refuse(run, problem);
             }
             let truth = truth.flatten();
             let (first, known, known_truth) = questions
@@ -268,7 +264,7 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
                     item.question,
                     runs[*first].folder.display()
                 );
-                return wrong(run, problem);
+                return refuse(run, problem);
             }
         }
         if others && !shared {
@@ -276,8 +272,13 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
                 "the run shares no question with {}; report each run alone",
                 runs[0].folder.display()
             );
-            return wrong(run, problem);
+            return refuse(run, problem);
         }
     }
     Ok(())
+}
+
+fn refuse(run: &StoredRun<ChoiceDetail>, problem: String) -> Result<()> {
+    let path = run.folder.clone();
+    Err(Error::Run { path, problem })
 }

@@ -96,21 +96,17 @@ fn notes(runs: &[JoinedRun]) -> impl Iterator<Item = (&JoinedRun, &str, &Enhance
 
 /// The conventions for a network's input and output, each with its source.
 fn how(note: &EnhancerNote) -> String {
-    let convention = |key: &str, before: &str| {
-        let line = note.convention.iter().find(|line| line.key == key)?;
-        Some(format!("{before}{} ({})", line.value, line.source))
-    };
     [
-        convention(ELSEWHERE, "enhanced "),
-        convention("preset", "preset "),
-        convention(TRAINED_ON, "trained on "),
-        convention("range_in", "fed "),
-        convention("color", "colours "),
-        convention("input = ", "input = "),
-        convention("channels", "channels "),
-        convention("range_out", "read as "),
-        convention("image = ", "image = "),
-        convention("rounding", "to bytes: "),
+        convention(note, ELSEWHERE, "enhanced "),
+        convention(note, "preset", "preset "),
+        convention(note, TRAINED_ON, "trained on "),
+        convention(note, "range_in", "fed "),
+        convention(note, "color", "colours "),
+        convention(note, "input = ", "input = "),
+        convention(note, "channels", "channels "),
+        convention(note, "range_out", "read as "),
+        convention(note, "image = ", "image = "),
+        convention(note, "rounding", "to bytes: "),
         unread_outputs(note),
         Some(note.sizes.clone()).filter(|sizes| !sizes.is_empty()),
     ]
@@ -118,6 +114,11 @@ fn how(note: &EnhancerNote) -> String {
     .flatten()
     .collect::<Vec<_>>()
     .join("; ")
+}
+
+fn convention(note: &EnhancerNote, key: &str, before: &str) -> Option<String> {
+    let line = note.convention.iter().find(|line| line.key == key)?;
+    Some(format!("{before}{} ({})", line.value, line.source))
 }
 
 /// The assumed value ranges, joined by "and"; `None` if none is assumed.

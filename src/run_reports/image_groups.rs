@@ -28,10 +28,6 @@ impl LightCurve {
     /// The raw curves that this one is compared with: L0, the degradation kind that this kind extends, and the same variant without the
     /// enhancer.
     fn bases(&self) -> Vec<Self> {
-        let raw = |variant| Self {
-            variant,
-            enhancer: None,
-        };
         let base = self.variant.kind.and_then(Kind::base);
         let base = base.map(|kind| Variant {
             kind: Some(kind),
@@ -40,7 +36,10 @@ impl LightCurve {
         [Some(Variant::NONE), base, Some(self.variant.clone())]
             .into_iter()
             .flatten()
-            .map(raw)
+            .map(|variant| Self {
+                variant,
+                enhancer: None,
+            })
             .filter(|base| base != self)
             .collect()
     }
@@ -293,7 +292,7 @@ fn image<D: Detail>(trial: TrialRef<'_, D>) -> Option<(&Condition, &str, Option<
 /// True if two runs have the same images on a curve according to their manifests.
 fn same_by_manifest(curve: &LightCurve, one: &RunManifest, other: &RunManifest) -> bool {
     let runs = [one, other];
-    let image_settings = |run: &RunManifest| {
+    differing_settings(&runs.map(|run| {
         let mut all = identity_fields(run, &settings::ENCODING);
         let kind = curve.variant.synthetic_kind();
         if kind.is_some() || curve.enhancer.is_some() {
@@ -312,6 +311,6 @@ fn same_by_manifest(curve: &LightCurve, one: &RunManifest, other: &RunManifest) 
             all.extend(settings::enhancer_settings(run));
         }
         Some(all)
-    };
-    differing_settings(&runs.map(image_settings)).is_empty()
+    }))
+    .is_empty()
 }

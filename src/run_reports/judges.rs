@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::settings::{Settings, differing_settings, reply_settings};
 use crate::error::{Error, Result};
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
-use crate::runs::stored::StoredRun;
+use crate::runs::stored::{StoredRun, text_setting};
 use crate::types::OpenDetail;
 use crate::types::manifests::{JUDGES, RunManifest, judge_flag};
 
@@ -60,7 +60,7 @@ fn check_same_settings(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
 
 /// Settings that determine the marks of a run's judge; `None` if no judge was asked, or the manifest does not state them.
 fn judge_settings(manifest: &RunManifest) -> Option<Settings> {
-    let judge = manifest.settings.get(JUDGE)?.as_str()?;
+    let judge = text_setting(manifest, JUDGE)?;
     // Runs of earlier versions list the judge only among the models.
     let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
     let settings = columns.into_iter().flatten().next().map(reply_settings)?;

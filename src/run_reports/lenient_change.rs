@@ -80,8 +80,9 @@ impl LenientChange {
         if self.scored == 0 && self.replies > 0 {
             return change;
         }
-        let percent = |right: usize| 100.0 * right as f64 / self.scored.max(1) as f64;
-        let [before, now] = self.right.map(percent);
+        let [before, now] = self
+            .right
+            .map(|right| 100.0 * right as f64 / self.scored.max(1) as f64);
         format!("{change}: the lenient accuracy is {now:.1} %, and was {before:.1} %")
     }
 }

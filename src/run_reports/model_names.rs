@@ -214,32 +214,29 @@ fn overlaps_between(
 
 /// Distinct name suffixes of groups of runs: the settings that differ if they are few and short, else the name of the first run.
 fn suffixes(groups: &[Vec<usize>], differences: &[Setting], names: &[String]) -> Vec<String> {
-    let is_short = |setting: &Setting| {
-        setting.flag.starts_with("--")
-            && setting
-                .values
-                .iter()
-                .all(|(_, value)| value.chars().count() <= MAX_VALUE_CHARS && !is_digest(value))
-    };
-    let by_settings = |group: &Vec<usize>| -> Option<String> {
-        let settings: Vec<String> = differences
-            .iter()
-            .map(|setting| {
-                let (_, value) = setting.values.iter().find(|(run, _)| group.contains(run))?;
-                Some(format!("{} {value}", spelled_setting(&setting.flag)))
-            })
-            .collect::<Option<_>>()?;
-        Some(settings.join(", "))
-    };
     groups
         .iter()
-        .map(by_settings)
+        .map(|group| -> Option<String> {
+            let settings: Vec<String> = differences
+                .iter()
+                .map(|setting| {
+                    let (_, value) = setting.values.iter().find(|(run, _)| group.contains(run))?;
+                    Some(format!("{} {value}", spelled_setting(&setting.flag)))
+                })
+                .collect::<Option<_>>()?;
+            Some(settings.join(", "))
+        })
         .collect::<Option<Vec<String>>>()
         .filter(|suffixes| {
             let distinct: BTreeSet<&String> = suffixes.iter().collect();
             distinct.len() == groups.len()
                 && differences.len() <= MAX_SETTINGS
-                && differences.iter().all(is_short)
+                && differences.iter().all(|setting| {
+                    setting.flag.starts_with("--")
+                        && setting.values.iter().all(|(_, value)| {
+                            value.chars().count() <= MAX_VALUE_CHARS && !is_digest(value)
+                        })
+                })
         })
         .unwrap_or_else(|| groups.iter().map(|group| names[group[0]].clone()).collect())
 }
@@ -307,8 +304,11 @@ fn overlaps<'a, D: Detail>(
         let [(run, trial), (other_run, other)] = [one, other];
         let image = trial.sent();
         let same_image = trial.view() == View::Image && image.is_some() && image == other.sent();
-        let has = |run: usize| parameters_are_known(&runs[run], trial.model());
-        same_words && same_image && has(run) && has(other_run)
+        same_words
+            && same_image
+            && [run, other_run]
+                .iter()
+                .all(|run| parameters_are_known(&runs[*run], trial.model()))
     };
     // The first trial of each run, by item.
     let mut first_trials = HashMap::<Item<'_>, Vec<(usize, TrialRef<'_, D>)>>::new();

@@ -4,8 +4,6 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use super::alerts::{joining_alerts, run_alerts};
 use super::combine::command_path;
 use super::enhancers;
@@ -24,7 +22,7 @@ use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::outcome::Outcome;
 use crate::runs::outcome::{StdoutFormat, Syntax};
 use crate::runs::predictions::{AnswerState, Prediction, predictions};
-use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials};
+use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials, text_setting};
 use crate::store::Store;
 use crate::tables::EnhancerRow;
 use crate::text::alert::{Alert, AlertKind};
@@ -61,9 +59,9 @@ impl Scores {
             enhancers,
             listing,
         } = joined;
-        let setting = |name| run.manifest.settings.get(name).and_then(Value::as_str);
-        let judge = setting(JUDGE).map(str::to_owned);
-        let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
+        let judge = text_setting(&run.manifest, JUDGE).map(str::to_owned);
+        let protocol =
+            text_setting(&run.manifest, PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
         let predictions = predictions(&run.records, &ids, protocol);
         let marks = marks(&run, judge.as_deref());

@@ -128,8 +128,15 @@ fn value_or_unset(settings: &Settings, flag: &str) -> Option<String> {
 /// Identity of a run; for human answers, the identity of the run whose images people saw.
 pub(super) fn identity_settings(run: &RunManifest) -> Settings {
     match run.identity.get(ASKED_ABOUT) {
-        Some(Value::Object(asked)) => asked.iter().map(field).collect(),
-        _ => run.identity.iter().map(field).collect(),
+        Some(Value::Object(asked)) => asked
+            .iter()
+            .map(|(name, value)| field(name, value))
+            .collect(),
+        _ => run
+            .identity
+            .iter()
+            .map(|(name, value)| field(name, value))
+            .collect(),
     }
 }
 
@@ -166,12 +173,11 @@ pub(super) fn pixel_settings(run: &RunManifest) -> Settings {
 /// Noise settings of a run: the flags as the user wrote them, and the content of its noise profiles. Empty if the noise profiles of
 /// `runs` are equal, or if this run has none.
 pub(super) fn noise_settings(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
-    let profiles = |run: &RunManifest| run.columns.get("reading").cloned();
-    let own = profiles(run);
+    let own = noise_profiles(run);
     // Equal profiles are the same noise, even if only one run writes out a default.
     let are_equal = runs
         .iter()
-        .filter_map(|other| profiles(other))
+        .filter_map(|other| noise_profiles(other))
         .all(|other| Some(&other) == own.as_ref());
     if own.is_none() || are_equal {
         return Settings::new();
@@ -185,6 +191,10 @@ pub(super) fn noise_settings(run: &RunManifest, runs: &[&RunManifest]) -> Settin
         .collect();
     settings.extend(column_settings(run, "reading"));
     settings
+}
+
+fn noise_profiles(run: &RunManifest) -> Option<BTreeMap<String, Value>> {
+    run.columns.get("reading").cloned()
 }
 
 /// Settings of the noise profiles and of the degradation kinds that are not in the paper.
@@ -285,8 +295,8 @@ pub(super) fn base_url(run: &RunManifest, model: &str) -> Option<String> {
     content.get("--base-url").map(text)
 }
 
-fn field((name, value): (&String, &Value)) -> (String, String) {
-    (name.clone(), text(value))
+fn field(name: &str, value: &Value) -> (String, String) {
+    (name.to_owned(), text(value))
 }
 
 /// Values in an object with their flags, including the values of nested objects; nulls are omitted.
@@ -344,18 +354,18 @@ pub(super) fn is_digest(text: &str) -> bool {
 mod tests {
     use super::*;
 
+    fn seed_settings(value: &str) -> Settings {
+        Settings::from([("--seed".to_owned(), value.to_owned())])
+    }
+
     #[test]
     fn setting_lists_each_value_once() {
-        let settings = |value: Option<&str>| {
-            let pair = value.map(|value| ("--seed".to_owned(), value.to_owned()));
-            Some(pair.into_iter().collect::<Settings>())
-        };
         let runs = [
-            settings(Some("0")),
-            settings(Some("1")),
-            settings(Some("0")),
+            Some(seed_settings("0")),
+            Some(seed_settings("1")),
+            Some(seed_settings("0")),
             None,
-            settings(None),
+            Some(Settings::new()),
         ];
         let names = ["a", "b", "c", "d", "e"].map(str::to_owned);
         let [setting] = &*differing_settings(&runs) else {

@@ -22,24 +22,18 @@ impl BatchSystem {
     pub(crate) fn from_environment(
         variable: &impl Fn(&str) -> Option<String>,
     ) -> Result<Option<Self>> {
-        let value = |name: &str| -> Result<Option<u32>> {
-            let parse = |text: String| {
-                text.trim()
-                    .parse()
-                    .map_err(|_| Error::usage(name, format_args!("{text:?} is not a number")))
-            };
-            variable(name).map(parse).transpose()
-        };
-        if let Some(id) = value("SLURM_ARRAY_TASK_ID")? {
-            let first = value("SLURM_ARRAY_TASK_MIN")?.unwrap_or(id);
-            let step = value("SLURM_ARRAY_TASK_STEP")?.unwrap_or(1).max(1);
-            let count = value("SLURM_ARRAY_TASK_COUNT")?.unwrap_or(1);
+        if let Some(id) = number(variable, "SLURM_ARRAY_TASK_ID")? {
+            let first = number(variable, "SLURM_ARRAY_TASK_MIN")?.unwrap_or(id);
+            let step = number(variable, "SLURM_ARRAY_TASK_STEP")?
+                .unwrap_or(1)
+                .max(1);
+            let count = number(variable, "SLURM_ARRAY_TASK_COUNT")?.unwrap_or(1);
             return Ok(Some(Self::Slurm {
                 index: id.saturating_sub(first) / step,
                 count: NonZeroU32::new(count).unwrap_or(NonZeroU32::MIN),
             }));
         }
-        let index = value("JOB_COMPLETION_INDEX")?;
+        let index = number(variable, "JOB_COMPLETION_INDEX")?;
         Ok(index.map(|index| Self::Kubernetes { index }))
     }
 
@@ -51,32 +45,47 @@ impl BatchSystem {
         self,
         shard_count: Option<NonZeroU32>,
     ) -> Result<(u32, NonZeroU32)> {
-        let wrong = |problem: String| Err(Error::usage("--shard", problem));
         let (index, count) = match (self, shard_count) {
             (Self::Slurm { count, .. }, Some(shard_count)) if count != shard_count => {
-                return wrong(format!(
-                    "the Slurm array has {count} tasks, not {shard_count}: name the shard itself, as --shard 2/{shard_count}"
+                return Err(Error::usage(
+                    "--shard",
+                    format_args!(
+                        "the Slurm array has {count} tasks, not {shard_count}: name the shard itself, as --shard 2/{shard_count}"
+                    ),
                 ));
             }
             (Self::Slurm { index, count }, _) | (Self::Kubernetes { index }, Some(count)) => {
                 (index, count)
             }
             (Self::Kubernetes { .. }, None) => {
-                return wrong(
+                return Err(Error::usage(
+                    "--shard",
                     "JOB_COMPLETION_INDEX is the index of this pod, but the number of pods is unknown: set it with --shard auto/N, or do \
-                     everything in each pod with --shard none"
-                        .to_owned(),
-                );
+                     everything in each pod with --shard none",
+                ));
             }
         };
         if index >= count.get() {
-            return wrong(format!(
-                "{self} is beyond the {count} parts: an index from 0 to {} expected",
-                count.get() - 1
+            return Err(Error::usage(
+                "--shard",
+                format_args!(
+                    "{self} is beyond the {count} parts: an index from 0 to {} expected",
+                    count.get() - 1
+                ),
             ));
         }
         Ok((index, count))
     }
+}
+
+fn number(variable: &impl Fn(&str) -> Option<String>, name: &str) -> Result<Option<u32>> {
+    variable(name)
+        .map(|text| {
+            text.trim()
+                .parse()
+                .map_err(|_| Error::usage(name, format_args!("{text:?} is not a number")))
+        })
+        .transpose()
 }
 
 impl fmt::Display for BatchSystem {

@@ -28,10 +28,13 @@ pub(crate) fn first_source<'n>(
 mod tests {
     use super::*;
 
+    fn first(model: &str, shard: Shard) -> usize {
+        first_source([model].into_iter(), shard, 1000)
+    }
+
     #[test]
     fn first_source_depends_on_models_and_shard_only() {
         let whole: Shard = "1/1".parse().unwrap();
-        let first = |model: &str, shard| first_source([model].into_iter(), shard, 1000);
         assert_eq!(first("a", whole), first("a", whole));
         assert_ne!(first("a", whole), first("b", whole));
         assert_ne!(

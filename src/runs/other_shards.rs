@@ -38,24 +38,26 @@ impl OtherShards {
             if shard_count(&other).is_none_or(|count| count == own) {
                 continue;
             }
-            let wrong = |problem: String| {
-                let path = path.clone();
-                Err(Error::Run { path, problem })
-            };
             if let Some((field, before, now)) =
                 differences(&other.identity, &manifest.identity).next()
             {
                 let field = spelled_setting(field);
-                return wrong(format!(
-                    "this part is of another run: its {field} is {before}, now it is {now}; use another --out, or the same {field}"
-                ));
+                return Err(Error::Run {
+                    path: path.clone(),
+                    problem: format!(
+                        "this part is of another run: its {field} is {before}, now it is {now}; use another --out, or the same {field}"
+                    ),
+                });
             }
             if store::is_locked(&path)? {
-                return wrong(format!(
-                    "another process is writing to this part of another division, and both might ask the same; wait for it, or end it, before \
-                     --shard {} begins",
-                    manifest.shard.as_deref().unwrap_or_default()
-                ));
+                return Err(Error::Run {
+                    path: path.clone(),
+                    problem: format!(
+                        "another process is writing to this part of another division, and both might ask the same; wait for it, or end it, \
+                         before --shard {} begins",
+                        manifest.shard.as_deref().unwrap_or_default()
+                    ),
+                });
             }
             shards.push((path, other));
         }

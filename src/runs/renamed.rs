@@ -82,7 +82,6 @@ pub(crate) fn note_renamed_models(
             .chain(now.clone())
             .collect();
     }
-    let adapted_key = |name: &String| format!("{ADAPTED_FOR}{name}");
     // Two models may have swapped names: remove all old entries before inserting new ones.
     for name in new_names
         .keys()
@@ -108,6 +107,10 @@ pub(crate) fn note_renamed_models(
             .insert(LEFT_OUT.to_owned(), json!(left_out));
     }
     Ok(())
+}
+
+fn adapted_key(name: &str) -> String {
+    format!("{ADAPTED_FOR}{name}")
 }
 
 /// New name of each renamed model.
@@ -164,15 +167,14 @@ fn new_names(
         if new_names.contains_key(name) {
             continue;
         }
-        let is_free = |candidate: &String| {
-            let is_kept = before.contains_key(candidate) && !new_names.contains_key(candidate);
-            !is_kept
-                && !now.contains_key(candidate)
-                && !new_names.values().any(|new| new == candidate)
-        };
         let free_name = std::iter::once(format!("{name} (before)"))
             .chain((2..=before.len() + now.len() + 2).map(|n| format!("{name} (before {n})")))
-            .find(is_free);
+            .find(|candidate| {
+                let is_kept = before.contains_key(candidate) && !new_names.contains_key(candidate);
+                !is_kept
+                    && !now.contains_key(candidate)
+                    && !new_names.values().any(|new| new == candidate)
+            });
         if let Some(new) = free_name {
             new_names.insert(name.clone(), new);
         }
@@ -196,11 +198,6 @@ fn left_out(
     let has = |name: &str| {
         now.contains_key(name) || manifest.models.iter().any(|model| model.name == name)
     };
-    let is_listed = |name: &str| {
-        // Controls are asked together with the observer.
-        let asked = Control::from_model_name(name).map_or(name, |_| OBSERVER);
-        has(name) || has(asked)
-    };
     manifest
         .columns
         .get("model")
@@ -208,7 +205,11 @@ fn left_out(
         .flatten()
         .map(|(name, _)| name)
         .filter(|name| settings == SettingsChange::Allowed || left_out_before.contains(*name))
-        .filter(|name| !is_listed(name))
+        .filter(|name| {
+            // Controls are asked together with the observer.
+            let asked = Control::from_model_name(name).map_or(name.as_str(), |_| OBSERVER);
+            !has(name) && !has(asked)
+        })
         .cloned()
         .collect()
 }

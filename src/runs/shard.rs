@@ -159,8 +159,10 @@ mod tests {
 
     fn resolved(text: Option<&str>, variables: &[(&str, &str)]) -> Result<Shard> {
         Shard::resolve(text, |name| {
-            let found = variables.iter().find(|(known, _)| *known == name);
-            found.map(|(_, value)| (*value).to_owned())
+            variables
+                .iter()
+                .find(|(known, _)| *known == name)
+                .map(|(_, value)| (*value).to_owned())
         })
     }
 
@@ -190,7 +192,7 @@ mod tests {
             let shard = resolved(text, variables).unwrap();
             assert_eq!(shard.to_string(), expected, "{text:?}");
         }
-        for (text, variables, says) in [
+        for (text, variables, message) in [
             (Some("0/4"), &[][..], "a part expected, as 2/4"),
             (Some("5/4"), &[], "a part expected"),
             (Some("1"), &[], "a part expected"),
@@ -200,13 +202,16 @@ mod tests {
             (None, &pod, "--shard auto/N"),
         ] {
             let error = resolved(text, variables).unwrap_err().to_string();
-            assert!(error.contains(says), "{text:?}: {error}");
+            assert!(error.contains(message), "{text:?}: {error}");
         }
+    }
+
+    fn number(n: u32) -> NonZeroU32 {
+        NonZeroU32::new(n).unwrap()
     }
 
     #[test]
     fn shares_of_the_shards_that_run_at_once_sum_up() {
-        let number = |n| NonZeroU32::new(n).unwrap();
         let parts: Vec<Shard> = Shard::all(number(3)).collect();
         let whole = Quota {
             requests: Some(number(500)),

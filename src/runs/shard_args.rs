@@ -61,13 +61,14 @@ pub(crate) fn keep_shard<T>(frames: &mut Vec<T>, shard: Shard) -> Result<()> {
 mod tests {
     use super::*;
 
+    fn part(text: &str) -> Result<String> {
+        let mut letters: Vec<char> = "abcdefg".chars().collect();
+        let kept = keep_shard(&mut letters, text.parse().unwrap());
+        kept.map(|()| letters.into_iter().collect::<String>())
+    }
+
     #[test]
     fn parts_are_together_everything_in_order() {
-        let part = |text: &str| {
-            let mut letters: Vec<char> = "abcdefg".chars().collect();
-            let kept = keep_shard(&mut letters, text.parse().unwrap());
-            kept.map(|()| letters.into_iter().collect::<String>())
-        };
         let parts = ["1/3", "2/3", "3/3"].map(|text| part(text).unwrap());
         assert_eq!(parts.concat(), "abcdefg");
         assert!(parts.iter().all(|part| (2..=3).contains(&part.len())));

@@ -52,12 +52,15 @@ impl ShardBudget {
 mod tests {
     use super::*;
 
+    fn half_budget(spent: f64) -> ShardBudget {
+        ShardBudget { share: 0.5, spent }
+    }
+
     #[test]
     fn nothing_is_left_of_a_share_that_is_spent() {
-        let cost = |spent| ShardBudget { share: 0.5, spent };
-        assert!((cost(0.2).left() - 0.3).abs() < 1e-12);
-        assert_eq!(cost(0.6).left().to_bits(), 0.0_f64.to_bits());
-        let words = cost(0.25).words();
+        assert!((half_budget(0.2).left() - 0.3).abs() < 1e-12);
+        assert_eq!(half_budget(0.6).left().to_bits(), 0.0_f64.to_bits());
+        let words = half_budget(0.25).words();
         assert!(words.contains("0.25") && words.contains("0.50"), "{words}");
     }
 }

@@ -86,7 +86,6 @@ pub(crate) fn shard_range(sources: &[WeightedSource], shard: Shard) -> Range<usi
 
 /// The index of the first source of each shard.
 fn shard_starts(sources: &[WeightedSource], count: usize) -> Vec<usize> {
-    let cost = |source: &WeightedSource| u128::from(source.cost.max(1));
     let total: u128 = sources.iter().map(cost).sum();
     // The total cost is cut into equal shares. A source belongs to the share in which it starts.
     let shard_at = |cost_before: u128| (cost_before * count as u128 / total.max(1)) as usize;
@@ -120,6 +119,10 @@ fn shard_starts(sources: &[WeightedSource], count: usize) -> Vec<usize> {
     starts
 }
 
+fn cost(source: &WeightedSource) -> u128 {
+    u128::from(source.cost.max(1))
+}
+
 #[cfg(test)]
 mod tests {
     use std::num::NonZeroU32;
@@ -127,12 +130,11 @@ mod tests {
     use super::*;
 
     fn cuts(scenes: &str, count: u32) -> Vec<Range<usize>> {
-        let scene = |letter: char| match letter {
-            '-' => String::new(),
-            letter => letter.to_string(),
-        };
         let sources = scenes.chars().map(|letter| WeightedSource {
-            scene: scene(letter),
+            scene: match letter {
+                '-' => String::new(),
+                letter => letter.to_string(),
+            },
             cost: 1,
         });
         divided(&sources.collect::<Vec<WeightedSource>>(), count)

@@ -322,3 +322,8 @@ fn no_run(folder: &Path) -> Error {
         problem: format!("no run in this folder: it has no manifest.json{hint}"),
     }
 }
+
+/// A setting of a manifest, if it is a text.
+pub(crate) fn text_setting<'a>(manifest: &'a RunManifest, name: &str) -> Option<&'a str> {
+    manifest.settings.get(name)?.as_str()
+}

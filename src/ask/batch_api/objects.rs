@@ -137,11 +137,6 @@ impl RemoteBatch {
             .and_then(|errors| errors.get("data").unwrap_or(errors).as_array())
             .map_or(&[][..], Vec::as_slice);
         let counts = object.get("request_counts");
-        let count = |name| {
-            counts
-                .and_then(|counts| counts.get(name)?.as_u64())
-                .unwrap_or(0)
-        };
         let mark = object.get("metadata").and_then(|data| text(data, MARK));
         Some(Self {
             id: text(object, "id")?,
@@ -149,9 +144,9 @@ impl RemoteBatch {
             output_file: text(object, "output_file_id"),
             error_file: text(object, "error_file_id"),
             counts: RequestCounts {
-                answered: count("completed"),
-                done: count("completed").saturating_add(count("failed")),
-                total: count("total"),
+                answered: count(counts, "completed"),
+                done: count(counts, "completed").saturating_add(count(counts, "failed")),
+                total: count(counts, "total"),
             },
             problem: errors
                 .first()
@@ -163,6 +158,13 @@ impl RemoteBatch {
             mark: mark.unwrap_or_default(),
         })
     }
+}
+
+/// Number of requests by its name in `request_counts`; 0 if absent.
+fn count(counts: Option<&Value>, name: &str) -> u64 {
+    counts
+        .and_then(|counts| counts.get(name)?.as_u64())
+        .unwrap_or(0)
 }
 
 /// Field of a batch's metadata with the mark of the program.
@@ -208,23 +210,24 @@ mod tests {
         }
     }
 
+    fn failed_batch(errors: &Value) -> RemoteBatch {
+        let object = json!({"id": "b", "status": "failed", "errors": errors});
+        RemoteBatch::from_json(&object, &Scrub::default()).unwrap()
+    }
+
     #[test]
     fn a_failed_batch_has_its_line_or_quota() {
-        let read = |errors: Value| {
-            let object = json!({"id": "b", "status": "failed", "errors": errors});
-            RemoteBatch::from_json(&object, &Scrub::default()).unwrap()
-        };
-        let line = read(json!({"object": "list", "data": [
+        let line = failed_batch(&json!({"object": "list", "data": [
             {"code": "invalid_json_line", "message": "not JSON", "param": null, "line": 7},
         ]}));
         assert_eq!(line.problem, "line 7: not JSON (invalid_json_line)");
         assert_eq!(line.quota, None);
-        let full = read(
-            json!({"data": [{"code": "token_limit_exceeded", "line": null, "message":
+        let full = failed_batch(
+            &json!({"data": [{"code": "token_limit_exceeded", "line": null, "message":
             "Enqueued token limit reached for m in organization o. Limit: 2,000,000 enqueued tokens."}]}),
         );
         let quota = full.quota.unwrap();
         assert_eq!(quota.limit, Some(2_000_000));
-        assert_eq!(read(Value::Null).quota, None);
+        assert_eq!(failed_batch(&Value::Null).quota, None);
     }
 }

@@ -105,8 +105,8 @@ impl Rule {
             Self::Tiles { base, tile } => {
                 let scale = (2048.0 / longer).min(1.0);
                 let scale = scale * (768.0 / (shorter * scale)).min(1.0);
-                let tiles = |side: f64| (side * scale / 512.0).ceil().max(1.0);
-                return base + tile * (tiles(width) * tiles(height)) as u64;
+                return base
+                    + tile * (tiles_along(scale, width) * tiles_along(scale, height)) as u64;
             }
             Self::FittedPatches {
                 most,
@@ -137,18 +137,23 @@ impl Rule {
             Self::Resized { patch } => patches_after_resize(width, height, patch),
             Self::Merged { patch, side } => {
                 let scale = (side / longer).min(1.0);
-                let patches = |length: f64| (length * scale / patch).round().max(1.0);
-                patches(width) * patches(height)
+                (width * scale / patch).round().max(1.0) * (height * scale / patch).round().max(1.0)
             }
         };
         count.ceil() as u64
     }
 }
 
+/// Tiles of 512 pixels along a scaled side.
+fn tiles_along(scale: f64, side: f64) -> f64 {
+    (side * scale / 512.0).ceil().max(1.0)
+}
+
 /// Number of patches that cover an image scaled by a factor. Up to a millionth of a patch per side is ignored as a rounding error.
 fn count_patches(width: f64, height: f64, patch: f64, scale: f64) -> f64 {
-    let patches = |side: f64| ((side * scale / patch * 1e6).round() / 1e6).ceil().max(1.0);
-    patches(width) * patches(height)
+    let [columns, rows] =
+        [width, height].map(|side| ((side * scale / patch * 1e6).round() / 1e6).ceil().max(1.0));
+    columns * rows
 }
 
 /// Number of 32 × 32 patches after an image is reduced to a maximum side and to at most `most` patches. The scale is chosen so that the
@@ -160,8 +165,9 @@ fn patches_after_fit(width: f64, height: f64, side: f64, most: f64) -> f64 {
         return count;
     }
     let scale = (32.0 * 32.0 * most / (width * height)).sqrt();
-    let whole = |side: f64| (side * scale / 32.0).floor().max(1.0) / (side * scale / 32.0);
-    count_patches(width, height, 32.0, scale * whole(width).min(whole(height))).min(most)
+    let [whole_width, whole_height] =
+        [width, height].map(|side| (side * scale / 32.0).floor().max(1.0) / (side * scale / 32.0));
+    count_patches(width, height, 32.0, scale * whole_width.min(whole_height)).min(most)
 }
 
 /// Limits of an image: maximum side in pixels, and maximum number of patches.
@@ -195,8 +201,8 @@ fn patches_after_resize(width: f64, height: f64, patch: f64) -> f64 {
     const MIN: f64 = 4.0;
     const MAX: f64 = 16_384.0;
     let count = |round: fn(f64) -> f64, scale: f64| {
-        let patches = |side: f64| round(side * scale / patch).max(1.0);
-        patches(width) * patches(height)
+        let [columns, rows] = [width, height].map(|side| round(side * scale / patch).max(1.0));
+        columns * rows
     };
     let unscaled = count(f64::round_ties_even, 1.0);
     let area = width * height / (patch * patch);
@@ -271,8 +277,10 @@ mod tests {
     #[test]
     fn counts_grow_with_the_size() {
         for family in &TABLE.family {
-            let count = |side: f64| family.rule.count(None, side, side);
-            let counts: Vec<u64> = (1..40).map(|step| count(f64::from(step) * 100.0)).collect();
+            let counts: Vec<u64> = (1..40)
+                .map(|step| f64::from(step) * 100.0)
+                .map(|side| family.rule.count(None, side, side))
+                .collect();
             let decrease = counts
                 .windows(2)
                 .find(|pair| (pair[1] as f64) < 0.9 * pair[0] as f64);

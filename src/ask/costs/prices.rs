@@ -45,13 +45,16 @@ impl Price {
     /// Cost of a request from its reported usage, in US dollars. A token count that the server did not report counts as 0.
     #[must_use]
     pub(crate) fn charged(&self, usage: Usage) -> f64 {
-        let or_zero = |tokens: Option<u64>| tokens.unwrap_or(0) as f64;
-        let prompt = or_zero(usage.prompt_tokens);
-        let reply = or_zero(usage.completion_tokens);
-        let cached = or_zero(usage.cached_tokens).min(prompt);
+        let prompt = tokens_or_zero(usage.prompt_tokens);
+        let reply = tokens_or_zero(usage.completion_tokens);
+        let cached = tokens_or_zero(usage.cached_tokens).min(prompt);
         let discount = self.input - self.cached_input.unwrap_or(self.input);
         self.cost(prompt, reply) - cached * discount / 1e6
     }
+}
+
+fn tokens_or_zero(tokens: Option<u64>) -> f64 {
+    tokens.unwrap_or(0) as f64
 }
 
 /// A dated table of prices by model.
@@ -84,15 +87,9 @@ impl Prices {
     /// If the file cannot be read or parsed, or a price or the batch share is negative or not finite.
     pub(crate) fn load(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
-        let invalid = |problem: String| {
-            let expected = "expected as-of = \"2026-11-20\", batch = 0.5 and [models] with lines like \
-                            gpt-4o = { input = 2.5, output = 10 }";
-            let problem = format!("{}: {problem}; {expected}", path.display());
-            Error::usage("--prices", problem)
-        };
         let prices: Self = toml::from_str(&text).map_err(|e| {
             let TomlFault { line, problem } = TomlFault::new(&text, &e);
-            invalid(format!("line {line}: {problem}"))
+            invalid_table(path, &format!("line {line}: {problem}"))
         })?;
         let first_invalid = prices
             .models
@@ -104,9 +101,10 @@ impl Prices {
             .chain([("batch", prices.batch)])
             .find(|(_, number)| !is_finite_and_not_negative(*number));
         if let Some((name, number)) = first_invalid {
-            return Err(invalid(format!(
-                "{name}: {number} is not a number of 0 or more"
-            )));
+            return Err(invalid_table(
+                path,
+                &format!("{name}: {number} is not a number of 0 or more"),
+            ));
         }
         Ok(Self {
             is_custom: true,
@@ -170,6 +168,13 @@ impl Prices {
     }
 }
 
+fn invalid_table(path: &Path, problem: &str) -> Error {
+    let expected = "expected as-of = \"2026-11-20\", batch = 0.5 and [models] with lines like \
+                            gpt-4o = { input = 2.5, output = 10 }";
+    let problem = format!("{}: {problem}; {expected}", path.display());
+    Error::usage("--prices", problem)
+}
+
 fn is_finite_and_not_negative(number: f64) -> bool {
     number.is_finite() && number >= 0.0
 }
@@ -196,19 +201,32 @@ mod tests {
         assert!(prices.as_of.starts_with("20"));
     }
 
+    fn input_price(prices: &Prices, model: &str) -> Option<f64> {
+        prices.find(model).map(|price| price.input)
+    }
+
+    fn with_cached(usage: Usage, tokens: u64) -> Usage {
+        Usage {
+            cached_tokens: Some(tokens),
+            ..usage
+        }
+    }
+
     #[test]
     fn versioned_names_have_the_price_of_their_model() {
         let prices = Prices::built_in().unwrap();
-        let input = |model| prices.find(model).map(|price| price.input);
-        assert_eq!(input("gpt-4o"), Some(2.5));
-        assert_eq!(input("gpt-4o-2024-08-06"), Some(2.5));
-        assert_eq!(input("gpt-4-0613"), Some(30.0));
-        assert_eq!(input("gpt-4-1106-preview"), Some(10.0));
-        assert_eq!(input("openai/gpt-4o-mini-2024-07-18"), Some(0.15));
-        assert_eq!(input("claude-haiku-4-5-20251001"), Some(1.0));
+        assert_eq!(input_price(&prices, "gpt-4o"), Some(2.5));
+        assert_eq!(input_price(&prices, "gpt-4o-2024-08-06"), Some(2.5));
+        assert_eq!(input_price(&prices, "gpt-4-0613"), Some(30.0));
+        assert_eq!(input_price(&prices, "gpt-4-1106-preview"), Some(10.0));
         assert_eq!(
-            input("gemini-2.5-flash-preview-04-17"),
-            input("gemini-2.5-flash")
+            input_price(&prices, "openai/gpt-4o-mini-2024-07-18"),
+            Some(0.15)
+        );
+        assert_eq!(input_price(&prices, "claude-haiku-4-5-20251001"), Some(1.0));
+        assert_eq!(
+            input_price(&prices, "gemini-2.5-flash-preview-04-17"),
+            input_price(&prices, "gemini-2.5-flash")
         );
         for unknown in [
             "gpt-4o-audio",
@@ -217,7 +235,7 @@ mod tests {
             "gpt-4o-",
             "gemini-2.5-flash-preview-tts",
         ] {
-            assert_eq!(input(unknown), None, "{unknown}");
+            assert_eq!(input_price(&prices, unknown), None, "{unknown}");
         }
         let price = prices.find("gpt-4o").unwrap();
         let usage = Usage {
@@ -228,25 +246,22 @@ mod tests {
         };
         assert!((price.charged(usage) - 3.5).abs() < 1e-12);
         // Half of the prompt is cached and costs half the price. A count of cached tokens above the prompt is capped.
-        let cached = |tokens| Usage {
-            cached_tokens: Some(tokens),
-            ..usage
-        };
-        assert!((price.charged(cached(500_000)) - 2.875).abs() < 1e-12);
-        assert!((price.charged(cached(u64::MAX)) - 2.25).abs() < 1e-12);
+        assert!((price.charged(with_cached(usage, 500_000)) - 2.875).abs() < 1e-12);
+        assert!((price.charged(with_cached(usage, u64::MAX)) - 2.25).abs() < 1e-12);
         let opus = prices.find("claude-opus-4-8").unwrap();
-        assert!((opus.charged(usage) - opus.charged(cached(9))).abs() < 1e-12);
+        assert!((opus.charged(usage) - opus.charged(with_cached(usage, 9))).abs() < 1e-12);
+    }
+
+    fn load_text(path: &Path, text: &str) -> Result<Prices> {
+        std::fs::write(path, text).unwrap();
+        Prices::load(path)
     }
 
     #[test]
     fn invalid_custom_tables_are_rejected() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let load = |text: &str| {
-            std::fs::write(file.path(), text).unwrap();
-            Prices::load(file.path())
-        };
         let good = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\n\"m/x\" = { input = 1, output = 2, image-tokens = 900 }\n";
-        let price = load(good).unwrap().find("m/x").unwrap();
+        let price = load_text(file.path(), good).unwrap().find("m/x").unwrap();
         assert_eq!((price.input, price.image_tokens), (1.0, Some(900)));
         for wrong in [
             "",
@@ -255,7 +270,7 @@ mod tests {
             &good.replace("batch = 0.5", "batch = nan"),
             "models = 3",
         ] {
-            let error = load(wrong).unwrap_err().to_string();
+            let error = load_text(file.path(), wrong).unwrap_err().to_string();
             assert!(error.starts_with("--prices: "), "{error}");
             assert!(error.contains("gpt-4o ="), "{error}");
         }

@@ -160,9 +160,8 @@ mod tests {
         #[derive(Debug, thiserror::Error)]
         #[error("outer")]
         struct Outer(#[source] io::Error);
-        let error_with_code = |code| Outer(io::Error::from_raw_os_error(code));
-        assert!(lacks_open_files(&error_with_code(24)));
-        assert!(!lacks_open_files(&error_with_code(111)));
+        assert!(lacks_open_files(&Outer(io::Error::from_raw_os_error(24))));
+        assert!(!lacks_open_files(&Outer(io::Error::from_raw_os_error(111))));
         assert!(!lacks_open_files(&Outer(io::Error::other(
             "Too many open files"
         ))));

@@ -53,34 +53,45 @@ impl CustomHeaders {
 
     /// Adds a header given as `NAME: VALUE`.
     fn add_plain(&mut self, text: &str) -> Result<()> {
-        let usage_error = |problem: String| Error::usage("--header", problem);
-        let (name, value) = text
-            .split_once(':')
-            .ok_or_else(|| usage_error("'NAME: VALUE' expected, as 'X-Team: vision'".to_owned()))?;
+        let (name, value) = text.split_once(':').ok_or_else(|| {
+            Error::usage("--header", "'NAME: VALUE' expected, as 'X-Team: vision'")
+        })?;
         let (name, value) = (name.trim(), value.trim());
         if is_secret_value(value) || (is_secret_name(name) && value.len() >= 20) {
-            return Err(usage_error(format!(
-                "the value of {name} looks like a secret, which is not shown here; put it into a variable and name that: \
+            return Err(Error::usage(
+                "--header",
+                format_args!(
+                    "the value of {name} looks like a secret, which is not shown here; put it into a variable and name that: \
                  --header-env {name}=VARIABLE"
-            )));
+                ),
+            ));
         }
         self.add(name, value, "--header")
     }
 
     /// Adds a header given as `NAME=VARIABLE`.
     fn add_from_variable(&mut self, text: &str) -> Result<()> {
-        let usage_error = |problem: String| Error::usage("--header-env", problem);
         let (name, variable_name) = text.split_once('=').ok_or_else(|| {
-            usage_error("NAME=VARIABLE expected, as X-Auth=GATEWAY_TOKEN".to_owned())
+            Error::usage(
+                "--header-env",
+                "NAME=VARIABLE expected, as X-Auth=GATEWAY_TOKEN",
+            )
         })?;
         let (name, variable_name) = (name.trim(), variable_name.trim());
         if looks_like_key(variable_name) {
-            return Err(usage_error(format!(
-                "the value after {name}= looks like a secret, which is not shown here; put it into a variable and name that"
-            )));
+            return Err(Error::usage(
+                "--header-env",
+                format_args!(
+                    "the value after {name}= looks like a secret, which is not shown here; put it into a variable and name that"
+                ),
+            ));
         }
-        let value = variable(variable_name)
-            .ok_or_else(|| usage_error(format!("the variable {variable_name} is not set")))?;
+        let value = variable(variable_name).ok_or_else(|| {
+            Error::usage(
+                "--header-env",
+                format_args!("the variable {variable_name} is not set"),
+            )
+        })?;
         let value = value.trim();
         self.add(name, value, "--header-env")?;
         self.secrets.push(value.to_owned());
@@ -93,23 +104,27 @@ impl CustomHeaders {
 
     /// Adds a header. Errors name `flag`, the flag that the header comes from.
     fn add(&mut self, name: &str, value: &str, flag: &str) -> Result<()> {
-        let usage_error = |problem: String| Error::usage(flag, problem);
         let Ok(header_name) = HeaderName::try_from(name) else {
-            return Err(usage_error(
-                "this is not a valid name of an HTTP header".to_owned(),
+            return Err(Error::usage(
+                flag,
+                "this is not a valid name of an HTTP header",
             ));
         };
         if RESERVED.contains(&header_name.as_str()) {
-            return Err(usage_error(format!("{name} is set by the program itself")));
+            return Err(Error::usage(
+                flag,
+                format_args!("{name} is set by the program itself"),
+            ));
         }
         let Ok(mut header_value) = HeaderValue::try_from(value) else {
-            return Err(usage_error(format!(
-                "the value of {name} has characters that an HTTP header cannot carry"
-            )));
+            return Err(Error::usage(
+                flag,
+                format_args!("the value of {name} has characters that an HTTP header cannot carry"),
+            ));
         };
         header_value.set_sensitive(flag == "--header-env");
         if self.map.insert(header_name, header_value).is_some() {
-            return Err(usage_error(format!("{name} is named twice")));
+            return Err(Error::usage(flag, format_args!("{name} is named twice")));
         }
         Ok(())
     }

@@ -313,14 +313,13 @@ impl Endpoint {
             Some(gate) => Some(self.unless_closed(gate.pass()).await?),
             None => None,
         };
-        let is_ready = |index: usize| {
-            let replica = &self.replicas[index];
-            let has_room = self.load_balancer.in_flight(index) < replica.width();
-            has_room && replica.gate.ready_at() <= Instant::now() + SOON
-        };
         let chosen = self
             .load_balancer
-            .choose(request.model, request.affinity, avoided, is_ready);
+            .choose(request.model, request.affinity, avoided, |index| {
+                let replica = &self.replicas[index];
+                let has_room = self.load_balancer.in_flight(index) < replica.width();
+                has_room && replica.gate.ready_at() <= Instant::now() + SOON
+            });
         let Some(replica) = chosen else {
             let id = &request.sent.parameters.model;
             let message = format!("no replica of this endpoint can be asked for {id} any more");

@@ -180,16 +180,17 @@ impl LoadBalancer {
         let count = self.state().replicas.len();
         let ready: Vec<bool> = (0..count).map(is_ready).collect();
         let (now, mut state) = (Instant::now(), self.state());
-        let is_available = |index: usize| match state.replicas[index].health {
-            Health::Working => true,
-            Health::BackoffUntil(end) => end <= now,
-            Health::Probing => false,
-        };
         let mut candidates: Vec<usize> = (0..count)
             .filter(|index| !state.is_excluded(model, *index))
             .collect();
         // If no replica is available, all are tried as a single endpoint would be, with the delays of its retries.
-        prefer(&mut candidates, is_available);
+        prefer(&mut candidates, |index| {
+            match state.replicas[index].health {
+                Health::Working => true,
+                Health::BackoffUntil(end) => end <= now,
+                Health::Probing => false,
+            }
+        });
         prefer(&mut candidates, |index| !avoided.contains(&index));
         prefer(&mut candidates, |index| ready[index]);
         let in_flight = |index: &usize| state.replicas[*index].in_flight;

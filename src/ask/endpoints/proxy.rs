@@ -30,21 +30,17 @@ pub(super) fn check_proxy(
     let Ok(address) = base.to_string().parse::<Uri>() else {
         return Ok(());
     };
-    let first = |names: [&'static str; 2]| {
-        names
-            .into_iter()
-            .find_map(|name| Some((name, variable(name)?)))
-            .filter(|(_, value)| !value.is_empty())
-    };
     let by_scheme = if base.is_plain() {
         ["HTTP_PROXY", "http_proxy"]
     } else {
         ["HTTPS_PROXY", "https_proxy"]
     };
-    let Some((name, value)) = first(by_scheme).or_else(|| first(["ALL_PROXY", "all_proxy"])) else {
+    let Some((name, value)) = first_set(&variable, by_scheme)
+        .or_else(|| first_set(&variable, ["ALL_PROXY", "all_proxy"]))
+    else {
         return Ok(());
     };
-    let no_proxy = first(["NO_PROXY", "no_proxy"])
+    let no_proxy = first_set(&variable, ["NO_PROXY", "no_proxy"])
         .and_then(|(_, value)| value.into_string().ok())
         .unwrap_or_default();
     let matcher = Matcher::builder().all(SAMPLE_PROXY).no(no_proxy).build();
@@ -55,6 +51,17 @@ pub(super) fn check_proxy(
     let problem = "not a proxy that can be used, and nothing was sent without it; expected for example http://proxy.example:3128 (no \
                    SOCKS). To connect directly, unset it or name the host in NO_PROXY";
     Err(Error::usage(name, problem))
+}
+
+/// The first of two variables that is set, unless it is empty.
+fn first_set(
+    variable: &impl Fn(&str) -> Option<OsString>,
+    names: [&'static str; 2],
+) -> Option<(&'static str, OsString)> {
+    names
+        .into_iter()
+        .find_map(|name| Some((name, variable(name)?)))
+        .filter(|(_, value)| !value.is_empty())
 }
 
 /// True if requests can be sent through a proxy at this address.
@@ -84,14 +91,13 @@ mod tests {
 
     /// Variable with an unusable proxy for this address and environment.
     fn refused(base: &str, set: &[(&str, &str)]) -> Option<String> {
-        let variable = |name: &str| {
+        let error = check_proxy(&base.parse().unwrap(), |name| {
             set.iter()
                 .find(|(known, _)| *known == name)
                 .map(|(_, value)| value.into())
-        };
-        let error = check_proxy(&base.parse().unwrap(), variable)
-            .err()?
-            .to_string();
+        })
+        .err()?
+        .to_string();
         assert!(!error.contains("pass"), "{error}");
         Some(error.split(':').next().unwrap_or_default().to_owned())
     }

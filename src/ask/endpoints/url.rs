@@ -95,28 +95,33 @@ impl FromStr for BaseUrl {
 
     /// Parses a URL. Errors do not show it, because it may contain a password.
     fn from_str(text: &str) -> Result<Self> {
-        let wrong = |problem: &str| Error::usage("--base-url", problem);
         let url = Url::parse(text.trim()).map_err(|error| {
-            wrong(&format!(
-                "not an address ({error}); expected for example https://api.openai.com/v1 or http://127.0.0.1:8000/v1"
-            ))
+            Error::usage(
+                "--base-url",
+                format_args!(
+                    "not an address ({error}); expected for example https://api.openai.com/v1 or http://127.0.0.1:8000/v1"
+                ),
+            )
         })?;
         if !matches!(url.scheme(), "http" | "https") || url.host_str().is_none() {
-            return Err(wrong(
+            return Err(Error::usage(
+                "--base-url",
                 "expected an address that begins with https:// or http://",
             ));
         }
         if url.fragment().is_some() {
-            return Err(wrong(
+            return Err(Error::usage(
+                "--base-url",
                 "an address with '#' cannot be used; remove '#' and everything after it",
             ));
         }
         for path in Wire::ALL.map(Wire::path) {
             let before = url.path().trim_end_matches('/').strip_suffix(path);
             if before.is_some_and(|before| before.ends_with('/')) {
-                return Err(wrong(&format!(
-                    "remove /{path} from the end; it is appended to the address"
-                )));
+                return Err(Error::usage(
+                    "--base-url",
+                    format_args!("remove /{path} from the end; it is appended to the address"),
+                ));
             }
         }
         Ok(Self(url))

@@ -117,11 +117,10 @@ impl ApiError {
             message = format!("{message}: {raw}");
         }
         let message = truncated(message);
-        let field = |name| error.get(name).and_then(text_or_number);
         Self {
-            kind: field("type"),
-            code: field("code").or_else(|| field("status")),
-            param: field("param").or_else(|| error_location(error)),
+            kind: field(error, "type"),
+            code: field(error, "code").or_else(|| field(error, "status")),
+            param: field(error, "param").or_else(|| error_location(error)),
             is_moderated: metadata.is_some_and(|metadata| {
                 metadata.get("reasons").is_some() || metadata.get("flagged_input").is_some()
             }),
@@ -186,6 +185,10 @@ impl ApiError {
         let status = self.code.as_ref()?.parse().ok()?;
         (400..600).contains(&status).then_some(status)
     }
+}
+
+fn field(error: &Value, name: &str) -> Option<String> {
+    error.get(name).and_then(text_or_number)
 }
 
 /// Reason why a response with a success status has no reply.
@@ -456,13 +459,14 @@ mod tests {
         }
     }
 
+    fn gemini(id: &str) -> String {
+        format!(
+            r#"[{{"error":{{"code":429,"message":"You exceeded your current quota.","details":[{{"violations":[{{"quotaId":"{id}"}}]}},{{"@type":"type.googleapis.com/google.rpc.RetryInfo","retryDelay":"45.837906927s"}}]}}}}]"#
+        )
+    }
+
     #[test]
     fn waits_and_daily_limits_are_parsed() {
-        let gemini = |id: &str| {
-            format!(
-                r#"[{{"error":{{"code":429,"message":"You exceeded your current quota.","details":[{{"violations":[{{"quotaId":"{id}"}}]}},{{"@type":"type.googleapis.com/google.rpc.RetryInfo","retryDelay":"45.837906927s"}}]}}}}]"#
-            )
-        };
         for (body, seconds, is_daily) in [
             (gemini("GenerateRequestsPerMinutePerProject"), Some(45.837_906_927), false),
             (gemini("GenerateRequestsPerDayPerProject"), Some(45.837_906_927), true),

@@ -41,12 +41,13 @@ fn stated_limit(message: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
+    fn parse(code: Option<&str>, message: &str) -> Option<QuotaRefusal> {
+        let error = serde_json::json!({"code": code, "message": message});
+        QuotaRefusal::from_api_error(&ApiError::from_error(&error), &Scrub::default())
+    }
+
     #[test]
     fn the_limit_is_parsed_from_the_message() {
-        let parse = |code: Option<&str>, message: &str| {
-            let error = serde_json::json!({"code": code, "message": message});
-            QuotaRefusal::from_api_error(&ApiError::from_error(&error), &Scrub::default())
-        };
         let message = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
                      once some in_progress batches have been completed.";
         assert_eq!(parse(None, message).unwrap().limit, Some(90_000));

@@ -90,13 +90,17 @@ mod tests {
         assert_eq!(patterns.len(), count);
     }
 
+    fn flat(message: &str) -> String {
+        json!({"object": "error", "message": message, "type": "BadRequestError", "code": 400})
+            .to_string()
+    }
+
+    fn error(message: &str) -> String {
+        json!({"error": {"message": message}}).to_string()
+    }
+
     #[test]
     fn server_errors_have_a_cause() {
-        let error = |message: &str| json!({"error": {"message": message}}).to_string();
-        let flat = |message: &str| {
-            json!({"object": "error", "message": message, "type": "BadRequestError", "code": 400})
-                .to_string()
-        };
         for (body, flag) in [
             (flat("facebook/opt-125m is not a multimodal model None"), "--blind"),
             (json!({"error": "Model does not support images. Please use a model that does."}).to_string(), "--blind"),

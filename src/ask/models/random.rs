@@ -93,14 +93,15 @@ mod tests {
         );
     }
 
+    fn guesses(seed: u64, condition: &str) -> String {
+        let condition = condition.parse().unwrap();
+        (0..40)
+            .map(|id| guess(seed, &question(id, 4), Some(&condition), 0))
+            .collect()
+    }
+
     #[test]
     fn guesses_depend_on_seed_question_and_condition() {
-        let guesses = |seed: u64, condition: &str| -> String {
-            let condition = condition.parse().unwrap();
-            (0..40)
-                .map(|id| guess(seed, &question(id, 4), Some(&condition), 0))
-                .collect()
-        };
         assert_eq!(guesses(1, "L3-noise"), guesses(1, "L3-noise"));
         assert_ne!(guesses(1, "L3-noise"), guesses(2, "L3-noise"));
         assert_ne!(guesses(1, "L3-noise"), guesses(1, "L3-ev"));

@@ -359,10 +359,6 @@ fn resolve_alike(error: AskError, reach: Reach) -> AskError {
 /// Checks that the fields of `--extra-body` do not set the same as a flag.
 fn check_user_fields(parameters: &Parameters, initial: RequestFields) -> Result<()> {
     let extra = &parameters.extra;
-    let conflict = |field: &str, flag: &str| {
-        let problem = format_args!("{field} is set by {flag}; leave one of them out");
-        Err(Error::usage("--extra-body", problem))
-    };
     if parameters.constrain != Constrain::None
         && let Some(field) = ["response_format", "structured_outputs", "text"]
             .into_iter()
@@ -390,6 +386,11 @@ fn check_user_fields(parameters: &Parameters, initial: RequestFields) -> Result<
         return conflict("include", "--request probabilities");
     }
     Ok(())
+}
+
+fn conflict(field: &str, flag: &str) -> Result<()> {
+    let problem = format_args!("{field} is set by {flag}; leave one of them out");
+    Err(Error::usage("--extra-body", problem))
 }
 
 /// Checks that the vendor supports a requested constraint and requested probabilities. Warns if requests to it are not repeatable.

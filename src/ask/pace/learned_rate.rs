@@ -236,14 +236,14 @@ impl LearnedRate {
         self.remember(false);
         self.consecutive_pauses = 0;
         if let Some(rate) = self.rate.filter(|_| self.pause.is_none()) {
-            let is_below = |share: f64| self.ceiling.is_none_or(|ceiling| rate < share * ceiling);
-            let growth = if !self.is_reliable && is_below(FAR) {
-                GROWTH[0]
-            } else if is_below(NEAR) {
-                GROWTH[1]
-            } else {
-                GROWTH[2]
-            };
+            let growth =
+                if !self.is_reliable && self.ceiling.is_none_or(|ceiling| rate < FAR * ceiling) {
+                    GROWTH[0]
+                } else if self.ceiling.is_none_or(|ceiling| rate < NEAR * ceiling) {
+                    GROWTH[1]
+                } else {
+                    GROWTH[2]
+                };
             let seconds = (now - self.grown_at).as_secs_f64().min(1.0);
             self.rate = Some(rate * libm::pow(1.0 + growth, seconds));
         }

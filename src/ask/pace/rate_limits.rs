@@ -38,23 +38,16 @@ impl RateLimits {
     /// `x-ratelimit-{limit,remaining,reset}` (OpenRouter, for requests) and
     /// `anthropic-ratelimit-{requests,tokens}-{limit,remaining,reset}`. A limit without `remaining` or `reset` is ignored.
     pub(in crate::ask) fn read(headers: &HeaderMap, now: SystemTime) -> Self {
-        let text = |name: &str| headers.get(name)?.to_str().ok().map(str::trim);
-        let rate_limit = |name: &dyn Fn(&str) -> String| {
-            let number = |field| text(&name(field))?.parse::<f64>().ok();
-            let remaining = number("remaining").filter(|n| n.is_finite())?;
-            Some(RateLimit {
-                limit: number("limit").filter(|n| n.is_finite() && *n > 0.0),
-                remaining: remaining.max(0.0),
-                reset: time_until_reset(text(&name("reset"))?, now)?,
-            })
-        };
         let limit_on = |kind: &str| {
-            rate_limit(&|field| format!("x-ratelimit-{field}-{kind}"))
-                .or_else(|| rate_limit(&|field| format!("anthropic-ratelimit-{kind}-{field}")))
+            rate_limit(headers, now, &|field| format!("x-ratelimit-{field}-{kind}")).or_else(|| {
+                rate_limit(headers, now, &|field| {
+                    format!("anthropic-ratelimit-{kind}-{field}")
+                })
+            })
         };
         Self {
             requests: limit_on("requests")
-                .or_else(|| rate_limit(&|field| format!("x-ratelimit-{field}"))),
+                .or_else(|| rate_limit(headers, now, &|field| format!("x-ratelimit-{field}"))),
             tokens: limit_on("tokens"),
         }
     }
@@ -89,6 +82,25 @@ impl RateLimits {
     }
 }
 
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name)?.to_str().ok().map(str::trim)
+}
+
+/// Reads a rate limit; `name` makes the name of a header from its field.
+fn rate_limit(
+    headers: &HeaderMap,
+    now: SystemTime,
+    name: &dyn Fn(&str) -> String,
+) -> Option<RateLimit> {
+    let number = |field| text(headers, &name(field))?.parse::<f64>().ok();
+    let remaining = number("remaining").filter(|n| n.is_finite())?;
+    Some(RateLimit {
+        limit: number("limit").filter(|n| n.is_finite() && *n > 0.0),
+        remaining: remaining.max(0.0),
+        reset: time_until_reset(text(headers, &name("reset"))?, now)?,
+    })
+}
+
 impl RateLimit {
     /// Advice for requests that each use `cost` of the limit: none above half of the limit; below, the remaining amount is spread
     /// evenly over the time until reset.
@@ -113,7 +125,6 @@ const MIN_TIMESTAMP: f64 = 1e9;
 /// Time until a reset, from a duration (`6m0s`, `17ms` or seconds) or a date (RFC 3339, or a Unix timestamp in seconds or
 /// milliseconds); zero for a date in the past, `None` for any other text.
 fn time_until_reset(text: &str, now: SystemTime) -> Option<Duration> {
-    let until = |date: SystemTime| date.duration_since(now).unwrap_or(Duration::ZERO);
     if let Ok(number) = text.parse::<f64>() {
         let seconds = Duration::try_from_secs_f64(if number >= MIN_TIMESTAMP * 1e3 {
             number / 1e3
@@ -122,15 +133,21 @@ fn time_until_reset(text: &str, now: SystemTime) -> Option<Duration> {
         })
         .ok()?;
         return if number >= MIN_TIMESTAMP {
-            SystemTime::UNIX_EPOCH.checked_add(seconds).map(until)
+            SystemTime::UNIX_EPOCH
+                .checked_add(seconds)
+                .map(|date| time_until(now, date))
         } else {
             Some(seconds)
         };
     }
     if let Ok(date) = text.parse::<Timestamp>() {
-        return Some(until(date.into()));
+        return Some(time_until(now, date.into()));
     }
     text.parse::<SignedDuration>().ok()?.try_into().ok()
+}
+
+fn time_until(now: SystemTime, date: SystemTime) -> Duration {
+    date.duration_since(now).unwrap_or(Duration::ZERO)
 }
 
 #[cfg(test)]
@@ -176,16 +193,17 @@ mod tests {
         }
     }
 
+    fn openai(remaining: &'static str, reset: &'static str) -> PaceAdvice {
+        read(&[
+            ("x-ratelimit-limit-requests", "500"),
+            ("x-ratelimit-remaining-requests", remaining),
+            ("x-ratelimit-reset-requests", reset),
+        ])
+        .advice(1000.0)
+    }
+
     #[test]
     fn remaining_requests_are_spread_until_reset() {
-        let openai = |remaining, reset| {
-            read(&[
-                ("x-ratelimit-limit-requests", "500"),
-                ("x-ratelimit-remaining-requests", remaining),
-                ("x-ratelimit-reset-requests", reset),
-            ])
-            .advice(1000.0)
-        };
         assert_eq!(openai("499", "120ms"), PaceAdvice::Nothing);
         // 250 left of 500 a minute: the spacing matches the refill rate, one request in 120 ms.
         assert_eq!(

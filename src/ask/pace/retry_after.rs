@@ -9,16 +9,21 @@ use reqwest::header::{DATE, HeaderMap, RETRY_AFTER};
 /// `Retry-After` is a number of seconds, possibly with a fraction, or a date. A date is relative to the server's clock if the response
 /// has a `Date`. `None` without a valid header, or for a wait of zero.
 pub(in crate::ask) fn retry_after(headers: &HeaderMap, now: SystemTime) -> Option<Duration> {
-    let header = |name: &str| headers.get(name)?.to_str().ok();
-    if let Some(wait) = header("retry-after-ms").and_then(|ms| parse_duration(ms, 1e-3)) {
+    if let Some(wait) = header(headers, "retry-after-ms").and_then(|ms| parse_duration(ms, 1e-3)) {
         return Some(wait);
     }
-    let retry_after = header(RETRY_AFTER.as_str())?;
+    let retry_after = header(headers, RETRY_AFTER.as_str())?;
     parse_duration(retry_after, 1.0).or_else(|| {
-        let now = header(DATE.as_str()).and_then(parse_date).unwrap_or(now);
+        let now = header(headers, DATE.as_str())
+            .and_then(parse_date)
+            .unwrap_or(now);
         let wait = parse_date(retry_after)?.duration_since(now).ok()?;
         (!wait.is_zero()).then_some(wait)
     })
+}
+
+fn header<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name)?.to_str().ok()
 }
 
 fn parse_date(text: &str) -> Option<SystemTime> {
@@ -52,29 +57,34 @@ mod tests {
 
     #[test]
     fn waits_of_every_form_are_parsed() {
-        let ms = |ms| Some(Duration::from_millis(ms));
         for (pairs, expected) in [
-            (vec![("retry-after", "2")], ms(2000)),
-            (vec![("retry-after", " 0.25 ")], ms(250)),
+            (vec![("retry-after", "2")], Some(Duration::from_secs(2))),
+            (
+                vec![("retry-after", " 0.25 ")],
+                Some(Duration::from_millis(250)),
+            ),
             (
                 vec![("retry-after", "30"), ("retry-after-ms", "1500")],
-                ms(1500),
+                Some(Duration::from_millis(1500)),
             ),
-            (vec![("retry-after", "0"), ("retry-after-ms", "50")], ms(50)),
+            (
+                vec![("retry-after", "0"), ("retry-after-ms", "50")],
+                Some(Duration::from_millis(50)),
+            ),
             (
                 vec![("retry-after", "2"), ("retry-after-ms", "soon")],
-                ms(2000),
+                Some(Duration::from_secs(2)),
             ),
             (
                 vec![("retry-after", "Sun, 06 Nov 1994 08:49:47 GMT")],
-                ms(10_000),
+                Some(Duration::from_secs(10)),
             ),
             (
                 vec![
                     ("retry-after", "Sun, 06 Nov 1994 08:59:47 GMT"),
                     ("date", "Sun, 06 Nov 1994 08:59:45 GMT"),
                 ],
-                ms(2000),
+                Some(Duration::from_secs(2)),
             ),
             (vec![("retry-after", "Sun, 06 Nov 1994 08:49:37 GMT")], None),
             (vec![("retry-after", "Sun, 06 Nov 1904 08:49:37 GMT")], None),

@@ -30,13 +30,10 @@ impl ConcurrencyBounds {
         if self == Self::DEFAULT {
             return self;
         }
-        let share = |number: NonZeroUsize| {
-            NonZeroUsize::new(number.get().div_ceil(count.max(1))).unwrap_or(NonZeroUsize::MIN)
-        };
         Self {
-            min: share(self.min),
-            initial: share(self.initial),
-            max: share(self.max),
+            min: share(count, self.min),
+            initial: share(count, self.initial),
+            max: share(count, self.max),
         }
     }
 
@@ -45,6 +42,10 @@ impl ConcurrencyBounds {
     pub fn max(self) -> usize {
         self.max.get()
     }
+}
+
+fn share(count: usize, number: NonZeroUsize) -> NonZeroUsize {
+    NonZeroUsize::new(number.get().div_ceil(count.max(1))).unwrap_or(NonZeroUsize::MIN)
 }
 
 impl fmt::Display for ConcurrencyBounds {

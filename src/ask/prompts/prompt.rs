@@ -34,11 +34,12 @@ impl Prompts {
     /// # Errors
     /// If the folder has no prompt or contains another file, or if a template is invalid or omits the question or a choice.
     pub fn load(dir: &Path) -> Result<Self> {
-        let unreadable = |error| Error::file(dir, "read", error);
         let mut sources = Sources::default();
         let mut found = false;
-        for entry in fs::read_dir(dir).map_err(unreadable)? {
-            let path = entry.map_err(unreadable)?.path();
+        for entry in fs::read_dir(dir).map_err(|error| Error::file(dir, "read", error))? {
+            let path = entry
+                .map_err(|error| Error::file(dir, "read", error))?
+                .path();
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             let source = match &*name {
                 CHOICE => &mut sources.choice,

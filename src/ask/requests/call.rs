@@ -118,19 +118,18 @@ impl<'a> Message<'a> {
 
     /// Parts of one text of the message, with the marked images that are not yet placed.
     fn text_parts(&self, text: &'a str, is_placed: &mut [bool]) -> Vec<MessagePart<'a>> {
-        let is_place = |index: usize| match is_placed.get_mut(index) {
+        pieces(text, |index| match is_placed.get_mut(index) {
             Some(is_placed) if self.places == ImagePlaces::Marked => {
                 !std::mem::replace(is_placed, true)
             }
             _ => false,
-        };
-        pieces(text, is_place)
-            .into_iter()
-            .map(|piece| match piece {
-                MarkedPiece::Words(text) => MessagePart::Text(text),
-                MarkedPiece::Image(index) => MessagePart::Image(&self.images[index]),
-            })
-            .collect()
+        })
+        .into_iter()
+        .map(|piece| match piece {
+            MarkedPiece::Words(text) => MessagePart::Text(text),
+            MarkedPiece::Image(index) => MessagePart::Image(&self.images[index]),
+        })
+        .collect()
     }
 }
 

@@ -143,7 +143,6 @@ impl RequestArgs {
 
 /// Parses the value of `--extra-body`: JSON, or `@` and the path of a JSON file.
 fn parse_body(value: &str) -> Result<Map<String, Value>> {
-    let invalid = |problem: String| Error::usage("--extra-body", problem);
     let file = value
         .strip_prefix('@')
         .map(|path| reading::settings(Path::new(path)))
@@ -152,20 +151,22 @@ fn parse_body(value: &str) -> Result<Map<String, Value>> {
     // Errors of serde_json have a line and a column but no values, so they cannot show a secret.
     let parsed = serde_json::from_str(json).map_err(|e| {
         let expected = "a JSON object expected, as {\"top_k\": 1}, or @FILE with one";
-        invalid(format!("{expected}: {e}"))
+        Error::usage("--extra-body", format_args!("{expected}: {e}"))
     })?;
     let Value::Object(fields) = parsed else {
-        return Err(invalid(
-            "a JSON object expected, as {\"top_k\": 1}".to_owned(),
+        return Err(Error::usage(
+            "--extra-body",
+            "a JSON object expected, as {\"top_k\": 1}",
         ));
     };
     let owned = PROGRAM_FIELDS
         .iter()
         .find(|(field, _)| fields.contains_key(*field));
     if let Some((field, setter)) = owned {
-        return Err(invalid(format!(
-            "{field} is set by the program: use {setter}"
-        )));
+        return Err(Error::usage(
+            "--extra-body",
+            format_args!("{field} is set by the program: use {setter}"),
+        ));
     }
     refuse_secrets(&fields)?;
     Ok(fields)
@@ -360,15 +361,16 @@ mod tests {
         assert!(args.resolve().is_err());
     }
 
+    fn budget(body: &Value) -> Option<ThinkingBudget> {
+        let fields = ExtraFields {
+            body: object(body),
+            ..ExtraFields::default()
+        };
+        fields.thinking_budget()
+    }
+
     #[test]
     fn thinking_budget_is_found_when_nested() {
-        let budget = |body: &Value| {
-            let fields = ExtraFields {
-                body: object(body),
-                ..ExtraFields::default()
-            };
-            fields.thinking_budget()
-        };
         let google = json!({"google": {"thinking_config": {"thinking_budget": -1}}});
         assert_eq!(budget(&google), Some(ThinkingBudget::Unlimited));
         let dashscope = json!({"enable_thinking": true, "thinking_budget": 2048});

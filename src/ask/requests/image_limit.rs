@@ -200,9 +200,12 @@ fn stricter<T: Ord>(
 mod tests {
     use super::*;
 
+    fn limit_at(base: &str) -> ImageLimit {
+        ImageLimit::from_access(&Access::new(base.parse().unwrap()))
+    }
+
     #[test]
     fn the_host_decides_the_limit() {
-        let limit_at = |base: &str| ImageLimit::from_access(&Access::new(base.parse().unwrap()));
         assert_eq!(limit_at("https://api.anthropic.com/v1").side, Some(8000));
         assert_eq!(
             limit_at("https://r.openai.azure.com/openai/v1").origin,
@@ -246,19 +249,20 @@ mod tests {
         assert!(ImageLimit::from_user(5).check(&image(6, 10)).is_err());
     }
 
+    fn user_limit_at(base: &str) -> ImageLimit {
+        ImageLimit::from_user(1).with_requests_to(&Access::new(base.parse().unwrap()))
+    }
+
     #[test]
     fn requests_with_several_images_have_limits() {
-        let at = |base: &str| {
-            ImageLimit::from_user(1).with_requests_to(&Access::new(base.parse().unwrap()))
-        };
-        let groq = at("https://api.groq.com/openai/v1");
+        let groq = user_limit_at("https://api.groq.com/openai/v1");
         assert!(groq.check_request(5, None).is_ok());
         let error = groq.check_request(6, None).unwrap_err().to_string();
         assert!(
             error.contains("6 images") && error.contains("5 of Groq"),
             "{error}"
         );
-        let anthropic = at("https://api.anthropic.com/v1");
+        let anthropic = user_limit_at("https://api.anthropic.com/v1");
         let wide = image(10, 2001);
         assert!(anthropic.check_request(20, Some(&wide)).is_ok());
         let error = anthropic.check_request(21, Some(&wide)).unwrap_err();
@@ -268,14 +272,14 @@ mod tests {
         );
         assert!(anthropic.check_request(21, Some(&image(10, 2000))).is_ok());
         // 50 images of 300 kB are 20 MB of base64.
-        let gemini = at("https://generativelanguage.googleapis.com/v1beta/openai");
+        let gemini = user_limit_at("https://generativelanguage.googleapis.com/v1beta/openai");
         assert_eq!(gemini.may_exceed(50, &image(300_000, 10)), None);
         let warning = gemini.may_exceed(50, &image(300_003, 10)).unwrap();
         assert!(warning.contains("Gemini takes 20 MB"), "{warning}");
         // The stricter of two limits, and no limit at an unknown server.
         let both = groq.stricter(anthropic);
         assert!(both.check_request(6, None).is_err() && both.check_request(5, Some(&wide)).is_ok());
-        let unknown = at("http://127.0.0.1:8000/v1");
+        let unknown = user_limit_at("http://127.0.0.1:8000/v1");
         assert!(unknown.check_request(1000, Some(&wide)).is_ok());
         assert_eq!(unknown.may_exceed(1000, &wide), None);
     }

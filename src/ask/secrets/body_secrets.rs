@@ -34,13 +34,6 @@ pub(in crate::ask) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> 
 }
 
 fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
-    let secret_error = |name: &str| {
-        let problem = format_args!(
-            "{name} looks like a secret, which is not shown here and must not be in a body, because bodies are written to files: \
-             put it into a variable, and name that with --header-env or --api-key-env"
-        );
-        Err(Error::usage("--extra-body", problem))
-    };
     if is_secret_value(name) {
         return secret_error("the name of a field");
     }
@@ -54,6 +47,14 @@ fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
     }
 }
 
+fn secret_error(name: &str) -> Result<()> {
+    let problem = format_args!(
+        "{name} looks like a secret, which is not shown here and must not be in a body, because bodies are written to files: \
+             put it into a variable, and name that with --header-env or --api-key-env"
+    );
+    Err(Error::usage("--extra-body", problem))
+}
+
 /// True if the text of a field looks like a secret: it has the prefix of a key, or the field name always means a secret, or the field
 /// name looks secret and the text is a long mixture of letters and digits.
 fn is_secret(name: &str, text: &str) -> bool {
@@ -65,9 +66,10 @@ fn is_secret(name: &str, text: &str) -> bool {
     let has_secret_suffix = SECRET_SUFFIXES
         .iter()
         .any(|suffix| letters.ends_with(suffix));
-    let is_key_char = |c: char| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c);
     let is_long_key = text.len() >= MIN_LENGTH
-        && text.chars().all(is_key_char)
+        && text
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c))
         && text.contains(|c: char| c.is_ascii_digit());
     let has_secret_name = is_secret_name(name) && !NOT_SECRET.contains(&name);
     is_secret_value(text)
@@ -81,11 +83,12 @@ mod tests {
 
     use super::*;
 
+    fn refusal(body: &Value) -> Result<(), String> {
+        refuse_secrets(body.as_object().unwrap()).map_err(|error| error.to_string())
+    }
+
     #[test]
     fn secret_fields_are_refused() {
-        let body = |body: &Value| {
-            refuse_secrets(body.as_object().unwrap()).map_err(|error| error.to_string())
-        };
         for (fields, name) in [
             (json!({"api_key": "sk-0123456789"}), "api_key"),
             (json!({"user": "sk-0123456789"}), "user"),
@@ -97,7 +100,7 @@ mod tests {
             ),
             (json!({"sk-0123456789": 1}), "the name of a field"),
         ] {
-            let error = body(&fields).unwrap_err();
+            let error = refusal(&fields).unwrap_err();
             let expected = format!("--extra-body: {name} looks like a secret");
             assert!(error.starts_with(&expected), "{error}");
             assert!(
@@ -111,7 +114,7 @@ mod tests {
             json!({"eos_token": "<|end_of_text_number_2|>", "token_limit": 10, "api_key": null}),
             json!({"keywords": ["the colour of 20 lamps in the room"]}),
         ] {
-            assert!(body(&fields).is_ok(), "{fields}");
+            assert!(refusal(&fields).is_ok(), "{fields}");
         }
     }
 }

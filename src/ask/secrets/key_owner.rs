@@ -32,16 +32,17 @@ pub(in crate::ask) fn check_owner(
 mod tests {
     use super::*;
 
+    fn check(vendors: VendorTable, key: &str, address: &str) -> Result<(), String> {
+        let key = Secret::new(key, "KEY").unwrap();
+        check_owner(&key, &address.parse().unwrap(), vendors).map_err(|e| e.to_string())
+    }
+
     #[test]
     fn keys_are_sent_only_to_their_vendor() {
         let rows = tempfile::NamedTempFile::new().unwrap();
         let text = "[[vendor]]\nname = \"Campus\"\nhosts = [\"llm.example\"]\nkey = [\"K\"]\nkey-form = [\"camp-\", \"sk-proj-\"]\n";
         std::fs::write(rows.path(), text).unwrap();
         let own = VendorTable::read(rows.path()).unwrap();
-        let check = |vendors: VendorTable, key: &str, address: &str| {
-            let key = Secret::new(key, "KEY").unwrap();
-            check_owner(&key, &address.parse().unwrap(), vendors).map_err(|e| e.to_string())
-        };
         for (key, address) in [
             ("sk-ant-123", "https://api.anthropic.com/v1"),
             ("sk-ant-123", "http://127.0.0.1:4000/v1"),

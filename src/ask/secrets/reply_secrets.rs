@@ -14,16 +14,15 @@ const MAX_NAME: usize = 200;
 
 /// Removes keys that a server or a model repeats in a reply, and limits the length of its texts.
 pub(in crate::ask) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
-    // Shorten last: otherwise a part of a key could remain.
-    let text = |text: String| shortened(scrub.reply(text));
     let name = |mut name: String| {
         name = scrub.reply(name);
         name.truncate(name.floor_char_boundary(MAX_NAME));
         name
     };
     Reply {
-        text: text(reply.text),
-        refusal: reply.refusal.map(text),
+        // Shorten last: otherwise a part of a key could remain.
+        text: shortened(scrub.reply(reply.text)),
+        refusal: reply.refusal.map(|text| shortened(scrub.reply(text))),
         served_model: reply.served_model.map(name),
         provider: reply.provider.map(name),
         finish: match reply.finish {

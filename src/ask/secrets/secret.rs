@@ -196,14 +196,18 @@ mod tests {
         }
     }
 
+    fn read_text(path: &std::path::Path, text: &[u8]) -> Result<Secret, String> {
+        std::fs::write(path, text).unwrap();
+        Secret::read(path).map_err(|e| e.to_string())
+    }
+
     #[test]
     fn files_without_a_key_are_refused() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let read = |text: &[u8]| {
-            std::fs::write(file.path(), text).unwrap();
-            Secret::read(file.path()).map_err(|e| e.to_string())
-        };
-        assert_eq!(read(b"sk-abc\n").unwrap().expose(), "sk-abc");
+        assert_eq!(
+            read_text(file.path(), b"sk-abc\n").unwrap().expose(),
+            "sk-abc"
+        );
         for wrong in [
             &b"sk-abc\nsk-def\n"[..],
             b"-----BEGIN OPENSSH PRIVATE KEY-----\nabc\n",
@@ -211,7 +215,7 @@ mod tests {
             &[b'a'; 4097],
             b"sk-\xff",
         ] {
-            let error = read(wrong).unwrap_err();
+            let error = read_text(file.path(), wrong).unwrap_err();
             assert!(error.contains(&*file.path().to_string_lossy()), "{error}");
             assert!(
                 !["sk-", "abc", "aaa"]

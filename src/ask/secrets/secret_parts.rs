@@ -68,14 +68,13 @@ impl SecretParts {
                 _ => runs.push(index..index + PART),
             }
         }
-        let is_part = |run: &&[Letter]| {
-            let has_digit = run.iter().any(|letter| letter.value.is_ascii_digit());
-            let has_letter = run.iter().any(|letter| letter.value.is_ascii_alphabetic());
-            (has_digit && has_letter) || run.len() >= MIN_WORD_PART
-        };
         runs.into_iter()
             .map(|run| &letters[run])
-            .filter(is_part)
+            .filter(|run| {
+                let has_digit = run.iter().any(|letter| letter.value.is_ascii_digit());
+                let has_letter = run.iter().any(|letter| letter.value.is_ascii_alphabetic());
+                (has_digit && has_letter) || run.len() >= MIN_WORD_PART
+            })
             .map(|run| run[0].start..run[run.len() - 1].end)
             .collect()
     }
@@ -125,18 +124,20 @@ fn letters(text: &str) -> impl Iterator<Item = Letter> {
 
 /// First character of these bytes, unescaped, and its length in bytes.
 fn letter(bytes: &[u8]) -> (u8, usize) {
-    let escaped = |digits: Range<usize>| {
-        let end = digits.end;
-        let digits = std::str::from_utf8(bytes.get(digits)?).ok()?;
-        let code = u8::from_str_radix(digits, 16).ok()?;
-        Some((code, end))
-    };
     match bytes {
-        [b'\\', b'u', b'0', b'0', ..] => escaped(4..6).unwrap_or((0, 1)),
+        [b'\\', b'u', b'0', b'0', ..] => escaped(bytes, 4..6).unwrap_or((0, 1)),
         [b'\\', other, ..] if other.is_ascii() => (0, 2),
-        [b'%', ..] => escaped(1..3).unwrap_or((0, 1)),
+        [b'%', ..] => escaped(bytes, 1..3).unwrap_or((0, 1)),
         _ => (bytes[0], 1),
     }
+}
+
+/// The byte with this hexadecimal code, and the end of the code.
+fn escaped(bytes: &[u8], digits: Range<usize>) -> Option<(u8, usize)> {
+    let end = digits.end;
+    let digits = std::str::from_utf8(bytes.get(digits)?).ok()?;
+    let code = u8::from_str_radix(digits, 16).ok()?;
+    Some((code, end))
 }
 
 #[cfg(test)]

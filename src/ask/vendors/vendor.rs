@@ -248,8 +248,14 @@ mod tests {
             assert!(!vendor.key.is_empty(), "{}", vendor.name);
             assert_eq!(vendor.check(), Ok(()), "{}", vendor.name);
             hosts.extend(&vendor.hosts);
-            let variable = |name: &String| !crate::ask::secrets::looks_like_key(name);
-            assert!(vendor.key.iter().all(variable), "{}", vendor.name);
+            assert!(
+                vendor
+                    .key
+                    .iter()
+                    .all(|name| !crate::ask::secrets::looks_like_key(name)),
+                "{}",
+                vendor.name
+            );
         }
         let count = hosts.len();
         hosts.sort();
@@ -257,9 +263,12 @@ mod tests {
         assert_eq!(hosts.len(), count, "a host is listed twice");
     }
 
+    fn vendor_name(key: &str) -> Option<&'static str> {
+        Vendor::by_key(key).map(|vendor| &*vendor.name)
+    }
+
     #[test]
     fn keys_identify_their_vendor() {
-        let vendor_name = |key: &str| Vendor::by_key(key).map(|vendor| &*vendor.name);
         assert_eq!(vendor_name("sk-ant-api03-x"), Some("Anthropic"));
         assert_eq!(vendor_name("sk-proj-x"), Some("OpenAI"));
         assert_eq!(vendor_name("sk-abcT3BlbkFJdef"), Some("OpenAI"));
@@ -269,24 +278,37 @@ mod tests {
         }
     }
 
+    fn token_field_at(host: &str, field: TokenField) -> TokenField {
+        Vendor::token_field_at(Vendor::at_host(host), field)
+    }
+
     #[test]
     fn the_token_field_depends_on_the_host() {
-        let at = |host, field| Vendor::token_field_at(Vendor::at_host(host), field);
         let auto = TokenField::Auto;
-        assert_eq!(at("api.openai.com", auto), TokenField::MaxCompletionTokens);
-        assert_eq!(at("localhost", auto), TokenField::MaxTokens);
-        assert_eq!(at("api.mistral.ai", auto), TokenField::MaxTokens);
-        assert_eq!(at("api.openai.com", TokenField::Omit), TokenField::Omit);
+        assert_eq!(
+            token_field_at("api.openai.com", auto),
+            TokenField::MaxCompletionTokens
+        );
+        assert_eq!(token_field_at("localhost", auto), TokenField::MaxTokens);
+        assert_eq!(
+            token_field_at("api.mistral.ai", auto),
+            TokenField::MaxTokens
+        );
+        assert_eq!(
+            token_field_at("api.openai.com", TokenField::Omit),
+            TokenField::Omit
+        );
+    }
+
+    fn check_base(text: &str) -> Option<Result<(), Error>> {
+        let base: BaseUrl = text.parse().unwrap();
+        Vendor::at_host(base.host()).map(|vendor| vendor.check_address(&base))
     }
 
     #[test]
     fn some_vendors_require_a_path() {
-        let check = |text: &str| {
-            let base: BaseUrl = text.parse().unwrap();
-            Vendor::at_host(base.host()).map(|vendor| vendor.check_address(&base))
-        };
         let bare = "https://r.openai.azure.com/?api-version=2024-10-21";
-        let error = check(bare).unwrap().unwrap_err().to_string();
+        let error = check_base(bare).unwrap().unwrap_err().to_string();
         assert!(
             error.contains("Azure needs a path: https://RESOURCE"),
             "{error}"
@@ -295,7 +317,7 @@ mod tests {
             "https://r.openai.azure.com/openai/v1",
             "https://api.openai.com",
         ] {
-            assert!(check(base).unwrap().is_ok(), "{base}");
+            assert!(check_base(base).unwrap().is_ok(), "{base}");
         }
     }
 

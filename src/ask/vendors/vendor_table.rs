@@ -31,31 +31,25 @@ impl VendorTable {
     /// If the file cannot be read or parsed, has no vendor, or has a key in place of a variable name; the error does not show the key.
     pub(in crate::ask) fn read(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
-        let invalid = |problem: String| {
-            let expected =
-                "expected tables [[vendor]] with name, hosts and key, as in src/ask/vendors.toml";
-            let problem = format!("{}: {problem}; {expected}", path.display());
-            Error::usage("--vendor", problem)
-        };
         let Rows { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
             let TomlFault { line, problem } = TomlFault::new(&text, &e);
-            invalid(format!("line {line}: {problem}"))
+            invalid_file(path, &format!("line {line}: {problem}"))
         })?;
         if rows.is_empty() {
-            return Err(invalid("there is no [[vendor]] in it".to_owned()));
+            return Err(invalid_file(path, "there is no [[vendor]] in it"));
         }
         for vendor in &rows {
             vendor
                 .check()
-                .map_err(|problem| invalid(format!("{}: {problem}", vendor.name)))?;
+                .map_err(|problem| invalid_file(path, &format!("{}: {problem}", vendor.name)))?;
             if vendor.batch.is_some() {
                 let problem = "batch: what a Batch API takes is not read from a file; set it with --file-size, --file-requests, --url and \
                                --purpose";
-                return Err(invalid(format!("{}: {problem}", vendor.name)));
+                return Err(invalid_file(path, &format!("{}: {problem}", vendor.name)));
             }
             if vendor.key.iter().any(|name| looks_like_key(name)) {
                 let problem = "the value of key looks like a key, which is not shown here: name the variable that holds it";
-                return Err(invalid(format!("{}: {problem}", vendor.name)));
+                return Err(invalid_file(path, &format!("{}: {problem}", vendor.name)));
             }
         }
         Ok(Self(Box::leak(rows.into_boxed_slice())))
@@ -78,6 +72,13 @@ impl VendorTable {
     }
 }
 
+fn invalid_file(path: &Path, problem: &str) -> Error {
+    let expected =
+        "expected tables [[vendor]] with name, hosts and key, as in src/ask/vendors.toml";
+    let problem = format!("{}: {problem}; {expected}", path.display());
+    Error::usage("--vendor", problem)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,17 +89,20 @@ mod tests {
         VendorTable::read(file.path())
     }
 
+    fn name_at(table: VendorTable, host: &str) -> Option<&'static str> {
+        table.at_host(host).map(|vendor| &*vendor.name)
+    }
+
     #[test]
     fn user_rows_have_priority() {
         let table = read(
             "[[vendor]]\nname = \"Mine\"\nhosts = [\"llm.example\", \"api.openai.com\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\n",
         );
         let table = table.unwrap();
-        let name = |host| table.at_host(host).map(|vendor| &*vendor.name);
-        assert_eq!(name("eu.llm.example"), Some("Mine"));
-        assert_eq!(name("api.openai.com"), Some("Mine"));
-        assert_eq!(name("api.mistral.ai"), Some("Mistral"));
-        assert_eq!(name("notllm.example"), None);
+        assert_eq!(name_at(table, "eu.llm.example"), Some("Mine"));
+        assert_eq!(name_at(table, "api.openai.com"), Some("Mine"));
+        assert_eq!(name_at(table, "api.mistral.ai"), Some("Mistral"));
+        assert_eq!(name_at(table, "notllm.example"), None);
         assert_eq!(
             VendorTable::default()
                 .at_host("api.openai.com")

@@ -108,16 +108,20 @@ fn content(content: Option<&Value>) -> Result<(String, Option<String>), &'static
     };
     let (mut text, mut refusal) = (String::new(), String::new());
     for part in parts {
-        let words = |field| part.get(field).and_then(Value::as_str).unwrap_or_default();
         match part.get("type").and_then(Value::as_str) {
-            Some("text" | "output_text") => text += words("text"),
-            Some("refusal") => refusal += words("refusal"),
+            Some("text" | "output_text") => text += words(part, "text"),
+            Some("refusal") => refusal += words(part, "refusal"),
             // A part without a type is a string, or has a field `text`.
-            None => text += part.as_str().unwrap_or_else(|| words("text")),
+            None => text += part.as_str().unwrap_or_else(|| words(part, "text")),
             Some(_) => {}
         }
     }
     Ok((text, (!refusal.is_empty()).then_some(refusal)))
+}
+
+/// A text field of a content part; empty if it is absent.
+pub(super) fn words<'a>(part: &'a Value, field: &str) -> &'a str {
+    part.get(field).and_then(Value::as_str).unwrap_or_default()
 }
 
 /// Description of a lost reply.
@@ -228,19 +232,18 @@ mod tests {
         }
     }
 
+    fn incomplete_reply(text: &str) -> String {
+        format!(r#"{{"choices":[{{"finish_reason":"error","message":{{"content":"{text}"}}}}]}}"#)
+    }
+
     #[test]
     fn errors_in_the_text_of_incomplete_replies_are_found() {
-        let body = |text: &str| {
-            format!(
-                r#"{{"choices":[{{"finish_reason":"error","message":{{"content":"{text}"}}}}]}}"#
-            )
-        };
         let text = "internal error happened, status code ResponseType.INPUT_LENGTH_ERROR";
-        let Err(ReplyError::Api(api_error)) = json(&body(text)) else {
+        let Err(ReplyError::Api(api_error)) = json(&incomplete_reply(text)) else {
             panic!("no API error");
         };
         assert_eq!(api_error.message, text);
-        let other = json(&body("The answer is"));
+        let other = json(&incomplete_reply("The answer is"));
         assert!(matches!(other, Err(ReplyError::Unreadable(_))));
     }
 
@@ -280,17 +283,19 @@ mod tests {
         }
     }
 
+    fn reply_body(content: &str, finish: &str, usage: &str) -> String {
+        format!(
+            r#"{{"choices":[{{"finish_reason":"{finish}","message":{{"content":{content},"refusal":null}}}}],"usage":{usage}}}"#
+        )
+    }
+
     #[test]
     fn empty_replies_without_tokens_are_lost() {
-        let body = |content: &str, finish: &str, usage: &str| {
-            format!(
-                r#"{{"choices":[{{"finish_reason":"{finish}","message":{{"content":{content},"refusal":null}}}}],"usage":{usage}}}"#
-            )
-        };
         let none = r#"{"prompt_tokens":0,"completion_tokens":0}"#;
         for usage in [none, r#"{"prompt_tokens":300,"completion_tokens":0}"#] {
             for content in ["null", "\"\"", "[]"] {
-                let Err(ReplyError::Unreadable(lost)) = json(&body(content, "stop", usage)) else {
+                let Err(ReplyError::Unreadable(lost)) = json(&reply_body(content, "stop", usage))
+                else {
                     panic!("{content} {usage}");
                 };
                 assert!(lost.description.contains("lost") && !lost.is_final);
@@ -298,11 +303,11 @@ mod tests {
         }
         let ended = r#"{"prompt_tokens":300,"completion_tokens":1}"#;
         assert!(
-            json(&body("null", "stop", ended)).is_ok(),
+            json(&reply_body("null", "stop", ended)).is_ok(),
             "the model returned no text"
         );
-        assert!(json(&body("null", "length", none)).is_ok());
-        assert!(json(&body("\"B\"", "stop", none)).is_ok());
+        assert!(json(&reply_body("null", "length", none)).is_ok());
+        assert!(json(&reply_body("\"B\"", "stop", none)).is_ok());
     }
 
     #[test]

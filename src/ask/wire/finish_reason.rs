@@ -30,18 +30,17 @@ static REASONS: LazyLock<Reasons> =
 pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Finish, Unreadable> {
     let name = reason.trim().to_ascii_lowercase().replace('-', "_");
     let reasons = &*REASONS;
-    let is_in = |list: &[String]| list.contains(&name);
     if name.is_empty() {
         Ok(Finish::Unknown)
-    } else if is_in(&reasons.stop) {
+    } else if reasons.stop.contains(&name) {
         Ok(Finish::Stop)
-    } else if is_in(&reasons.other) {
+    } else if reasons.other.contains(&name) {
         Ok(Finish::Other(reason.to_owned()))
-    } else if is_in(&reasons.length) {
+    } else if reasons.length.contains(&name) {
         Ok(Finish::Length)
-    } else if is_in(&reasons.filter) {
+    } else if reasons.filter.contains(&name) {
         Ok(Finish::Filter)
-    } else if is_in(&reasons.context) {
+    } else if reasons.context.contains(&name) {
         Err(Unreadable {
             usage,
             is_final: true,
@@ -51,7 +50,7 @@ pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Finish, Unreada
                  smaller --max-tokens)"
             ))
         })
-    } else if is_in(&reasons.broken) {
+    } else if reasons.broken.contains(&name) {
         Err(Unreadable {
             usage,
             finish: Some(reason.to_owned()),

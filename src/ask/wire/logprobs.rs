@@ -98,16 +98,16 @@ fn with_chosen(
 
 /// Parses the lists of legacy completions: `{"tokens": […], "token_logprobs": […], "top_logprobs": [{token: logprob}]}`.
 fn legacy_positions(logprobs: &Value) -> Option<Vec<TokenPosition>> {
-    let list = |field| logprobs.get(field).and_then(Value::as_array);
-    let tokens = list("tokens")?;
+    let tokens = list(logprobs, "tokens")?;
     tokens
         .iter()
         .take(MAX_POSITIONS)
         .enumerate()
         .map(|(index, token)| {
             let token = token.as_str()?.to_owned();
-            let logprob = known_logprob(list("token_logprobs").and_then(|list| list.get(index)));
-            let top_tokens = list("top_logprobs")
+            let logprob =
+                known_logprob(list(logprobs, "token_logprobs").and_then(|list| list.get(index)));
+            let top_tokens = list(logprobs, "top_logprobs")
                 .and_then(|list| list.get(index)?.as_object())
                 .into_iter()
                 .flatten()
@@ -120,6 +120,10 @@ fn legacy_positions(logprobs: &Value) -> Option<Vec<TokenPosition>> {
             })
         })
         .collect()
+}
+
+fn list<'a>(logprobs: &'a Value, field: &str) -> Option<&'a Vec<Value>> {
+    logprobs.get(field).and_then(Value::as_array)
 }
 
 /// Detects reasoning in a message: reasoning tokens in the usage, reasoning fields or parts, or marks in the text.

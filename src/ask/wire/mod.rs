@@ -113,8 +113,8 @@ fn key_header(key: &Secret, form: KeyHeader) -> Result<HeaderMap> {
         KeyHeader::ApiKey => (HeaderName::from_static("api-key"), key.expose().to_owned()),
         _ => (AUTHORIZATION, format!("Bearer {}", key.expose())),
     };
-    let invalid = |_| Error::usage("key", "it has characters that an HTTP header cannot carry");
-    let mut value = HeaderValue::try_from(text).map_err(invalid)?;
+    let mut value = HeaderValue::try_from(text)
+        .map_err(|_| Error::usage("key", "it has characters that an HTTP header cannot carry"))?;
     value.set_sensitive(true);
     Ok(HeaderMap::from_iter([(name, value)]))
 }

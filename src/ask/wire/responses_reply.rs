@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::chat_reply::words;
 use super::finish_reason;
 use super::json_body;
 use super::logprobs;
@@ -72,14 +73,13 @@ fn last_response(stream: &str) -> Option<Value> {
 /// # Errors
 /// If the response has not ended.
 fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, ReplyError> {
-    let text = |value: Option<&Value>| value.and_then(Value::as_str).map(str::to_owned);
-    let status = text(response.get("status")).unwrap_or_default();
+    let status = owned_text(response.get("status")).unwrap_or_default();
     match &*status {
         "" => Ok(Finish::Unknown),
         "completed" => Ok(Finish::Stop),
         "incomplete" => {
             let details = response.get("incomplete_details");
-            let reason = text(details.and_then(|details| details.get("reason")));
+            let reason = owned_text(details.and_then(|details| details.get("reason")));
             Ok(finish_reason::read(
                 reason.as_deref().unwrap_or("incomplete"),
                 usage,
@@ -91,6 +91,10 @@ fn finish(response: &Value, usage: Option<Usage>) -> Result<Finish, ReplyError> 
                 .into(),
         ),
     }
+}
+
+fn owned_text(value: Option<&Value>) -> Option<String> {
+    value.and_then(Value::as_str).map(str::to_owned)
 }
 
 /// Token probabilities of the first text that has them, and whether the model thought before it; `None` without any.
@@ -125,10 +129,9 @@ fn text_and_refusal(items: &[Value]) -> (String, String) {
         .filter_map(|item| item.get("content")?.as_array())
         .flatten();
     for part in parts {
-        let words = |field| part.get(field).and_then(Value::as_str).unwrap_or_default();
         match part.get("type").and_then(Value::as_str) {
-            Some("output_text" | "text") => text += words("text"),
-            Some("refusal") => refusal += words("refusal"),
+            Some("output_text" | "text") => text += words(part, "text"),
+            Some("refusal") => refusal += words(part, "refusal"),
             _ => {}
         }
     }

@@ -144,12 +144,6 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
         sent.fields.top_logprobs.is_some(),
         !parameters.probabilities,
     );
-    let field = |name, state, adaptable, hint| RequestField {
-        name,
-        state,
-        hint,
-        adaptable,
-    };
     Vec::from([
         field(
             "temperature",
@@ -230,6 +224,20 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             "leave --request constrain out, or try --request constrain=json",
         ),
     ])
+}
+
+fn field(
+    name: &'static str,
+    state: FieldState,
+    adaptable: Option<AdaptableField>,
+    hint: &'static str,
+) -> RequestField<'static> {
+    RequestField {
+        name,
+        state,
+        hint,
+        adaptable,
+    }
 }
 
 /// Remedy for a reasoning effort that the model does not accept.

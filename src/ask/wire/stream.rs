@@ -70,8 +70,10 @@ fn error_event(event: &Value) -> Option<Value> {
     if event.get("error").is_some_and(|error| !error.is_null()) {
         return Some(event.clone());
     }
-    let is_error = |field| event.get(field).is_some_and(|kind| kind == "error");
-    (is_error("type") || is_error("object")).then(|| json!({"error": event}))
+    ["type", "object"]
+        .iter()
+        .any(|field| event.get(field).is_some_and(|kind| kind == "error"))
+        .then(|| json!({"error": event}))
 }
 
 /// A choice joined from its chunks.
@@ -199,13 +201,14 @@ mod tests {
         );
     }
 
+    fn piece(content: &str, token: &str, finish: &str) -> String {
+        format!(
+            "data: {{\"choices\":[{{\"delta\":{{\"content\":{content}}},\"logprobs\":{{\"content\":[{{\"token\":\"{token}\"}}],\"refusal\":null}},\"finish_reason\":{finish}}}]}}\n\n"
+        )
+    }
+
     #[test]
     fn logprobs_and_content_parts_are_joined() {
-        let piece = |content: &str, token: &str, finish: &str| {
-            format!(
-                "data: {{\"choices\":[{{\"delta\":{{\"content\":{content}}},\"logprobs\":{{\"content\":[{{\"token\":\"{token}\"}}],\"refusal\":null}},\"finish_reason\":{finish}}}]}}\n\n"
-            )
-        };
         let whole = [piece("\"B\"", "B", "null"), piece("\".\"", ".", "\"stop\"")].concat();
         let choice = &assemble(&whole).unwrap()["choices"][0];
         assert_eq!(choice["message"]["content"], "B.");

@@ -11,9 +11,8 @@ use crate::types::Usage;
 /// tokens, if these are more than the reported number and so cannot be part of it. `None` without any number.
 pub(super) fn read(usage: Option<&Value>) -> Option<Usage> {
     let usage = usage?;
-    let first_of = |names: [&str; 2]| names.iter().find_map(|name| number(usage.get(*name)?));
-    let prompt = first_of(["prompt_tokens", "input_tokens"]);
-    let completion = first_of(["completion_tokens", "output_tokens"]);
+    let prompt = first_of(usage, ["prompt_tokens", "input_tokens"]);
+    let completion = first_of(usage, ["completion_tokens", "output_tokens"]);
     let total = number_in(usage, "total_tokens");
     // OpenAI reports cached tokens in the details, Anthropic in two top-level fields.
     let cached = detail(usage, PROMPT_DETAILS, "cached_tokens");
@@ -47,6 +46,10 @@ pub(super) fn read(usage: Option<&Value>) -> Option<Usage> {
         total_tokens: total,
     };
     (usage != Usage::default()).then_some(usage)
+}
+
+fn first_of(usage: &Value, names: [&str; 2]) -> Option<u64> {
+    names.iter().find_map(|name| number(usage.get(*name)?))
 }
 
 /// Names of the object with details about the prompt.
@@ -170,15 +173,18 @@ mod tests {
         }
     }
 
+    fn prompt_tokens(usage: &Value) -> Option<u64> {
+        read(Some(usage)).unwrap().prompt_tokens
+    }
+
     #[test]
     fn caches_outside_the_prompt_are_added() {
-        let prompt = |usage: Value| read(Some(&usage)).unwrap().prompt_tokens;
         let large =
             json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 2000});
-        assert_eq!(prompt(large), Some(2100));
+        assert_eq!(prompt_tokens(&large), Some(2100));
         let within =
             json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 60});
-        assert_eq!(prompt(within), Some(100));
+        assert_eq!(prompt_tokens(&within), Some(100));
     }
 
     #[test]

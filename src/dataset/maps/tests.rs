@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::*;
 
 /// A PNG file of this height and width with these packed rows.
-fn png_file((height, width): (u32, u32), color: ColorType, bits: BitDepth, data: &[u8]) -> Vec<u8> {
+fn png_file([height, width]: [u32; 2], color: ColorType, bits: BitDepth, data: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(color);
@@ -31,7 +31,7 @@ fn npy_file(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-fn deep(size: (u32, u32), values: &[u16]) -> Vec<u8> {
+fn deep(size: [u32; 2], values: &[u16]) -> Vec<u8> {
     let data: Vec<u8> = values.iter().flat_map(|v| v.to_be_bytes()).collect();
     png_file(size, ColorType::Grayscale, BitDepth::Sixteen, &data)
 }
@@ -70,7 +70,7 @@ fn segments(path: &Path, size: Size) -> Result<Array2<u32>> {
 
 #[test]
 fn depth_is_rounded_half_to_even() {
-    let png = deep((2, 3), &[0, 1, 3, 5, 7, 65_535]);
+    let png = deep([2, 3], &[0, 1, 3, 5, 7, 65_535]);
     let read = depth("d.png", &png, Some(0.0005), (2, 3)).unwrap();
     assert_eq!(read, array![[0, 0, 2], [2, 4, 32_768]]);
     let metres = [
@@ -104,7 +104,7 @@ fn depth_is_rounded_half_to_even() {
 
 #[test]
 fn too_large_depth_is_refused() {
-    let error = depth("d.png", &deep((1, 1), &[2500]), Some(1.0), (1, 1)).unwrap_err();
+    let error = depth("d.png", &deep([1, 1], &[2500]), Some(1.0), (1, 1)).unwrap_err();
     let error = error.to_string();
     assert!(error.contains("d.png: a depth of 2500 m"), "{error}");
     for metres in [1000.001, 5e6, f64::MAX] {
@@ -128,19 +128,21 @@ fn invalid_depth_scale_is_refused() {
     }
 }
 
+fn shallow(color: ColorType) -> Vec<u8> {
+    png_file([1, 2], color, BitDepth::Eight, &[7, 255])
+}
+
 #[test]
 fn semantic_maps_are_read_in_every_format() {
-    let size = (1, 2);
-    let shallow = |color| png_file(size, color, BitDepth::Eight, &[7, 255]);
     for (bytes, expected) in [
         (shallow(ColorType::Grayscale), array![[7, 255]]),
         (shallow(ColorType::Indexed), array![[7, 255]]),
-        (deep(size, &[7, 40_000]), array![[7, 40_000]]),
+        (deep([1, 2], &[7, 40_000]), array![[7, 40_000]]),
     ] {
         let (_folder, path) = temporary_file("s.png", &bytes);
         assert_eq!(semantic(&path, (1, 2)).unwrap(), expected);
     }
-    let colour = png_file((1, 1), ColorType::Rgb, BitDepth::Eight, &[1, 2, 3]);
+    let colour = png_file([1, 1], ColorType::Rgb, BitDepth::Eight, &[1, 2, 3]);
     let (_folder, path) = temporary_file("s.png", &colour);
     let error = semantic(&path, (1, 1)).unwrap_err().to_string();
     assert!(error.contains("s.png: an RGB PNG of 8 bits"), "{error}");
@@ -148,7 +150,7 @@ fn semantic_maps_are_read_in_every_format() {
 
 #[test]
 fn segment_maps_are_read_in_every_format() {
-    let (_folder, path) = temporary_file("o.png", &deep((1, 2), &[0, 65_535]));
+    let (_folder, path) = temporary_file("o.png", &deep([1, 2], &[0, 65_535]));
     assert_eq!(segments(&path, (1, 2)).unwrap(), array![[0, 65_535]]);
     let ids = [0_i64, 4_294_967_295].map(i64::to_le_bytes).concat();
     let (_folder, path) = temporary_file("o.npy", &npy_file("<i8", "(2, 1)", &ids));
@@ -166,10 +168,10 @@ fn segment_maps_are_read_in_every_format() {
 
 #[test]
 fn map_size_error_names_both_sizes() {
-    let says = "1 × 2 pixels (height × width), but its image has 2 × 1";
-    let (_folder, png) = temporary_file("m.png", &deep((1, 2), &[1, 2]));
+    let message = "1 × 2 pixels (height × width), but its image has 2 × 1";
+    let (_folder, png) = temporary_file("m.png", &deep([1, 2], &[1, 2]));
     let (_folder, npy) = temporary_file("m.npy", &npy_file("|u1", "(1, 2)", &[1, 2]));
-    let units = deep((1, 2), &[1, 2]);
+    let units = deep([1, 2], &[1, 2]);
     for error in [
         depth("m.png", &units, Some(0.001), (2, 1)).unwrap_err(),
         semantic(&png, (2, 1)).unwrap_err(),
@@ -177,7 +179,7 @@ fn map_size_error_names_both_sizes() {
         segments(&npy, (2, 1)).unwrap_err(),
     ] {
         let error = error.to_string();
-        assert!(error.contains(says) && error.contains("m."), "{error}");
+        assert!(error.contains(message) && error.contains("m."), "{error}");
     }
 }
 
@@ -190,7 +192,7 @@ fn truncated_map_is_an_error() {
     })
     .take(32 * 32)
     .collect();
-    let bytes = deep((32, 32), &values);
+    let bytes = deep([32, 32], &values);
     let (_folder, path) = temporary_file("o.png", &bytes[..bytes.len() / 2]);
     let error = segments(&path, (32, 32)).unwrap_err().to_string();
     assert!(error.contains("o.png: not a whole PNG"), "{error}");

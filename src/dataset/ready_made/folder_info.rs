@@ -47,14 +47,17 @@ impl FolderInfo {
     }
 
     fn read(path: &Path, info: &serde_json::Value) -> Result<Self> {
-        let field = |key: &str| info.get(key).and_then(serde_json::Value::as_str);
-        let map = field("map")
+        let map = text_field(info, "map")
             .map(str::parse::<ColumnMap>)
             .transpose()
             .map_err(|problem| Error::data(path.display(), format_args!("map: {problem}")))?;
         Ok(Self {
-            name: field("name").unwrap_or_default().to_owned(),
+            name: text_field(info, "name").unwrap_or_default().to_owned(),
             map,
         })
     }
+}
+
+fn text_field<'a>(info: &'a serde_json::Value, key: &str) -> Option<&'a str> {
+    info.get(key).and_then(serde_json::Value::as_str)
 }

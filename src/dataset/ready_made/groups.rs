@@ -113,22 +113,23 @@ fn parse_field(table: &Table, field: &str) -> Result<NamePart, String> {
     let Some((name, run)) = split_run(field).filter(|_| table.find(field).is_none()) else {
         return find_column(table, field).map(NamePart::Cell);
     };
-    let wrong = || {
-        format!(
-            "group={{{field}}}: {{COLUMN:2}} or {{COLUMN:2 from 1}} expected, with how many numbers are one group and the first of them"
-        )
-    };
     let (length, first) = run.split_once(" from ").unwrap_or((run, "0"));
-    let length: u64 = length.trim().parse().map_err(|_| wrong())?;
-    let first = first.trim().parse().map_err(|_| wrong())?;
+    let length: u64 = length.trim().parse().map_err(|_| run_problem(field))?;
+    let first = first.trim().parse().map_err(|_| run_problem(field))?;
     if length == 0 {
-        return Err(wrong());
+        return Err(run_problem(field));
     }
     Ok(NamePart::Run {
         column: find_column(table, name)?,
         length,
         first,
     })
+}
+
+fn run_problem(field: &str) -> String {
+    format!(
+        "group={{{field}}}: {{COLUMN:2}} or {{COLUMN:2 from 1}} expected, with how many numbers are one group and the first of them"
+    )
 }
 
 /// Splits a field in braces at its last colon: the column and the run of numbers.

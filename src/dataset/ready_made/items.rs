@@ -170,11 +170,10 @@ fn question_parts(
         let problem = "nothing but options in the question";
         return Err(PartsError::Row(problem.to_owned()));
     }
-    let with_hint = |text: String| match &*hint {
-        "" => text,
-        hint => format!("{hint}\n{text}"),
-    };
-    let (text, whole) = (with_hint(text), whole.map(with_hint));
+    let (text, whole) = (
+        prepend_hint(&hint, text),
+        whole.map(|text| prepend_hint(&hint, text)),
+    );
     let is_too_long = options
         .iter()
         .flat_map(|options| &*options.texts)
@@ -191,6 +190,13 @@ fn question_parts(
         whole,
         options,
     })
+}
+
+fn prepend_hint(hint: &str, text: String) -> String {
+    match hint {
+        "" => text,
+        hint => format!("{hint}\n{text}"),
+    }
 }
 
 /// The hint of a row (empty if it has none) and its question, in this order.

@@ -93,16 +93,17 @@ impl Preset {
         let map = self.map.as_deref().and_then(|map| map.parse().ok());
         args.map.splice(0..0, map);
         args.preset_config.clone_from(&self.config);
-        let skip = |kind, flag: Option<LeaveOut>| {
-            flag.or(self.skip.contains(&kind).then_some(LeaveOut::Skip))
-        };
         if args.multi_image.is_none() && self.skip.contains(&Skip::MultiImage) {
             args.multi_image = Some(SeveralImages::Skip);
         }
-        args.no_image = skip(Skip::NoImage, args.no_image);
-        args.open = skip(Skip::Open, args.open);
-        args.several = skip(Skip::Several, args.several);
+        args.no_image = args.no_image.or(self.skipped(Skip::NoImage));
+        args.open = args.open.or(self.skipped(Skip::Open));
+        args.several = args.several.or(self.skipped(Skip::Several));
         args
+    }
+
+    fn skipped(&self, kind: Skip) -> Option<LeaveOut> {
+        self.skip.contains(&kind).then_some(LeaveOut::Skip)
     }
 
     /// Map of the groups for the strict score of the set, or a note if their columns do not exist.

@@ -200,12 +200,7 @@ impl<D: Detail> Driver<'_, D> {
 
     /// True if the goal is reached, or no part can advance any more.
     fn is_reached(&self) -> Result<bool> {
-        let is_final = |part: usize| {
-            self.part(part).stage == Stage::Ended
-                || self.is_left_alone(part)
-                || self.is_stopped(part)
-        };
-        if (0..self.journal.parts.len()).all(is_final) {
+        if (0..self.journal.parts.len()).all(|part| self.is_final(part)) {
             return Ok(true);
         }
         Ok(match self.until {
@@ -214,12 +209,16 @@ impl<D: Detail> Driver<'_, D> {
             Goal::Submitted => {
                 let mut nothing_to_submit = true;
                 for (index, part) in self.journal.parts.iter().enumerate() {
-                    let is_submitted = part.stage == Stage::Created || is_final(index);
+                    let is_submitted = part.stage == Stage::Created || self.is_final(index);
                     nothing_to_submit &= is_submitted || self.is_held(index)?;
                 }
                 nothing_to_submit
             }
         })
+    }
+
+    fn is_final(&self, part: usize) -> bool {
+        self.part(part).stage == Stage::Ended || self.is_left_alone(part) || self.is_stopped(part)
     }
 
     /// True if the command only checks or cancels batches, and no flag names the server of this part.

@@ -189,12 +189,11 @@ impl<D: Detail> ModelInputFiles<D> {
         let Some(open) = self.open.take() else {
             return Ok(());
         };
-        let unwritten = |e| Error::file(&open.path, "write", e);
         open.file
             .into_inner()
             .map_err(std::io::IntoInnerError::into_error)
             .and_then(|file| file.sync_all())
-            .map_err(unwritten)?;
+            .map_err(|e| Error::file(&open.path, "write", e))?;
         if let Some(journal) = &mut register.journal {
             let Destination {
                 model,
@@ -223,7 +222,8 @@ impl<D: Detail> ModelInputFiles<D> {
             )?;
         }
         register.store.append_to_batch(&open.blanks)?;
-        fs::rename(open.path.with_extension(PART), &open.path).map_err(unwritten)?;
+        fs::rename(open.path.with_extension(PART), &open.path)
+            .map_err(|e| Error::file(&open.path, "write", e))?;
         self.done.push((open.path.clone(), open.blanks.len()));
         Ok(())
     }
@@ -231,10 +231,9 @@ impl<D: Detail> ModelInputFiles<D> {
 
 /// Formats bytes as hexadecimal digits.
 pub(super) fn hexadecimal(bytes: &[u8]) -> String {
-    let digit = |half: u8| char::from_digit(half.into(), 16).unwrap_or('0');
     bytes
         .iter()
         .flat_map(|byte| [byte >> 4, byte & 15])
-        .map(digit)
+        .map(|half| char::from_digit(half.into(), 16).unwrap_or('0'))
         .collect()
 }

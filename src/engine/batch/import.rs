@@ -98,17 +98,19 @@ impl<'a, D: Detail> Driver<'a, D> {
     /// renamed, models match by their id at the endpoint.
     fn models_of(&self, part: usize) -> Vec<&'a Model> {
         let facts = &self.part(part).facts;
-        let all = || self.models.iter().map(|one| (&*one.name, &*one.model));
-        let named: Vec<&Model> = all()
-            .filter(|(name, model)| facts.asks(name, model.name()))
-            .map(|(_, model)| model)
+        let named: Vec<&Model> = self
+            .models
+            .iter()
+            .filter(|one| facts.asks(&one.name, one.model.name()))
+            .map(|one| &*one.model)
             .collect();
         if !named.is_empty() {
             return named;
         }
-        all()
-            .filter(|(_, model)| model.name() == facts.model)
-            .map(|(_, model)| model)
+        self.models
+            .iter()
+            .map(|one| &*one.model)
+            .filter(|model| model.name() == facts.model)
             .collect()
     }
 
@@ -192,12 +194,15 @@ pub(super) fn key_of(line: &str) -> Option<TrialKey> {
 
 /// Calls `take` with each non-blank line of a file. Invalid UTF-8 is replaced.
 pub(super) fn for_each_line(path: &Path, mut take: impl FnMut(&str) -> Result<()>) -> Result<()> {
-    let unreadable = |e| Error::file(path, "read", e);
-    let mut file = BufReader::new(reading::open(path).map_err(unreadable)?);
+    let mut file = BufReader::new(reading::open(path).map_err(|e| Error::file(path, "read", e))?);
     let mut line = Vec::new();
     loop {
         line.clear();
-        if file.read_until(b'\n', &mut line).map_err(unreadable)? == 0 {
+        if file
+            .read_until(b'\n', &mut line)
+            .map_err(|e| Error::file(path, "read", e))?
+            == 0
+        {
             return Ok(());
         }
         let text = String::from_utf8_lossy(&line);

@@ -2,6 +2,8 @@
 
 /// Converts a text to a part of a file name: characters other than ASCII letters, digits, `-`, `_` and `.` are replaced.
 pub(super) fn file_name(text: &str) -> String {
-    let safe = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    text.replace(|c| !safe(c), "_")
+    text.replace(
+        |c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)),
+        "_",
+    )
 }

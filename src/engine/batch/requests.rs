@@ -172,8 +172,10 @@ pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
 /// # Errors
 /// If the vendor of an endpoint does not support it.
 pub(super) fn require_files(models: &[ModelUnderTest]) -> Result<()> {
-    let mut bases = models.iter().filter_map(|model| model.model.batch_base());
-    bases.try_for_each(|base| BatchInterface::at(&base).require_files())
+    models
+        .iter()
+        .filter_map(|model| model.model.batch_base())
+        .try_for_each(|base| BatchInterface::at(&base).require_files())
 }
 
 /// The text about the written files and the next step for the user.

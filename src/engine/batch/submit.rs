@@ -172,13 +172,13 @@ impl<D: Detail> Driver<'_, D> {
     fn part_batch(&self, part: usize, batches: Vec<RemoteBatch>) -> Option<RemoteBatch> {
         let last_mark = self.mark(part);
         let prefix = format!("{}/{}/", self.journal.run, self.part(part).stem());
-        let (last, earlier): (Vec<_>, Vec<_>) = batches
+        let (last, earlier) = batches
             .into_iter()
             .filter(|batch| {
                 batch.mark == last_mark
                     || (batch.mark.starts_with(&prefix) && batch.state != BatchState::Failed)
             })
-            .partition(|batch| batch.mark == last_mark);
+            .partition::<Vec<_>, _>(|batch| batch.mark == last_mark);
         last.into_iter().chain(earlier).next()
     }
 

@@ -164,11 +164,11 @@ fn cost_lines<E: Experiment>(
         .filter(|(_, model)| model.model.is_remote())
         .map(|(index, model)| {
             let price = model.price(&experiment.settings().money.prices);
-            let mut by_reading = BTreeMap::<Option<ReadingName>, Tokens>::new();
+            let mut by_profile = BTreeMap::<Option<ReadingName>, Tokens>::new();
             for (place, group) in plan.groups() {
                 let degradation = group.condition.as_ref().and_then(|c| c.degradation());
-                let reading = degradation.and_then(Degradation::reading).cloned();
-                let tokens = by_reading.entry(reading).or_default();
+                let profile = degradation.and_then(Degradation::reading).cloned();
+                let tokens = by_profile.entry(profile).or_default();
                 let before = tokens.requests;
                 for trial in group.trials.iter().filter(|trial| trial.model == index) {
                     tokens.add(text_tokens(&trial.prompt), trial.item.reply_tokens());
@@ -185,12 +185,12 @@ fn cost_lines<E: Experiment>(
                 }
             }
             for request in expected.iter().filter(|request| request.model == index) {
-                let tokens = by_reading.entry(None).or_default();
+                let tokens = by_profile.entry(None).or_default();
                 tokens.add(request.text_tokens, request.reply_tokens);
             }
             let line = CostLine {
                 charged_image_tokens: measured.image(index),
-                ..cost_line(model, price, &by_reading, E::PHASES[phase])
+                ..cost_line(model, price, &by_profile, E::PHASES[phase])
             };
             (index, line)
         })
@@ -276,10 +276,10 @@ impl Tokens {
 fn cost_line(
     model: &ModelUnderTest,
     price: Option<Price>,
-    by_reading: &BTreeMap<Option<ReadingName>, Tokens>,
+    by_profile: &BTreeMap<Option<ReadingName>, Tokens>,
     phase: &str,
 ) -> CostLine {
-    let tokens = Tokens::sum(by_reading.values());
+    let tokens = Tokens::sum(by_profile.values());
     let requests = tokens.requests as f64;
     let longest = model
         .model
@@ -299,11 +299,11 @@ fn cost_line(
         dollars: tokens.dollars(price, tokens.reply),
         most_dollars: longest.and_then(|longest| tokens.dollars(price, longest)),
         charged_image_tokens: None,
-        readings: by_reading
+        readings: by_profile
             .iter()
             .filter(|(_, tokens)| tokens.requests > 0)
-            .map(|(reading, tokens)| ReadingCost {
-                reading: reading.clone(),
+            .map(|(profile, tokens)| ReadingCost {
+                reading: profile.clone(),
                 requests: tokens.requests,
                 dollars: tokens.dollars(price, tokens.reply),
             })

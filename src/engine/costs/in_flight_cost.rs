@@ -38,7 +38,6 @@ impl InFlightCost {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
             Err(e) => return Err(Error::file(path, "read", e)),
         };
-        let is_cost = |dollars: f64| dollars.is_finite() && dollars >= 0.0;
         let note = serde_json::from_slice::<Self>(&text)
             .ok()
             .filter(|note| is_cost(note.killed) && is_cost(note.in_flight));
@@ -89,6 +88,10 @@ impl InFlightCost {
         let text = serde_json::to_vec(&self).map_err(|e| Error::file(&path, "write", e.into()))?;
         files::write(&path, &text)
     }
+}
+
+fn is_cost(dollars: f64) -> bool {
+    dollars.is_finite() && dollars >= 0.0
 }
 
 #[cfg(test)]

@@ -76,12 +76,11 @@ impl AskingArgs {
         let matches = command()
             .try_get_matches_from(words)
             .map_err(|e| line(&e))?;
-        let given = |id: &str| matches.contains_id(id);
         // A source of the key or of the system message replaces the other source.
-        if given("api_key_env") || given("api_key_file") {
+        if matches.contains_id("api_key_env") || matches.contains_id("api_key_file") {
             self.forget_key();
         }
-        if given("system") || given("system_file") {
+        if matches.contains_id("system") || matches.contains_id("system_file") {
             (self.request.system, self.request.system_file) = (None, None);
         }
         self.update_from_arg_matches(&matches).map_err(|e| line(&e))

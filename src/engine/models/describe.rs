@@ -21,44 +21,48 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
             .into_iter()
             .flatten()
             .find(|note| note["name"] == *model.name);
-        let field = |name: &str| note.and_then(|note| note.get(name));
         let _ = writeln!(text, "{} ({})", model.name, model.view);
-        let mut line = |name: &str, value: &str| {
-            let _ = writeln!(text, "  {name:9} {value}");
-        };
-        line("id", &model.id.label());
+        write_line(&mut text, "id", &model.id.label());
         let Some(opened) = open_model(model)? else {
             continue;
         };
-        for address in field("endpoints")
+        for address in field(note, "endpoints")
             .and_then(Value::as_array)
             .into_iter()
             .flatten()
         {
-            line("endpoint", address.as_str().unwrap_or_default());
+            write_line(&mut text, "endpoint", address.as_str().unwrap_or_default());
         }
-        if let Some(key) = field("key").and_then(Value::as_str) {
-            line("key", key);
+        if let Some(key) = field(note, "key").and_then(Value::as_str) {
+            write_line(&mut text, "key", key);
         }
-        let headers: Vec<&str> = field("headers")
+        let headers: Vec<&str> = field(note, "headers")
             .and_then(Value::as_array)
             .into_iter()
             .flatten()
             .filter_map(Value::as_str)
             .collect();
         if !headers.is_empty() {
-            line("headers", &headers.join(", "));
+            write_line(&mut text, "headers", &headers.join(", "));
         }
         if let Some(body) = opened.body(Message::text_only("QUESTION"), 0) {
             let body = body.map_err(|e| Error::data(&*model.name, e))?;
-            line("request", &String::from_utf8_lossy(&body));
+            write_line(&mut text, "request", &String::from_utf8_lossy(&body));
         }
-        line("digest", &opened.digest()?.to_string()[..16]);
+        write_line(&mut text, "digest", &opened.digest()?.to_string()[..16]);
         if let Some(limit) = model.limit {
-            line("limit", &format!("the first {limit} questions"));
+            write_line(&mut text, "limit", &format!("the first {limit} questions"));
         }
     }
     Ok(text)
+}
+
+fn field<'a>(note: Option<&'a Value>, name: &str) -> Option<&'a Value> {
+    note.and_then(|note| note.get(name))
+}
+
+fn write_line(text: &mut String, name: &str, value: &str) {
+    let _ = writeln!(text, "  {name:9} {value}");
 }
 
 /// Opens a model; `None` for a built-in model that answers multiple-choice questions only.

@@ -145,8 +145,9 @@ impl Entry {
                         // A table of headers replaces that of an earlier layer, even if it is empty.
                         self.asking.forget_headers();
                     }
-                    let wrong = |problem: String| located.error(format_args!("{key}: {problem}"));
-                    self.asking.update(&words).map_err(wrong)?;
+                    self.asking
+                        .update(&words)
+                        .map_err(|problem| located.error(format_args!("{key}: {problem}")))?;
                 }
             }
         }
@@ -221,11 +222,6 @@ pub(super) fn flag_of(key: &str) -> Option<&str> {
 fn words(key: &str, located: &Located) -> Result<Vec<String>> {
     let flag = flag_of(key).unwrap_or(key);
     let wrong = |expected: &str| Err(located.error(format_args!("{key}: {expected} expected")));
-    let text = |value: &Value| match value {
-        Value::String(text) => Some(text.clone()),
-        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Some(value.to_string()),
-        _ => None,
-    };
     match (key, &located.value) {
         ("headers", Value::Table(headers)) => {
             let words: Result<Vec<String>, ()> = headers
@@ -250,7 +246,7 @@ fn words(key: &str, located: &Located) -> Result<Vec<String>> {
             Ok(vec![format!("--extra-body={json}")])
         }
         (_, Value::Array(items)) => {
-            let words: Option<Vec<String>> = items.iter().map(text).collect();
+            let words: Option<Vec<String>> = items.iter().map(plain_text).collect();
             match words {
                 Some(words) => Ok(words
                     .iter()
@@ -259,10 +255,18 @@ fn words(key: &str, located: &Located) -> Result<Vec<String>> {
                 None => wrong("a list of texts"),
             }
         }
-        (_, value) => match text(value) {
+        (_, value) => match plain_text(value) {
             Some(word) => Ok(vec![format!("--{flag}={word}")]),
             None => wrong("a text, a number or true or false"),
         },
+    }
+}
+
+fn plain_text(value: &Value) -> Option<String> {
+    match value {
+        Value::String(text) => Some(text.clone()),
+        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Some(value.to_string()),
+        _ => None,
     }
 }
 

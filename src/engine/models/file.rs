@@ -49,14 +49,9 @@ impl ModelsFile {
     /// line, and does not show the secret.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
-        let in_line = |line: usize| format!("{}, line {line}", path.display());
-        let at = |start: usize| in_line(line_at(&text, start));
-        let invalid = |e: toml::de::Error| {
-            let TomlFault { line, problem } = TomlFault::new(&text, &e);
-            Error::usage(in_line(line), format_args!("not valid TOML: {problem}"))
-        };
-        let values: Table = toml::from_str(&text).map_err(invalid)?;
-        let spans = DeTable::parse(&text).map_err(invalid)?;
+        let at = |start: usize| in_line(path, line_at(&text, start));
+        let values: Table = toml::from_str(&text).map_err(|e| invalid_toml(path, &text, &e))?;
+        let spans = DeTable::parse(&text).map_err(|e| invalid_toml(path, &text, &e))?;
         let mut file = Self {
             path: path.to_owned(),
             defaults: Keys::new(),
@@ -91,6 +86,18 @@ impl ModelsFile {
         }
         Ok(file)
     }
+}
+
+fn in_line(path: &Path, line: usize) -> String {
+    format!("{}, line {line}", path.display())
+}
+
+fn invalid_toml(path: &Path, text: &str, e: &toml::de::Error) -> Error {
+    let TomlFault { line, problem } = TomlFault::new(text, e);
+    Error::usage(
+        in_line(path, line),
+        format_args!("not valid TOML: {problem}"),
+    )
 }
 
 /// Adds the lines to the keys and values of a table. Refuses secrets, and keys that are set twice.

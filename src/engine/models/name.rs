@@ -138,9 +138,12 @@ impl FromStr for ModelName {
 mod tests {
     use super::*;
 
+    fn check(name: &str) -> Result<()> {
+        name.parse::<ModelName>().unwrap().check_spelling()
+    }
+
     #[test]
     fn near_misses_of_built_in_names_are_refused() {
-        let check = |name: &str| name.parse::<ModelName>().unwrap().check_spelling();
         for wrong in [
             "rndom",
             "Random",

@@ -9,10 +9,9 @@ use crate::error::{Error, Result};
 /// # Errors
 /// If no model has the name, or the key or its value is invalid.
 pub(super) fn apply_set(entries: &mut [Entry], text: &str) -> Result<()> {
-    let wrong = |problem: String| Error::usage("--set", problem);
     let (place, value) = text
         .split_once('=')
-        .ok_or_else(|| wrong("NAME.KEY=VALUE expected, as GPT-4o.rpm=60".to_owned()))?;
+        .ok_or_else(|| Error::usage("--set", "NAME.KEY=VALUE expected, as GPT-4o.rpm=60"))?;
     // The longest matching name, because a name may contain a dot and begin with another name.
     let longest_match = entries
         .iter()
@@ -29,7 +28,7 @@ pub(super) fn apply_set(entries: &mut [Entry], text: &str) -> Result<()> {
             "{place}: no model of this name; the models are {}",
             names.join(", ")
         );
-        return Err(wrong(problem));
+        return Err(Error::usage("--set", problem));
     };
     // A value that is not TOML is taken as a string.
     let mut parsed: toml::Table = format!("value = {value}").parse().unwrap_or_default();
@@ -38,9 +37,10 @@ pub(super) fn apply_set(entries: &mut [Entry], text: &str) -> Result<()> {
         .unwrap_or_else(|| toml::Value::String(value.to_owned()));
     let key = place[name.len() + 1..].replace('_', "-");
     if matches!(&*key, "name" | "id") {
-        return Err(wrong(format!(
-            "{key} identifies the model, and cannot be set"
-        )));
+        return Err(Error::usage(
+            "--set",
+            format_args!("{key} identifies the model, and cannot be set"),
+        ));
     }
     let located = Located {
         value,

@@ -128,9 +128,16 @@ impl AskSettings {
             trust::check(file, &entries, asking, context.data, trust)?;
         }
         refuse_models_of_file(&entries, &args.blind_model)?;
-        let flag = |name: &ModelName, view| Entry::from_flag(name.clone(), view, asking.clone());
-        entries.extend(args.model.iter().map(|name| flag(name, view)));
-        entries.extend(args.blind_model.iter().map(|name| flag(name, View::Blind)));
+        entries.extend(
+            args.model
+                .iter()
+                .map(|name| Entry::from_flag(name.clone(), view, asking.clone())),
+        );
+        entries.extend(
+            args.blind_model
+                .iter()
+                .map(|name| Entry::from_flag(name.clone(), View::Blind, asking.clone())),
+        );
         for text in &args.set {
             apply_set(&mut entries, text)?;
         }
@@ -249,10 +256,6 @@ fn entries_from_file(
         key => flag_of(key).is_some_and(|flag| typed.contains(flag)),
     };
     // An API key from the flags is not sent to an address of the file, so it does not override a key from [defaults] there.
-    let applies = |key: &str, keys: &Keys| {
-        let is_api_key = matches!(key, "key-env" | "key-file");
-        !is_typed(key) || (is_api_key && keys.contains_key("endpoints"))
-    };
     let mut entries = Vec::new();
     let mut overridden = BTreeSet::new();
     for keys in &file.models {
@@ -261,7 +264,10 @@ fn entries_from_file(
             .defaults
             .clone()
             .into_iter()
-            .filter(|(key, _)| applies(key, keys))
+            .filter(|(key, _)| {
+                let is_api_key = matches!(&**key, "key-env" | "key-file");
+                !is_typed(key) || (is_api_key && keys.contains_key("endpoints"))
+            })
             .collect();
         overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
         entries.push(Entry::from_file(
@@ -326,13 +332,12 @@ fn resolve(
         let value = plain_header(&access.header, &name);
         let problem =
             "no header of this name with a value in headers: only such a one can decide replies";
-        let missing = || {
+        let value = value.ok_or_else(|| {
             with_place(Error::usage(
                 "reply-headers",
                 format_args!("{name}: {problem}"),
             ))
-        };
-        let value = value.ok_or_else(missing)?;
+        })?;
         extra.reply_headers.insert(name.to_lowercase(), value);
     }
     extra.deployment.clone_from(&entry.deployment);
@@ -381,16 +386,6 @@ fn plain_header(headers: &[String], name: &str) -> Option<String> {
 fn manifest_note(entry: &Entry, resolved: &ModelSettings) -> Value {
     let access = &entry.asking.access;
     let views: Vec<String> = entry.views.iter().map(ToString::to_string).collect();
-    let names = |headers: &[String]| -> Vec<String> {
-        let name = |text: &String| {
-            text.split([':', '='])
-                .next()
-                .unwrap_or_default()
-                .trim()
-                .to_owned()
-        };
-        headers.iter().map(name).collect()
-    };
     let mut note = json!({
         "name": entry.name,
         "id": entry.id.label(),
@@ -405,7 +400,13 @@ fn manifest_note(entry: &Entry, resolved: &ModelSettings) -> Value {
         let sending = &server.sending;
         note["endpoints"] = json!(server.addresses());
         note["key"] = json!(access.key_source(&server.replicas[0]));
-        note["headers"] = json!([names(&access.header), names(&access.header_env)].concat());
+        note["headers"] = json!(
+            [
+                header_names(&access.header),
+                header_names(&access.header_env)
+            ]
+            .concat()
+        );
         note["pace"] = json!({
             "concurrency": sending.concurrency.to_string(), "rpm": sending.quota.requests, "tpm": sending.quota.tokens,
             "timeout": sending.timeout.as_secs_f64(), "retries": sending.retries, "max-wait": sending.max_wait.as_secs_f64(),
@@ -420,6 +421,19 @@ fn manifest_note(entry: &Entry, resolved: &ModelSettings) -> Value {
         fields.retain(|_, value| !value.is_null());
     }
     note
+}
+
+fn header_names(headers: &[String]) -> Vec<String> {
+    headers
+        .iter()
+        .map(|text| {
+            text.split([':', '='])
+                .next()
+                .unwrap_or_default()
+                .trim()
+                .to_owned()
+        })
+        .collect()
 }
 
 /// Refuses `--blind-model` with a model of the models file, because it would be asked at another address and with other settings than

@@ -64,11 +64,14 @@ fn is_in_data_folder(file: &Path, data: &Path) -> bool {
         data.parent()
     };
     let folder = folder.and_then(canonical_path);
-    let is_inside = |path: &Path| match (&folder, canonical_path(path)) {
+    is_below(folder.as_deref(), file) && !is_below(folder.as_deref(), Path::new("."))
+}
+
+fn is_below(folder: Option<&Path>, path: &Path) -> bool {
+    match (folder, canonical_path(path)) {
         (Some(folder), Some(path)) => path.starts_with(folder),
         _ => false,
-    };
-    is_inside(file) && !is_inside(Path::new("."))
+    }
 }
 
 /// The absolute path without symbolic links; `None` if there is no such file. An empty path is the working directory.
@@ -103,10 +106,6 @@ impl UntrustedModel<'_> {
     /// Refuses to send the content of files outside the folder of the models file.
     fn check_files(&self) -> Result<()> {
         let (asking, flags) = (&self.entry.asking, self.flags);
-        let body = |asking: &AskingArgs| {
-            let text = asking.request.extra_body.as_deref()?;
-            text.strip_prefix('@').map(PathBuf::from)
-        };
         let files = [
             (
                 "key-file",
@@ -118,7 +117,7 @@ impl UntrustedModel<'_> {
                 asking.request.system_file.clone(),
                 flags.request.system_file.clone(),
             ),
-            ("body", body(asking), body(flags)),
+            ("body", body_file(asking), body_file(flags)),
         ];
         for (key, path, flag_path) in files {
             if let Some(path) = path
@@ -207,13 +206,15 @@ impl UntrustedModel<'_> {
     /// The key of the model's own table, else that of `[defaults]`, if it names the variable.
     fn stated(&self, key: &str, variable: &str) -> Option<&Located> {
         let layers = [self.keys.get(key), self.file.defaults.get(key)];
-        let names = |located: &&Located| match &located.value {
-            toml::Value::Table(table) => table
-                .values()
-                .any(|value| value.get("env").and_then(toml::Value::as_str) == Some(variable)),
-            value => value.as_str() == Some(variable),
-        };
-        layers.into_iter().flatten().find(names)
+        layers
+            .into_iter()
+            .flatten()
+            .find(|located| match &located.value {
+                toml::Value::Table(table) => table
+                    .values()
+                    .any(|value| value.get("env").and_then(toml::Value::as_str) == Some(variable)),
+                value => value.as_str() == Some(variable),
+            })
     }
 
     fn is_inside(&self, path: &Path) -> bool {
@@ -241,6 +242,11 @@ impl UntrustedModel<'_> {
             (None, None) => Error::usage("--models", problem),
         }
     }
+}
+
+fn body_file(asking: &AskingArgs) -> Option<PathBuf> {
+    let text = asking.request.extra_body.as_deref()?;
+    text.strip_prefix('@').map(PathBuf::from)
 }
 
 /// The variables that the settings of an endpoint name for its key and its headers.

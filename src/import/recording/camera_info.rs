@@ -71,12 +71,11 @@ impl CameraInfo {
         };
         let _distortion_model = reader.text()?;
         let _distortion_parameters = reader.doubles()?;
-        let mut read_matrix = |count: usize| {
-            (0..count)
-                .map(|_| reader.f64())
-                .collect::<Result<Vec<f64>, _>>()
-        };
-        let (k, _rotation, p) = (read_matrix(9)?, read_matrix(9)?, read_matrix(12)?);
+        let (k, _rotation, p) = (
+            read_matrix(&mut reader, 9)?,
+            read_matrix(&mut reader, 9)?,
+            read_matrix(&mut reader, 12)?,
+        );
         Ok(Self::new(size, &k, &p))
     }
 
@@ -104,6 +103,12 @@ impl CameraInfo {
     }
 }
 
+fn read_matrix(reader: &mut FieldReader<'_>, count: usize) -> Result<Vec<f64>, String> {
+    (0..count)
+        .map(|_| reader.f64())
+        .collect::<Result<Vec<f64>, _>>()
+}
+
 /// Intrinsics in a row-major matrix with this number of columns; `None` unless all are finite and both focal lengths positive.
 fn intrinsics(matrix: &[f64], columns: usize) -> Option<Intrinsics> {
     let [fx, cx, fy, cy] =
@@ -127,6 +132,15 @@ struct JsonCamera {
 mod tests {
     use super::*;
 
+    fn intrinsics_of(
+        info: &CameraInfo,
+        topic: &str,
+        size: (usize, usize),
+    ) -> Option<(f64, f64, f64, f64)> {
+        info.intrinsics_for(topic, size)
+            .map(|camera| (camera.fx, camera.fy, camera.cx, camera.cy))
+    }
+
     #[test]
     fn rectified_topics_use_matrix_p() {
         let k = [500.0, 0.0, 320.0, 0.0, 501.0, 240.0, 0.0, 0.0, 1.0];
@@ -134,19 +148,15 @@ mod tests {
             400.0, 0.0, 300.0, 0.0, 0.0, 401.0, 200.0, 0.0, 0.0, 0.0, 1.0, 0.0,
         ];
         let info = CameraInfo::new([640, 480], &k, &p);
-        let intrinsics_of = |topic: &str, size| {
-            info.intrinsics_for(topic, size)
-                .map(|camera| (camera.fx, camera.fy, camera.cx, camera.cy))
-        };
         assert_eq!(
-            intrinsics_of("/c/image_raw", (640, 480)),
+            intrinsics_of(&info, "/c/image_raw", (640, 480)),
             Some((500.0, 501.0, 320.0, 240.0))
         );
         assert_eq!(
-            intrinsics_of("/c/image_rect", (640, 480)),
+            intrinsics_of(&info, "/c/image_rect", (640, 480)),
             Some((400.0, 401.0, 300.0, 200.0))
         );
-        assert_eq!(intrinsics_of("/c/image_raw", (320, 240)), None);
+        assert_eq!(intrinsics_of(&info, "/c/image_raw", (320, 240)), None);
         assert_eq!(CameraInfo::new([640, 480], &[0.0; 9], &[]).raw, None);
     }
 }

@@ -75,7 +75,6 @@ impl Channel {
 
 /// Common prefix of the topics of one camera: `/front` for `/front/image_raw`, `/front/image_raw/compressed` and `/front/camera_info`.
 pub(crate) fn camera_name(topic: &str) -> &str {
-    let parent_length = |topic: &str| topic.rfind('/').unwrap_or(0);
     let transports = [
         "/compressed",
         "/compressedDepth",
@@ -89,6 +88,10 @@ pub(crate) fn camera_name(topic: &str) -> &str {
         .filter(|base| base[parent_length(base)..].contains("image"))
         .unwrap_or(topic);
     &base[..parent_length(base)]
+}
+
+fn parent_length(topic: &str) -> usize {
+    topic.rfind('/').unwrap_or(0)
 }
 
 #[cfg(test)]
@@ -109,11 +112,12 @@ mod tests {
         assert_eq!(camera_name("image"), "");
     }
 
+    fn content(schema: &str, serialization: &str) -> ChannelContent {
+        Channel::new("/t".to_owned(), schema, serialization, b"").content
+    }
+
     #[test]
     fn all_spellings_of_type_names_are_known() {
-        let content = |schema: &str, serialization: &str| {
-            Channel::new("/t".to_owned(), schema, serialization, b"").content
-        };
         for schema in [
             "sensor_msgs/msg/Image",
             "sensor_msgs/Image",

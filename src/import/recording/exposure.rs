@@ -43,9 +43,10 @@ enum Primitive {
 /// Returns a definition if it may have fields about exposure, else an empty one to save memory.
 pub(super) fn relevant_definition(definition: &[u8]) -> Vec<u8> {
     let text = definition.to_ascii_lowercase();
-    let contains = |word: &[u8]| text.windows(word.len()).any(|part| part == word);
     let is_relevant = definition.len() <= MAX_DEFINITION_BYTES
-        && (contains(b"exposure") || contains(b"gain") || contains(b"json_data"));
+        && [&b"exposure"[..], b"gain", b"json_data"]
+            .iter()
+            .any(|word| text.windows(word.len()).any(|part| part == *word));
     if is_relevant {
         definition.to_vec()
     } else {
@@ -61,8 +62,9 @@ impl ExposureFields {
         }
         let text = std::str::from_utf8(definition).ok()?;
         // The definitions of nested types follow after a line of equals signs.
-        let own = text.split("\n===").next()?;
-        let mut lines = own
+        let mut lines = text
+            .split("\n===")
+            .next()?
             .lines()
             .map(|line| line.split('#').next().unwrap_or_default().trim())
             .filter(|line| !line.is_empty() && !line.contains('='))

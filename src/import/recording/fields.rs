@@ -194,12 +194,13 @@ mod tests {
         );
     }
 
+    fn time(seconds: i32, rest: u32) -> i64 {
+        let bytes = [seconds.to_le_bytes(), rest.to_le_bytes()].concat();
+        FieldReader::unaligned(&bytes).time().unwrap()
+    }
+
     #[test]
     fn negative_and_late_times_are_read() {
-        let time = |seconds: i32, rest: u32| {
-            let bytes = [seconds.to_le_bytes(), rest.to_le_bytes()].concat();
-            FieldReader::unaligned(&bytes).time().unwrap()
-        };
         assert_eq!(time(-1, 500_000_000), -500_000_000);
         assert_eq!(time(i32::MAX, 999_999_999), 2_147_483_647_999_999_999);
     }

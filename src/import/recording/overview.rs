@@ -98,10 +98,12 @@ impl Overview {
 
     /// Topic and time of the latest message, to continue an error message.
     fn last_message(&self) -> String {
-        let last = self.topics.iter().max_by_key(|(_, topic)| topic.times[1]);
-        last.map_or(String::new(), |(name, topic)| {
-            format!(" after {name} at {:.3} s", self.since_start(topic.times[1]))
-        })
+        self.topics
+            .iter()
+            .max_by_key(|(_, topic)| topic.times[1])
+            .map_or(String::new(), |(name, topic)| {
+                format!(" after {name} at {:.3} s", self.since_start(topic.times[1]))
+            })
     }
 
     /// Counts a message. Returns true if it is the first of its topic.

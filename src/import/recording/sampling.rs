@@ -180,14 +180,15 @@ mod tests {
     fn chosen(args: &SamplingArgs, times: &[f64]) -> Vec<usize> {
         let duration = times.last().unwrap() - times[0];
         let mut sampler = args.sampler(duration);
-        let mut due = |time: f64| {
-            sampler.is_due(Place {
-                time: nanoseconds(time),
-                since: nanoseconds(time - times[0]),
-                stretch: 0,
+        (0..times.len())
+            .filter(|i| {
+                sampler.is_due(Place {
+                    time: nanoseconds(times[*i]),
+                    since: nanoseconds(times[*i] - times[0]),
+                    stretch: 0,
+                })
             })
-        };
-        (0..times.len()).filter(|i| due(times[*i])).collect()
+            .collect()
     }
 
     #[test]
@@ -213,13 +214,16 @@ mod tests {
         );
     }
 
+    fn most(n: usize) -> SamplingArgs {
+        SamplingArgs {
+            max_frames: NonZeroUsize::new(n),
+            ..SamplingArgs::default()
+        }
+    }
+
     #[test]
     fn at_most_n_frames_are_evenly_spread() {
         let times: Vec<f64> = (0..=100).map(|i| f64::from(i) * 0.1).collect();
-        let most = |n: usize| SamplingArgs {
-            max_frames: NonZeroUsize::new(n),
-            ..SamplingArgs::default()
-        };
         assert_eq!(chosen(&most(5), &times), [0, 20, 40, 60, 80]);
         assert_eq!(chosen(&most(1), &times), [0]);
         assert_eq!(chosen(&most(1000), &times).len(), 101);
@@ -233,18 +237,17 @@ mod tests {
             ..SamplingArgs::default()
         };
         let mut sampler = args.sampler(0.0);
-        let grey = |code: u8| Thumbnail::new(&crate::types::Rgb::new(1, 1, vec![code; 3]).unwrap());
-        let mut takes = |i: i64, code: u8| {
-            let place = Place {
-                time: i,
-                since: i,
-                stretch: 0,
-            };
-            sampler.is_due(place) && sampler.has_changed(grey(code))
-        };
         let found: Vec<bool> = (0..)
             .zip([10, 14, 15, 16, 200])
-            .map(|(i, code)| takes(i, code))
+            .map(|(i, code)| {
+                let place = Place {
+                    time: i,
+                    since: i,
+                    stretch: 0,
+                };
+                let grey = crate::types::Rgb::new(1, 1, vec![code; 3]).unwrap();
+                sampler.is_due(place) && sampler.has_changed(Thumbnail::new(&grey))
+            })
             .collect();
         // 15 differs by 5 from the last chosen frame, 10, and 16 by 6.
         assert_eq!(found, [true, false, false, true, false]);

@@ -208,6 +208,15 @@ fn two_thousand_damaged_recordings_are_read_or_refused() {
     assert!(whole > 100 && partial > 100, "{whole} {partial}");
 }
 
+fn decodes(schema: &str, encoding: Encoding, bytes: &[u8]) -> bool {
+    stamp(schema, encoding, bytes);
+    drop(CameraInfo::parse(schema, encoding, bytes));
+    ImageMessage::parse(schema, encoding, bytes).is_ok_and(|message| match message.image {
+        MessageImage::Raw(image) => image.decode().is_ok(),
+        MessageImage::File { .. } => true,
+    })
+}
+
 #[test]
 fn damaged_messages_of_every_serialization_are_parsed_or_refused() {
     let mut random = StdRng::seed_from_u64(61);
@@ -230,14 +239,6 @@ fn damaged_messages_of_every_serialization_are_parsed_or_refused() {
         ),
         ("foxglove_msgs/RawImage", Encoding::Cdr, &raw[..]),
     ];
-    let decodes = |schema: &str, encoding: Encoding, bytes: &[u8]| {
-        stamp(schema, encoding, bytes);
-        drop(CameraInfo::parse(schema, encoding, bytes));
-        ImageMessage::parse(schema, encoding, bytes).is_ok_and(|message| match message.image {
-            MessageImage::Raw(image) => image.decode().is_ok(),
-            MessageImage::File { .. } => true,
-        })
-    };
     assert!(
         [0, 3, 4]
             .into_iter()

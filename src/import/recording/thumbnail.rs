@@ -48,9 +48,12 @@ impl Thumbnail {
 mod tests {
     use super::*;
 
+    fn flat(code: u8) -> Thumbnail {
+        Thumbnail::new(&Rgb::new(20, 33, vec![code; 20 * 33 * 3]).unwrap())
+    }
+
     #[test]
     fn the_difference_is_in_codes() {
-        let flat = |code: u8| Thumbnail::new(&Rgb::new(20, 33, vec![code; 20 * 33 * 3]).unwrap());
         assert!((flat(10).difference(&flat(17)) - 7.0).abs() < 1e-9);
         let mut half = vec![0; 32 * 32 * 3];
         half[..16 * 32 * 3].fill(200);

@@ -118,9 +118,8 @@ impl Video {
     pub(crate) fn frames(&self, interval: f64) -> Result<VideoFrames> {
         let filter = if interval > 0.0 {
             // The small addend is for frames at a multiple of the interval, whose quotient may be rounded down.
-            let interval_number = |time: &str| format!("floor(({time}-start_t)/{interval}+1e-7)");
-            let this = interval_number("t");
-            let last = interval_number("prev_selected_t");
+            let [this, last] = ["t", "prev_selected_t"]
+                .map(|time| format!("floor(({time}-start_t)/{interval}+1e-7)"));
             format!("select='isnan(prev_selected_t)+gt({this},{last})',showinfo")
         } else {
             "showinfo".to_owned()
@@ -276,12 +275,11 @@ impl VideoFrames {
         let Some(magic) = self.read_word()? else {
             return Ok(None);
         };
-        let mut number = || {
-            let word = self.read_word()?.unwrap_or_default();
-            word.parse::<usize>()
-                .map_err(|_| format!("{word:?} in the head of an image"))
-        };
-        let (width, height, max_value) = (number()?, number()?, number()?);
+        let (width, height, max_value) = (
+            self.read_number()?,
+            self.read_number()?,
+            self.read_number()?,
+        );
         let pixels = width.saturating_mul(height);
         if magic != "P6" || max_value != 255 || pixels == 0 || pixels as u64 > MOST_PIXELS {
             return Err(format!("an image {magic} of {width} × {height} pixels"));
@@ -293,6 +291,13 @@ impl VideoFrames {
         Rgb::new(height, width, samples)
             .map(Some)
             .map_err(|e| e.to_string())
+    }
+
+    /// Reads a number in the head of an image.
+    fn read_number(&mut self) -> Result<usize, String> {
+        let word = self.read_word()?.unwrap_or_default();
+        word.parse::<usize>()
+            .map_err(|_| format!("{word:?} in the head of an image"))
     }
 
     /// Reads the next word of the header of an image and the space after it; `None` at the end.

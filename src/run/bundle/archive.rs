@@ -48,7 +48,6 @@ pub(super) fn zip_files(folder: &str, mut files: Vec<(String, Vec<u8>)>) -> Resu
     files.sort();
     files.push((SUMS.to_owned(), sums(&files).into_bytes()));
     files.sort();
-    let failed = |e: &dyn std::fmt::Display| Error::data("the bundle", e);
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     archive.set_raw_comment(MARK.into());
     for (name, content) in files {
@@ -65,6 +64,10 @@ pub(super) fn zip_files(folder: &str, mut files: Vec<(String, Vec<u8>)>) -> Resu
     }
     let archive = archive.finish().map_err(|e| failed(&e))?;
     Ok(archive.into_inner())
+}
+
+fn failed(e: &dyn std::fmt::Display) -> Error {
+    Error::data("the bundle", e)
 }
 
 /// A line for each file: its SHA-256 in hexadecimal, two spaces, and its name.
@@ -85,18 +88,19 @@ mod tests {
 
     use super::*;
 
+    fn zipped(files: Vec<(&str, &str)>) -> Vec<u8> {
+        let files = files
+            .into_iter()
+            .map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
+        zip_files("run", files.collect()).unwrap()
+    }
+
     #[test]
     fn the_same_files_in_any_order_are_the_same_bytes() {
         let files = [("b.txt", "two"), ("a/c.txt", "one")];
-        let named = |files: Vec<(&str, &str)>| {
-            let files = files
-                .into_iter()
-                .map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
-            zip_files("run", files.collect()).unwrap()
-        };
-        let bytes = named(files.to_vec());
-        assert_eq!(bytes, named(files.into_iter().rev().collect()));
-        assert_ne!(bytes, named(vec![("b.txt", "two")]));
+        let bytes = zipped(files.to_vec());
+        assert_eq!(bytes, zipped(files.into_iter().rev().collect()));
+        assert_ne!(bytes, zipped(vec![("b.txt", "two")]));
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.zip");
         std::fs::write(&path, &bytes).unwrap();

@@ -140,10 +140,11 @@ fn other_entries(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<Strin
         .iter()
         .map(|(name, _)| name.split('/').next().unwrap_or(name))
         .collect();
-    let unreadable = |e: std::io::Error| Error::file(folder, "read", e);
     let mut others = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
-        let name = entry.map_err(unreadable)?.file_name();
+    for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))? {
+        let name = entry
+            .map_err(|e| Error::file(folder, "read", e))?
+            .file_name();
         let name = name.to_string_lossy().into_owned();
         if !known.contains(&*name) {
             others.push(name);
@@ -155,10 +156,15 @@ fn other_entries(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<Strin
 
 /// Converts the name of a run to a folder name that is valid on all systems.
 fn file_name(name: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_.+@".contains(c);
     let name: String = name
         .chars()
-        .map(|c| if plain(c) { c } else { '_' })
+        .map(|c| {
+            if c.is_alphanumeric() || "-_.+@".contains(c) {
+                c
+            } else {
+                '_'
+            }
+        })
         .collect();
     match name.trim_start_matches('.') {
         "" => "run".to_owned(),

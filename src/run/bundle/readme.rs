@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-use crate::runs::stored::AnyRun;
+use crate::runs::stored::{AnyRun, text_setting};
 use crate::types::flags::keyed_form;
 use crate::types::manifests::{RunManifest, judge_flag};
 use crate::types::text::shown;
@@ -98,8 +98,7 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
             RunModels::from_trials(&run.trials)
         }
     };
-    let setting = |name: &str| manifest.settings.get(name).and_then(Value::as_str);
-    let judge = setting("--judge");
+    let judge = text_setting(manifest, "--judge");
     let remote = remote_models(manifest);
     let file = models_file(&remote, &asked, judge);
     let is_in_file = |model: &String| file.is_some() && remote.contains_key(model);
@@ -117,7 +116,7 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
         }
     }
     for flag in ["--judge", "--protocol"] {
-        if let Some(value) = setting(flag) {
+        if let Some(value) = text_setting(manifest, flag) {
             words.extend([flag.to_owned(), word(value)]);
         }
     }
@@ -135,17 +134,15 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     if !levels.is_empty() {
         words.extend(["--levels".to_owned(), word(&levels.join(","))]);
     }
-    let has = |flag: &str| {
-        let is_of_images = manifest.images.contains_key(flag.trim_start_matches("--"));
-        is_of_images || words.iter().any(|known| known == flag)
-    };
     let more: Vec<String> = manifest
         .identity
         .iter()
         .filter(|(flag, value)| {
             // Digests identify files, which are named by the image flags.
             let is_plain = value.as_str().is_none_or(|text| text.len() < 64);
-            flag.starts_with("--") && !has(flag) && is_plain && *flag != "--data"
+            let is_of_images = manifest.images.contains_key(flag.trim_start_matches("--"));
+            let is_named = words.contains(flag);
+            flag.starts_with("--") && !is_of_images && !is_named && is_plain && *flag != "--data"
         })
         .flat_map(|(flag, value)| flag_words(flag, value))
         .collect();
@@ -174,11 +171,6 @@ fn models_file(
     asked: &RunModels,
     judge: Option<&str>,
 ) -> Option<String> {
-    let without_id = |content: &Value| {
-        let mut content = content.as_object().cloned().unwrap_or_default();
-        content.remove("--model");
-        content
-    };
     // The judge has its own flags.
     let models: Vec<(&String, &Value)> = remote
         .iter()
@@ -217,6 +209,12 @@ fn models_file(
         }
     }
     Some(text)
+}
+
+fn without_id(content: &Value) -> serde_json::Map<String, Value> {
+    let mut content = content.as_object().cloned().unwrap_or_default();
+    content.remove("--model");
+    content
 }
 
 /// True if a model is a control of the observer, which is asked together with the observer.
@@ -288,11 +286,16 @@ mod tests {
 
     #[test]
     fn flags_are_words_of_a_shell() {
-        let words = |value| flag_words("--x", &value);
-        assert_eq!(words(serde_json::json!("a b")), ["--x", "'a b'"]);
-        assert_eq!(words(serde_json::json!(["a", 2])), ["--x", "a", "--x", "2"]);
-        assert_eq!(words(serde_json::json!(true)), ["--x"]);
-        assert!(words(Value::Null).is_empty());
+        assert_eq!(
+            flag_words("--x", &serde_json::json!("a b")),
+            ["--x", "'a b'"]
+        );
+        assert_eq!(
+            flag_words("--x", &serde_json::json!(["a", 2])),
+            ["--x", "a", "--x", "2"]
+        );
+        assert_eq!(flag_words("--x", &serde_json::json!(true)), ["--x"]);
+        assert!(flag_words("--x", &Value::Null).is_empty());
         let gain = flag_words("--gain", &serde_json::json!(0.5));
         assert_eq!(gain, ["--noise", "gain=0.5"]);
         let fixed = flag_words("--fixed", &serde_json::json!(true));

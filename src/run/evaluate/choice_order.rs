@@ -165,9 +165,12 @@ mod tests {
             .collect()
     }
 
+    fn expected(text: &str, repeat: u32) -> (String, u32) {
+        (text.to_owned(), repeat)
+    }
+
     #[test]
     fn every_rotation_is_repeated() {
-        let expected = |text: &str, repeat| (text.to_owned(), repeat);
         assert_eq!(shown(0, false, false, 1), [expected("abc", 0)]);
         assert_eq!(
             shown(0, false, true, 2),
@@ -182,17 +185,18 @@ mod tests {
         );
     }
 
+    fn times(repeats: Option<u32>, truths: Truths, condition: Option<&str>) -> u32 {
+        let order = ChoiceOrder {
+            shuffle_options: false,
+            circular: false,
+            repeats: repeats.and_then(NonZeroU32::new),
+        };
+        let condition = condition.map(|name| name.parse::<Condition>().unwrap());
+        order.repeats(truths).times(condition.as_ref())
+    }
+
     #[test]
     fn only_untouched_images_are_asked_twice_without_truths() {
-        let times = |repeats: Option<u32>, truths, condition: Option<&str>| {
-            let order = ChoiceOrder {
-                shuffle_options: false,
-                circular: false,
-                repeats: repeats.and_then(NonZeroU32::new),
-            };
-            let condition = condition.map(|name| name.parse::<Condition>().unwrap());
-            order.repeats(truths).times(condition.as_ref())
-        };
         for (condition, expected) in [
             (Some("L0"), 2),
             (Some("L3-noise"), 1),

@@ -56,24 +56,35 @@ mod tests {
     use crate::types::{Choices, Family, QuestionId};
 
     fn others(frames: &str) -> Option<String> {
-        let question = |(id, frame): (usize, char)| Question {
-            id: QuestionId(id.to_string()),
-            frame: FrameId(frame.to_string()),
-            family: Family::Closest,
-            text: "?".into(),
-            choices: Choices::new(vec!["a".into(), "b".into()], 0).unwrap(),
-            group: None,
-            evidence: serde_json::Value::Null,
-        };
-        let questions: Vec<Question> = frames.chars().enumerate().map(question).collect();
+        let questions: Vec<Question> = frames
+            .chars()
+            .enumerate()
+            .map(|(id, frame)| Question {
+                id: QuestionId(id.to_string()),
+                frame: FrameId(frame.to_string()),
+                family: Family::Closest,
+                text: "?".into(),
+                choices: Choices::new(vec!["a".into(), "b".into()], 0).unwrap(),
+                group: None,
+                evidence: serde_json::Value::Null,
+            })
+            .collect();
         // Lower and upper case are frames of one scene; digits have none.
-        let scene = |frame: &FrameId| frame.0.to_lowercase().replace(char::is_numeric, "");
-        let others = OtherRooms::new(&questions, scene)?;
-        let shown = frames.chars().map(|frame| {
-            let shown = others.shown_for(&FrameId(frame.to_string())).unwrap();
-            shown.0.clone()
-        });
-        Some(shown.collect())
+        let others = OtherRooms::new(&questions, |frame| {
+            frame.0.to_lowercase().replace(char::is_numeric, "")
+        })?;
+        frames
+            .chars()
+            .map(|frame| {
+                Some(
+                    others
+                        .shown_for(&FrameId(frame.to_string()))
+                        .unwrap()
+                        .0
+                        .clone(),
+                )
+            })
+            .collect()
     }
 
     #[test]

@@ -11,7 +11,6 @@ use crate::engine::key_facts::KeyFacts;
 use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::error::Result;
 use crate::images::trials::{Item, Prompt, SourcePlan, Stimulus, Trial, TrialGroup};
-use crate::picture::Payload;
 use crate::types::{
     ChoiceDetail, Condition, Digest, FrameId, Question, Record, TrialOutcome, View,
 };
@@ -51,8 +50,7 @@ impl Item for ChoiceItem {
 
     fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Record {
         let question = &*trial.item.question;
-        let facts = |image: &Arc<Payload>| image.facts().clone();
-        let mut images = stimulus.images.iter().map(facts);
+        let mut images = stimulus.images.iter().map(|image| image.facts().clone());
         let detail = ChoiceDetail {
             frame: question.frame.clone(),
             family: question.family.clone(),
@@ -171,7 +169,6 @@ fn group(
     let image = condition
         .map(|condition| setup.recipe.stimulus(&setup.sources[source], condition))
         .transpose()?;
-    let is_control = |model: &ModelUnderTest| view == View::Image && is_other_room(model);
     let own = questions.own.iter().map(|shown| (shown, false));
     let others = questions.others.iter().map(|shown| (shown, true));
     let count = questions.own.len() + questions.others.len();
@@ -186,10 +183,9 @@ fn group(
             View::Blind => &shown.blind,
         };
         let place = setup.question_places[&shown.item.question.id];
-        for &(index, model) in models
-            .iter()
-            .filter(|(_, model)| model.is_asked(place) && is_control(model) == is_of_other)
-        {
+        for &(index, model) in models.iter().filter(|(_, model)| {
+            model.is_asked(place) && (view == View::Image && is_other_room(model)) == is_of_other
+        }) {
             trials.push(Trial {
                 key: key_facts(shown, prompt, model, condition, image).key()?,
                 model: index,

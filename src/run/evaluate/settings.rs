@@ -205,12 +205,12 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
         );
         return Err(Error::usage("--model", problem));
     }
-    let sees = |name: &str| {
-        models
-            .iter()
-            .any(|model| model.name == name && model.view == View::Image)
-    };
-    if let Some(blind) = models.iter().find(|model| !sees(&model.name)) {
+    let seeing: Vec<&str> = models
+        .iter()
+        .filter(|model| model.view == View::Image)
+        .map(|model| &*model.name)
+        .collect();
+    if let Some(blind) = models.iter().find(|model| !seeing.contains(&&*model.name)) {
         let problem = format_args!(
             "{} is shown no image, and --ask compares a model with its own answers in the light: name it with --model and leave --blind out; it is \
              asked without images, too",

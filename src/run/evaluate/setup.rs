@@ -276,14 +276,18 @@ fn file_places(
     selected: &[Question],
 ) -> HashMap<QuestionId, usize> {
     if let Some(plan) = &config.plan {
-        let ids = selected.iter().map(|question| question.id.clone());
-        ids.zip(plan.question_places()).collect()
+        selected
+            .iter()
+            .map(|question| question.id.clone())
+            .zip(plan.question_places())
+            .collect()
     } else {
-        let ids = dataset
+        dataset
             .questions()
             .iter()
-            .map(|question| question.id.clone());
-        ids.zip(0..).collect()
+            .map(|question| question.id.clone())
+            .zip(0..)
+            .collect()
     }
 }
 

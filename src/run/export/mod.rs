@@ -251,7 +251,6 @@ fn open_sets(
 
 /// A unique file name for each frame: its name without folders and extension, followed by a number if it is already used.
 fn file_names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a FrameId, String> {
-    let is_plain = |letter: char| letter.is_alphanumeric() || "-_.".contains(letter);
     let mut used = BTreeSet::new();
     let mut names = BTreeMap::new();
     for frame in frames {
@@ -266,6 +265,10 @@ fn file_names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a Fra
         names.insert(frame, unique);
     }
     names
+}
+
+fn is_plain(letter: char) -> bool {
+    letter.is_alphanumeric() || "-_.".contains(letter)
 }
 
 #[cfg(test)]

@@ -120,13 +120,19 @@ impl Width {
 mod tests {
     use super::*;
 
+    fn tex_points(text: &str, columns: Option<u8>) -> f64 {
+        points(text, columns).unwrap() * 72.27 / 72.0
+    }
+
+    fn points(text: &str, columns: Option<u8>) -> Result<f64> {
+        text.parse::<Width>().unwrap().points(columns)
+    }
+
     #[test]
     fn widths_are_those_of_columns_or_millimetres() {
-        let points = |text: &str, columns| text.parse::<Width>().unwrap().points(columns);
-        let tex = |text: &str, columns| points(text, columns).unwrap() * 72.27 / 72.0;
-        assert!((tex("ieee", None) - 252.0).abs() < 1e-9);
-        assert!((tex("ieee", Some(2)) - 516.0).abs() < 1e-9);
-        assert!((tex("neurips", Some(1)) - 397.5).abs() < 1e-9);
+        assert!((tex_points("ieee", None) - 252.0).abs() < 1e-9);
+        assert!((tex_points("ieee", Some(2)) - 516.0).abs() < 1e-9);
+        assert!((tex_points("neurips", Some(1)) - 397.5).abs() < 1e-9);
         assert!(points("neurips", Some(2)).is_err() && points("85", Some(1)).is_err());
         assert!((points("254", None).unwrap() - 720.0).abs() < 1e-9);
         for wrong in ["", "nature", "-3", "39", "601", "nan", "inf"] {

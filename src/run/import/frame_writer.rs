@@ -204,7 +204,8 @@ impl<'a> FrameWriter<'a> {
             scene: &scene,
             frame: &frame.name,
         };
-        let mut line = output.line(encoded.size);
+        let (width, height) = encoded.size;
+        let mut line = output.line(width, height);
         let path = output
             .write("rgb", encoded.ending, &encoded.bytes)
             .map_err(|e| e.to_string())?;
@@ -286,11 +287,9 @@ impl<'a> FrameWriter<'a> {
         }
         std::mem::take(&mut self.tally).warn();
         self.warn_of_white();
-        let key = |written: &WrittenFrame| {
-            let name = |key: &str| written.line[key].as_str().map(str::to_owned);
-            (name("scene"), name("frame"))
-        };
-        self.written.sort_by_cached_key(key);
+        self.written.sort_by_cached_key(|written| {
+            ["scene", "frame"].map(|key| written.line[key].as_str().map(str::to_owned))
+        });
         let lines = self.written.iter().map(|written| &written.line);
         frame_folder::write_folder_files(self.out, &Labels::default(), info, lines)?;
         let mut scenes: Vec<&Value> = self

@@ -44,18 +44,19 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 /// The message for a folder without MCAP files.
 fn no_mcap_problem(folder: &Path) -> Result<&'static str> {
     let files = entries(folder)?;
-    let has = |ending: &str| {
-        files
-            .iter()
-            .any(|file| file.extension().is_some_and(|own| own == ending))
-    };
-    Ok(if has("db3") {
+    Ok(if has_ending(&files, "db3") {
         SQLITE_BAG
-    } else if has("zstd") || has("zst") {
+    } else if has_ending(&files, "zstd") || has_ending(&files, "zst") {
         COMPRESSED_FILE
     } else {
         "no .mcap file in this folder"
     })
+}
+
+fn has_ending(files: &[PathBuf], ending: &str) -> bool {
+    files
+        .iter()
+        .any(|file| file.extension().is_some_and(|own| own == ending))
 }
 
 /// Total size of files, in bytes.

@@ -174,10 +174,15 @@ fn selected_topics(
 
 /// A topic as part of a file name.
 fn slug(topic: &str) -> String {
-    let is_plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '.');
     let name: String = topic
         .chars()
-        .map(|c| if is_plain(c) { c } else { '_' })
+        .map(|c| {
+            if c.is_alphanumeric() || matches!(c, '-' | '.') {
+                c
+            } else {
+                '_'
+            }
+        })
         .collect();
     name.trim_matches(['_', '.']).to_owned()
 }
@@ -236,26 +241,26 @@ impl<'a> Import<'a> {
         overview: Option<&Overview>,
     ) -> Result<Self> {
         let white = args.white.map_or(u16::MAX, NonZeroU16::get);
-        let selected = |topic: &String| {
-            let duration = overview
-                .and_then(|overview| overview.topics.get(topic))
-                .map_or(0.0, TopicOverview::duration);
-            SelectedTopic {
-                sampler: args.sampling.sampler(duration),
-                prefix: if topics.len() > 1 {
-                    slug(topic) + "-"
-                } else {
-                    String::new()
-                },
-                seen: 0,
-                clock: TopicClock::default(),
-                latest: None,
-            }
-        };
         Ok(Self {
             topics: topics
                 .iter()
-                .map(|topic| (topic.clone(), selected(topic)))
+                .map(|topic| {
+                    let duration = overview
+                        .and_then(|overview| overview.topics.get(topic))
+                        .map_or(0.0, TopicOverview::duration);
+                    let selected = SelectedTopic {
+                        sampler: args.sampling.sampler(duration),
+                        prefix: if topics.len() > 1 {
+                            slug(topic) + "-"
+                        } else {
+                            String::new()
+                        },
+                        seen: 0,
+                        clock: TopicClock::default(),
+                        latest: None,
+                    };
+                    (topic.clone(), selected)
+                })
                 .collect(),
             stretches: Stretches::new(args.written.stretch),
             writer: FrameWriter::new(

@@ -28,18 +28,9 @@ pub(super) fn listing(file: &Path, overview: &Overview) -> Result<Outcome> {
 
 /// One line for each topic with images, and the number of other topics.
 fn lines(overview: &Overview) -> String {
-    let width = |text: fn(&str, &TopicOverview) -> usize| {
-        overview
-            .topics
-            .iter()
-            .filter(|(_, topic)| !topic.image_format.is_empty())
-            .map(|(name, topic)| text(name, topic))
-            .max()
-            .unwrap_or(0)
-    };
-    let names = width(|name, _| name.chars().count());
-    let forms = width(|_, topic| topic.image_format.chars().count());
-    let schemas = width(|_, topic| topic.schema.chars().count());
+    let names = width(overview, |name, _| name.chars().count());
+    let forms = width(overview, |_, topic| topic.image_format.chars().count());
+    let schemas = width(overview, |_, topic| topic.schema.chars().count());
     let mut lines = String::new();
     let mut others = 0;
     for (name, topic) in &overview.topics {
@@ -64,6 +55,16 @@ fn lines(overview: &Overview) -> String {
     }
     let _ = writeln!(lines, "{} without images", counted(others, "further topic"));
     lines
+}
+
+fn width(overview: &Overview, text: fn(&str, &TopicOverview) -> usize) -> usize {
+    overview
+        .topics
+        .iter()
+        .filter(|(_, topic)| !topic.image_format.is_empty())
+        .map(|(name, topic)| text(name, topic))
+        .max()
+        .unwrap_or(0)
 }
 
 /// The error for a recording without images, with its topics. `file` is the first file of the recording.

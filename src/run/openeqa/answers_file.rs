@@ -44,12 +44,14 @@ pub(super) fn read(
 ) -> Result<Vec<Record<OpenDetail>>> {
     let path = &config.path;
     let text = reading::bytes(path)?;
-    let wrong = |problem: String| Error::data(path.display(), problem);
     let entries: Vec<AnswerEntry> = serde_json::from_slice(&text).map_err(|e| {
-        wrong(format!(
-            "{e}; a JSON array of {{\"question_id\", \"answer\"}} expected, with \"condition\" or \"level\" and \"annotator\" \
-             where there are several"
-        ))
+        Error::data(
+            path.display(),
+            format_args!(
+                "{e}; a JSON array of {{\"question_id\", \"answer\"}} expected, with \"condition\" or \"level\" and \"annotator\" \
+                 where there are several"
+            ),
+        )
     })?;
     let known: BTreeMap<&str, usize> = questions
         .iter()
@@ -63,17 +65,24 @@ pub(super) fn read(
             unknown.push(&*entry.question_id);
             continue;
         };
-        let condition = condition(entry, variants)
-            .map_err(|problem| wrong(format!("question {}: {problem}", entry.question_id)))?;
+        let condition = condition(entry, variants).map_err(|problem| {
+            Error::data(
+                path.display(),
+                format_args!("question {}: {problem}", entry.question_id),
+            )
+        })?;
         let person = entry.annotator.as_ref().map(|name| match name {
             Value::String(name) => name.clone(),
             other => other.to_string(),
         });
         if !seen.insert((index, condition.clone(), person.clone())) {
-            return Err(wrong(format!(
-                "question {} is answered twice at {condition}; state in \"annotator\" who answered",
-                entry.question_id
-            )));
+            return Err(Error::data(
+                path.display(),
+                format_args!(
+                    "question {} is answered twice at {condition}; state in \"annotator\" who answered",
+                    entry.question_id
+                ),
+            ));
         }
         let key = key(&config.name, entry, &condition, person.as_deref());
         let question = &questions[index];
@@ -111,17 +120,15 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
         (None, None | Some("L0")) => return Ok(Condition::L0),
         (None, Some(level)) => level,
     };
-    let of_kind = |kind: Kind| {
-        let severity = kind.severity(level).map_err(|e| e.to_string())?;
-        Degradation::new(kind, severity, None).map_err(|e| e.to_string())
-    };
     // Kinds on the axis of the level.
     let mut degradations: Vec<Degradation> = Kind::ALL
         .into_iter()
-        .filter_map(|kind| of_kind(kind).ok())
+        .filter_map(|kind| degradation_at(level, kind).ok())
         .collect();
     if degradations.is_empty() {
-        return Err(of_kind(Kind::Exposure).err().unwrap_or_default());
+        return Err(degradation_at(level, Kind::Exposure)
+            .err()
+            .unwrap_or_default());
     }
     let noise = degradations.iter().find(|how| how.kind() == Kind::Sensor);
     let example = noise.or(degradations.last()).map(ToString::to_string);
@@ -133,6 +140,11 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
             example.unwrap_or_default()
         )),
     }
+}
+
+fn degradation_at(level: &str, kind: Kind) -> std::result::Result<Degradation, String> {
+    let severity = kind.severity(level).map_err(|e| e.to_string())?;
+    Degradation::new(kind, severity, None).map_err(|e| e.to_string())
 }
 
 fn key(name: &str, entry: &AnswerEntry, condition: &Condition, person: Option<&str>) -> TrialKey {

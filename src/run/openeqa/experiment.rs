@@ -1,7 +1,6 @@
 //! The [`Experiment`] of open questions and of marks for the answers.
 
 use std::collections::{BTreeMap, HashMap};
-use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -44,8 +43,11 @@ impl Experiment for OpenSetup<'_> {
     }
 
     fn data(&self) -> &str {
-        let stem = self.config.questions.file_stem().map(Path::new);
-        stem.and_then(Path::to_str).unwrap_or("openeqa")
+        self.config
+            .questions
+            .file_stem()
+            .and_then(std::ffi::OsStr::to_str)
+            .unwrap_or("openeqa")
     }
 
     fn models(&self, phase: usize) -> &[ModelUnderTest] {

@@ -78,7 +78,6 @@ impl JudgeArgs {
         let Some(model) = self.judge else {
             return Ok(None);
         };
-        let at_judge = |e: crate::error::Error| e.at("the judge");
         model.require_open_answers().map_err(at_judge)?;
         if self.judge_base_url.is_none() && job.access.base_url.is_empty() {
             model.check_spelling().map_err(at_judge)?;
@@ -118,4 +117,8 @@ impl JudgeArgs {
             },
         }))
     }
+}
+
+fn at_judge(e: crate::error::Error) -> crate::error::Error {
+    e.at("the judge")
 }

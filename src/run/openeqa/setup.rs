@@ -48,14 +48,24 @@ impl<'a> OpenSetup<'a> {
     pub(super) fn open(config: &'a OpenEqa, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
         let all = openeqa::read_questions(&config.questions)?;
-        let ids = all.iter().map(|question| question.id.clone());
-        let file_places = ids.zip(0..).collect();
+        let file_places = all
+            .iter()
+            .map(|question| question.id.clone())
+            .zip(0..)
+            .collect();
         let selected = select(all, &config.chosen)?;
-        let ids = selected.iter().map(|question| question.id.clone());
-        let question_places = ids.zip(0..).collect();
-        let walk = |question: &OpenQuestion| question.episode.clone();
-        let (questions, part) =
-            shard_questions(selected, job.shard, walk, |_| String::new(), |_| 1)?;
+        let question_places = selected
+            .iter()
+            .map(|question| question.id.clone())
+            .zip(0..)
+            .collect();
+        let (questions, part) = shard_questions(
+            selected,
+            job.shard,
+            |question: &OpenQuestion| question.episode.clone(),
+            |_| String::new(),
+            |_| 1,
+        )?;
         let models = models::open_all(&job.ask, &[], |name| {
             models::open(name, None, &Parameters::new(String::new()))
         })?;
@@ -86,8 +96,13 @@ impl<'a> OpenSetup<'a> {
             check_enhanced(&conditions, &job.enhancers)?;
             (sources, conditions)
         } else {
-            let unseen = |name| Source::unseen(FrameId(name));
-            (names.into_iter().map(unseen).collect(), Vec::new())
+            (
+                names
+                    .into_iter()
+                    .map(|name| Source::unseen(FrameId(name)))
+                    .collect(),
+                Vec::new(),
+            )
         };
         recipe.check(&sources, &conditions)?;
         let mut setup = Self {

@@ -43,7 +43,8 @@ fn looks(
     threads: ThreadArgs,
     progress: &Progress,
 ) -> Result<Vec<FrameAppearance>> {
-    let (names, tally): (Vec<&FrameId>, _) = (dataset.frames().collect(), InputTally::default());
+    let names: Vec<&FrameId> = dataset.frames().collect();
+    let tally = InputTally::default();
     let bar = progress.bar("looks", names.len());
     let looks = pool(threads.threads)?.install(|| {
         names

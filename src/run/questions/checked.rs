@@ -124,10 +124,6 @@ pub(super) fn write_review(
 
 /// The relative link from a folder to a file.
 fn link(from: &Path, to: &Path) -> String {
-    let absolute = |path: &Path| {
-        let absolute_path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        absolute_path.canonicalize().unwrap_or(absolute_path)
-    };
     let (from, to) = (absolute(from), absolute(to));
     let common = from
         .components()
@@ -142,12 +138,16 @@ fn link(from: &Path, to: &Path) -> String {
     up.chain(down).collect::<Vec<_>>().join("/")
 }
 
+fn absolute(path: &Path) -> PathBuf {
+    let absolute_path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    absolute_path.canonicalize().unwrap_or(absolute_path)
+}
+
 /// Percent-encodes a name for a link (RFC 3986, section 2.3).
 fn escaped(name: &str) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-._~".contains(&byte);
     name.bytes()
         .map(|byte| {
-            if plain(byte) {
+            if byte.is_ascii_alphanumeric() || b"-._~".contains(&byte) {
                 char::from(byte).to_string()
             } else {
                 format!("%{byte:02X}")
@@ -185,22 +185,26 @@ mod tests {
         );
     }
 
+    fn line(person: &str, id: &str, verdict: &str, found: &str) -> String {
+        let line = serde_json::json!({
+            "id": id, "person": person, "verdict": verdict, "found": found,
+            "family": "color", "frame": "scene-1/a",
+        });
+        format!("{line}\n")
+    }
+
     #[test]
     fn one_of_two_people_rejects() {
         let folder = tempfile::tempdir().unwrap();
-        let path = |person: &str| folder.path().join(format!("{person}.jsonl"));
-        let line = |person: &str, id: &str, verdict: &str, found: &str| {
-            let line = serde_json::json!({
-                "id": id, "person": person, "verdict": verdict, "found": found,
-                "family": "color", "frame": "scene-1/a",
-            });
-            format!("{line}\n")
-        };
         let anna = line("anna", "a", "reject", "wrong") + &line("anna", "b", "accept", "right");
         let ben = line("ben", "a", "accept", "right") + &line("ben", "b", "accept", "right");
-        fs::write(path("anna"), anna).unwrap();
-        fs::write(path("ben"), ben).unwrap();
-        let found = read_verdicts(&[path("anna"), path("ben")]).unwrap();
+        fs::write(folder.path().join("anna.jsonl"), anna).unwrap();
+        fs::write(folder.path().join("ben.jsonl"), ben).unwrap();
+        let found = read_verdicts(&[
+            folder.path().join("anna.jsonl"),
+            folder.path().join("ben.jsonl"),
+        ])
+        .unwrap();
         assert_eq!(found.rejected, [QuestionId("a".into())].into());
         assert_eq!(found.checks.len(), 4);
         let check = &found.checks[&("anna".to_owned(), QuestionId("a".into()))];
@@ -213,14 +217,17 @@ mod tests {
     #[test]
     fn links_lead_from_the_page_to_the_image() {
         let folder = tempfile::tempdir().unwrap();
-        let at = |name: &str| folder.path().join(name);
-        fs::create_dir_all(at("data/a b")).unwrap();
-        fs::create_dir_all(at("out")).unwrap();
-        fs::write(at("data/a b/#1.png"), "").unwrap();
+        let root = folder.path();
+        fs::create_dir_all(root.join("data/a b")).unwrap();
+        fs::create_dir_all(root.join("out")).unwrap();
+        fs::write(root.join("data/a b/#1.png"), "").unwrap();
         assert_eq!(
-            link(&at("out"), &at("data/a b/#1.png")),
+            link(&root.join("out"), &root.join("data/a b/#1.png")),
             "../data/a%20b/%231.png"
         );
-        assert_eq!(link(&at("data"), &at("data/a b/#1.png")), "a%20b/%231.png");
+        assert_eq!(
+            link(&root.join("data"), &root.join("data/a b/#1.png")),
+            "a%20b/%231.png"
+        );
     }
 }

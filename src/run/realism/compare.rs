@@ -58,13 +58,13 @@ fn methods(
     pair: &str,
 ) -> Result<Vec<(NoiseMethod, Synthesis)>> {
     let mut methods = Vec::new();
-    for (reading, synthesis) in sensor.readings.iter() {
+    for (profile, synthesis) in sensor.readings.iter() {
         let method = |camera| NoiseMethod {
-            reading: reading.clone(),
+            reading: profile.clone(),
             camera,
         };
         methods.push((method(CameraOrigin::Given), synthesis.clone()));
-        let fit = fits.iter().find(|fit| fit.reading == *reading);
+        let fit = fits.iter().find(|fit| fit.reading == *profile);
         if let Some((fit, (gains, origin))) = fit.and_then(|fit| Some((fit, fit.for_pair(pair)?))) {
             let camera = fitted_camera(&synthesis.camera, fit, gains.range)?;
             let fitted = Synthesis {
@@ -91,12 +91,16 @@ fn compare_pair(
     let real_residuals = Residuals::new(&real, &exposure)?;
     let compare_image = |image: &Rgb| -> Result<(ImageComparison, Residuals)> {
         let residuals = Residuals::new(image, &exposure)?;
-        let kl = |rule| divergence(&real_residuals, &residuals, args.kl_bins, rule);
         let comparison = ImageComparison {
             psnr: psnr(&real, image)?,
             ssim: ssim(&real, image)?,
-            kl: kl(args.kl_empty),
-            kl_other: kl(args.kl_empty.other()),
+            kl: divergence(&real_residuals, &residuals, args.kl_bins, args.kl_empty),
+            kl_other: divergence(
+                &real_residuals,
+                &residuals,
+                args.kl_bins,
+                args.kl_empty.other(),
+            ),
         };
         Ok((comparison, residuals))
     };

@@ -40,21 +40,22 @@ pub(super) fn write_files(out: &Path, works: &[PairWork], summary: &RealismSumma
 
 /// The residuals of all pairs, pooled.
 fn pool_residuals(works: &[PairWork]) -> PooledResiduals {
-    let sum = |index: usize| {
-        let mut sum = Residuals::default();
-        for residuals in works.iter().filter_map(|work| work.residuals.get(index)) {
-            sum.add(residuals);
-        }
-        sum
-    };
     let noise = works.iter().take(1).flat_map(|work| &work.compared.noise);
     PooledResiduals {
-        real: sum(0),
+        real: sum_residuals(works, 0),
         noise: noise
             .enumerate()
-            .map(|(index, noise)| (noise.method.clone(), sum(index + 1)))
+            .map(|(index, noise)| (noise.method.clone(), sum_residuals(works, index + 1)))
             .collect(),
     }
+}
+
+fn sum_residuals(works: &[PairWork], index: usize) -> Residuals {
+    let mut sum = Residuals::default();
+    for residuals in works.iter().filter_map(|work| work.residuals.get(index)) {
+        sum.add(residuals);
+    }
+    sum
 }
 
 /// Writes the fitted gains of each pair, and a camera file for each noise profile with fitted pairs: `fitted.toml` if there is one noise

@@ -23,20 +23,20 @@ pub(super) fn fit(
     pairs: &[CheckedPair<'_>],
     workers: &PairWorkers<'_>,
 ) -> Result<Vec<ReadingFit>> {
-    let readings: Vec<FitReading> = sensor
+    let profiles: Vec<ProfileLadder> = sensor
         .readings
         .iter()
-        .map(|(name, synthesis)| FitReading::new(name, synthesis))
+        .map(|(name, synthesis)| ProfileLadder::new(name, synthesis))
         .collect::<Result<_>>()?;
     let fits = workers.map("pairs fitted", pairs, |_, checked| {
         // A file that can no longer be read fails in the comparison, where it is logged and counted.
         let (normal, low) = load(args, checked.pair, None).ok()?;
-        Some(fit_pair(sensor.seed, &readings, checked, &normal, &low))
+        Some(fit_pair(sensor.seed, &profiles, checked, &normal, &low))
     });
-    Ok(readings
+    Ok(profiles
         .iter()
         .enumerate()
-        .map(|(index, reading)| {
+        .map(|(index, profile)| {
             let pair_fits = pairs
                 .iter()
                 .zip(&fits)
@@ -47,18 +47,18 @@ pub(super) fn fit(
                     })
                 })
                 .collect();
-            ReadingFit::new(reading.name.clone(), reading.ratio(), pair_fits)
+            ReadingFit::new(profile.name.clone(), profile.ratio(), pair_fits)
         })
         .collect())
 }
 
 /// A noise profile with a camera at the middle of its ranges, for each gain of the ladder.
-struct FitReading {
+struct ProfileLadder {
     name: ReadingName,
     ladder: [Synthesis; LADDER_STEPS],
 }
 
-impl FitReading {
+impl ProfileLadder {
     fn new(name: &ReadingName, synthesis: &Synthesis) -> Result<Self> {
         let mut camera = synthesis.camera.clone();
         camera.set_sampling(Sampling::Fixed);
@@ -93,7 +93,7 @@ fn fixed_state(synthesis: &Synthesis, drop_ev: f64) -> CameraState {
 /// The fits to one pair, one for each noise profile.
 fn fit_pair(
     seed: u64,
-    readings: &[FitReading],
+    profiles: &[ProfileLadder],
     checked: &CheckedPair<'_>,
     normal: &Pixels,
     low: &Rgb,
@@ -103,11 +103,11 @@ fn fit_pair(
     let drop = f64::from(checked.drop);
     let smooth = SmoothBlocks::new(&normal.codes(), drop);
     let real = smooth.spread(low);
-    readings
+    profiles
         .iter()
-        .map(|reading| {
+        .map(|profile| {
             let mut raw = None;
-            let curves = reading.ladder.each_ref().map(|synthesis| {
+            let curves = profile.ladder.each_ref().map(|synthesis| {
                 let state = fixed_state(synthesis, drop);
                 // The clean RAW image is the same at all gains, because the colours of the camera are.
                 let headroom = synthesis.headroom_ev(drop);

@@ -57,13 +57,6 @@ pub(super) fn admit(request: &Request<Incoming>, port: u16) -> Result<(), Reques
 /// # Errors
 /// If it is too large, does not arrive in time, or breaks off.
 pub(super) async fn body(body: Incoming) -> Result<Vec<u8>, RequestFault> {
-    let too_large = || {
-        let message = format!(
-            "the body is incomplete, or has more than {} MiB",
-            MAX_BODY >> 20
-        );
-        RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
-    };
     // Check the announced length first.
     if body.size_hint().lower() > MAX_BODY as u64 {
         return Err(too_large());
@@ -78,6 +71,14 @@ pub(super) async fn body(body: Incoming) -> Result<Vec<u8>, RequestFault> {
             RequestFault::new(StatusCode::REQUEST_TIMEOUT, message)
         })?
         .ok_or_else(too_large)
+}
+
+fn too_large() -> RequestFault {
+    let message = format!(
+        "the body is incomplete, or has more than {} MiB",
+        MAX_BODY >> 20
+    );
+    RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
 }
 
 /// All bytes of a body; `None` if it is too large or breaks off.

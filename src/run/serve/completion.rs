@@ -55,13 +55,16 @@ impl Completion {
     }
 
     fn events(&self) -> String {
-        let chunk = |delta: Value, finish: Value| {
-            let mut chunk = self.head("chat.completion.chunk");
-            chunk["choices"] = json!([{"index": 0, "delta": delta, "finish_reason": finish}]);
-            format!("data: {chunk}\n\n")
-        };
         let delta = json!({"role": "assistant", "content": self.text});
-        chunk(delta, Value::Null) + &chunk(json!({}), json!("stop")) + "data: [DONE]\n\n"
+        self.chunk(&delta, &Value::Null)
+            + &self.chunk(&json!({}), &json!("stop"))
+            + "data: [DONE]\n\n"
+    }
+
+    fn chunk(&self, delta: &Value, finish: &Value) -> String {
+        let mut chunk = self.head("chat.completion.chunk");
+        chunk["choices"] = json!([{"index": 0, "delta": delta, "finish_reason": finish}]);
+        format!("data: {chunk}\n\n")
     }
 }
 

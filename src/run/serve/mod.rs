@@ -123,9 +123,11 @@ fn bind(port: u16) -> Result<TcpListener> {
 }
 
 async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progress) -> Result<()> {
-    let unusable = |e| Error::usage("--port", e);
-    let listener = tokio::net::TcpListener::from_std(listener).map_err(unusable)?;
-    let address = listener.local_addr().map_err(unusable)?;
+    let listener =
+        tokio::net::TcpListener::from_std(listener).map_err(|e| Error::usage("--port", e))?;
+    let address = listener
+        .local_addr()
+        .map_err(|e| Error::usage("--port", e))?;
     let names: Vec<&str> = state.names().collect();
     progress.note(&format!(
         "models: {}; no key is needed; Ctrl-C ends it",

@@ -29,11 +29,6 @@ impl ParsedQuestion {
         let lines: Vec<&str> = text.lines().collect();
         let parsed: Vec<Option<(char, &str)>> =
             lines.iter().map(|line| parse_choice(line)).collect();
-        let no_choices = || {
-            let message =
-                "no choices in the text; lines like \"A. yes\" and \"B. no\" are expected";
-            RequestFault::new(StatusCode::BAD_REQUEST, message)
-        };
         let first = parsed
             .iter()
             .rposition(|line| matches!(line, Some(('A', _))))
@@ -63,6 +58,11 @@ impl ParsedQuestion {
             choices,
         })
     }
+}
+
+fn no_choices() -> RequestFault {
+    let message = "no choices in the text; lines like \"A. yes\" and \"B. no\" are expected";
+    RequestFault::new(StatusCode::BAD_REQUEST, message)
 }
 
 /// The letter and the text of a choice; `None` if the line is not a choice.

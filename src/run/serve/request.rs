@@ -62,9 +62,12 @@ impl ServedQuestion {
     /// # Errors
     /// 400 if the body is not a chat completion, a message has several images, or an image cannot be decoded.
     pub(super) fn parse(body: &[u8]) -> Result<Self, RequestFault> {
-        let wrong = |message: String| RequestFault::new(StatusCode::BAD_REQUEST, message);
-        let body: ChatBody = serde_json::from_slice(body)
-            .map_err(|e| wrong(format!("the request is not a valid chat completion: {e}")))?;
+        let body: ChatBody = serde_json::from_slice(body).map_err(|e| {
+            RequestFault::new(
+                StatusCode::BAD_REQUEST,
+                format!("the request is not a valid chat completion: {e}"),
+            )
+        })?;
         let (mut text, mut image, mut max_images) = (String::new(), None, 0);
         let mut append = |words: &str| {
             text.push_str(words);
@@ -92,7 +95,8 @@ impl ServedQuestion {
         if max_images > 1 {
             let message =
                 format!("a message shows {max_images} images, and these models look at one");
-            return Err(wrong(message).at("image_url", "invalid_image_url"));
+            return Err(RequestFault::new(StatusCode::BAD_REQUEST, message)
+                .at("image_url", "invalid_image_url"));
         }
         Ok(Self {
             model: body.model,
@@ -109,23 +113,25 @@ impl ServedQuestion {
 
 /// Decodes the image of a data URL; also returns the payload for the model.
 fn decode_data_url(url: &str) -> Result<(Rgb, Arc<Payload>), RequestFault> {
-    let wrong = |message: String| {
-        RequestFault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
-    };
     let (_, data) = url
         .strip_prefix("data:image/")
         .and_then(|rest| rest.split_once(";base64,"))
         .ok_or_else(|| {
-            wrong(
+            invalid_image(
                 "only data URLs are accepted: data:image/png;base64,… or data:image/jpeg;base64,…"
                     .to_owned(),
             )
         })?;
     let bytes = STANDARD
         .decode(data)
-        .map_err(|e| wrong(format!("the image is not base64: {e}")))?;
+        .map_err(|e| invalid_image(format!("the image is not base64: {e}")))?;
     let file = ImageFile::new(bytes, "image_url".to_owned(), ReadingRule::default());
-    let rgb = file.decode().map_err(|e| wrong(e.to_string()))?;
-    let payload = Payload::encode(&rgb, PayloadFormat::Png).map_err(|e| wrong(e.to_string()))?;
+    let rgb = file.decode().map_err(|e| invalid_image(e.to_string()))?;
+    let payload =
+        Payload::encode(&rgb, PayloadFormat::Png).map_err(|e| invalid_image(e.to_string()))?;
     Ok((rgb, Arc::new(payload)))
+}
+
+fn invalid_image(message: String) -> RequestFault {
+    RequestFault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
 }

@@ -31,15 +31,17 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
     let item = SheetItem::read(args)?;
     let rows = item.rows();
     let images = item.images(args, &rows)?;
-    let cell = |condition: &Condition| -> Option<Result<StoryCell>> {
-        let image = images.get(condition)?;
-        let marks = item.marks(condition);
-        Some(cell_image(image).map(|image| StoryCell { image, marks }))
-    };
     let drawn = rows.iter().map(|(name, conditions)| {
-        let cells = conditions
-            .iter()
-            .map(|condition| condition.as_ref().and_then(cell).transpose());
+        let cells = conditions.iter().map(|condition| {
+            condition
+                .as_ref()
+                .and_then(|condition| -> Option<Result<StoryCell>> {
+                    let image = images.get(condition)?;
+                    let marks = item.marks(condition);
+                    Some(cell_image(image).map(|image| StoryCell { image, marks }))
+                })
+                .transpose()
+        });
         let name = name.clone();
         cells
             .collect::<Result<_>>()
@@ -115,18 +117,17 @@ impl SheetItem {
         let run = open_choice_run(&args.run, "--sheet draws questions with choices")?;
         let run =
             run.with_truths("--sheet draws accuracy; leave it out to see the images and replies")?;
-        let problem = |problem: String| Error::Run {
-            path: args.run.clone(),
-            problem,
-        };
         let name = args.question_id();
         let mut records = run.records_of(name)?;
         records.retain(|record| record.condition.is_some() && !is_control(&record.model));
         let Some(first) = records.first() else {
             let example = run.trials.first().map_or("", |trial| &trial.question().0);
-            return Err(problem(format!(
-                "the run did not ask {name:?} with images; an item is named by the id of its question, as {example}"
-            )));
+            return Err(run_error(
+                args,
+                format!(
+                    "the run did not ask {name:?} with images; an item is named by the id of its question, as {example}"
+                ),
+            ));
         };
         let stored = run.questions.iter().find(|question| question.id.0 == name);
         let text = choice_text(first, stored);
@@ -135,7 +136,7 @@ impl SheetItem {
         let choices: Vec<&str> = lines.map(str::trim).collect();
         let manifest = run.manifest.clone();
         let curves = story_curves(run)?
-            .ok_or_else(|| problem("no model was shown a degraded image".to_owned()))?;
+            .ok_or_else(|| run_error(args, "no model was shown a degraded image".to_owned()))?;
         let conditions = records
             .iter()
             .filter_map(|record| record.condition.as_ref());
@@ -164,13 +165,14 @@ impl SheetItem {
     fn rows(&self) -> SheetRows {
         let row = |name: String, enhancer: Option<_>| {
             let conditions = self.levels.iter().map(|level| {
-                let fits = |condition: &&Condition| {
-                    let variant = condition.kind_reading();
-                    condition.level() == *level
-                        && condition.enhancer.as_ref() == enhancer
-                        && (variant == self.curves.variant || variant == Variant::NONE)
-                };
-                self.asked_conditions().find(fits).cloned()
+                self.asked_conditions()
+                    .find(|condition| {
+                        let variant = condition.kind_reading();
+                        condition.level() == *level
+                            && condition.enhancer.as_ref() == enhancer
+                            && (variant == self.curves.variant || variant == Variant::NONE)
+                    })
+                    .cloned()
             });
             (name, conditions.collect())
         };
@@ -236,6 +238,13 @@ impl SheetItem {
             marks.push((record.model.clone(), mark));
         }
         marks
+    }
+}
+
+fn run_error(args: &ShowArgs, problem: String) -> Error {
+    Error::Run {
+        path: args.run.clone(),
+        problem,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -52,13 +52,12 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
         ..
     } = StoredRun::open_choices(&args.run, "openeqa --study DIR makes their page")?
         .with_truths("what people answer is scored by them")?;
-    let wrong = |problem: String| {
-        let path = args.run.clone();
-        Error::Run { path, problem }
-    };
     let conditions = conditions(&trials, &args.condition)?;
     if questions.is_empty() || conditions.is_empty() {
-        return Err(wrong("this run has no questions about images".to_owned()));
+        return Err(run_error(
+            &args.run,
+            "this run has no questions about images".to_owned(),
+        ));
     }
     let first_orders = first_orders(&trials);
     let mut frames = BTreeMap::<FrameId, Vec<RunQuestion>>::new();
@@ -83,7 +82,7 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
                 let problem = format!(
                     "{frame} at {condition} is not the image that was sent: the data, an enhancement model or this program has changed"
                 );
-                return Err(wrong(problem));
+                return Err(run_error(&args.run, problem));
             }
             // The name does not reveal the level.
             let name = Digest::from_parts([frame.0.as_bytes(), condition.to_string().as_bytes()]);
@@ -132,6 +131,11 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
             conditions.len()
         ),
     ))
+}
+
+fn run_error(run: &Path, problem: String) -> Error {
+    let path = run.to_owned();
+    Error::Run { path, problem }
 }
 
 /// The conditions of the run with images, limited to the `wanted` ones if there are any.

@@ -99,14 +99,17 @@ fn read_output(file: &Path) -> Result<Option<OutputFile>> {
     if !SCHEMAS.contains(&&*sidecar.schema) {
         return Ok(None);
     }
-    let wrong = |problem: &str| Err(Error::data(file.display(), problem));
     let Some(output) = sidecar.output else {
-        return wrong(
+        return Err(Error::data(
+            file.display(),
             "has no digest of its image: an older version wrote it; run `synthesize` again to add it",
-        );
+        ));
     };
     if Path::new(&output.file).components().count() != 1 {
-        return wrong("names an image outside of its folder");
+        return Err(Error::data(
+            file.display(),
+            "names an image outside of its folder",
+        ));
     }
     Ok(Some(output))
 }

@@ -95,26 +95,32 @@ impl Sheet {
 
 /// The footer of a figure: camera and seed, gain and light ratio in each noise profile, and the flags of further variants.
 fn footer(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) -> String {
-    let has = |test: fn(Kind) -> bool| degradations.iter().any(|how| test(how.kind()));
     let mut facts = Vec::new();
-    if has(Kind::has_noise) {
+    if has_kind(degradations, Kind::has_noise) {
         facts.push(camera_and_seed(light));
     }
-    if has(Kind::has_readings) {
+    if has_kind(degradations, Kind::has_readings) {
         let key = NoiseKey::new(light.kinds.sensor.seed, frame);
-        let readings = light.kinds.sensor.readings.iter();
         facts.extend(
-            readings
+            light
+                .kinds
+                .sensor
+                .readings
+                .iter()
                 .map(|(name, synthesis)| format!("{name}: {}", gain_and_ratio(synthesis, &key))),
         );
     }
-    if has(|kind| kind == Kind::Auto) {
+    if has_kind(degradations, |kind| kind == Kind::Auto) {
         facts.push(format!("--auto {}", light.kinds.auto));
     }
-    if has(Kind::has_motion) {
+    if has_kind(degradations, Kind::has_motion) {
         facts.push(format!("--motion {}", light.kinds.motion));
     }
     facts.join("; ")
+}
+
+fn has_kind(degradations: &[Degradation], test: fn(Kind) -> bool) -> bool {
+    degradations.iter().any(|how| test(how.kind()))
 }
 
 /// Camera and seed in words.
@@ -213,7 +219,6 @@ fn draw_terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         adu(&noisy, range)
     };
     let clean = with_terms(&[]);
-    let signal = |name: String, adu| Signal { name, adu };
     let mut signals = vec![signal("RAW".to_owned(), clean.clone())];
     for (name, term) in [
         ("shot noise", Term::Shot),
@@ -232,6 +237,10 @@ fn draw_terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         state.ratio
     );
     Ok(sheet::noise(&signals, &footer))
+}
+
+fn signal(name: String, adu: ndarray::Array2<f32>) -> Signal {
+    Signal { name, adu }
 }
 
 /// The samples of a RAW image in ADU.

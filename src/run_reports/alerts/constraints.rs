@@ -18,12 +18,12 @@ pub(super) fn constraint_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail
         .filter(|(_, constraint)| *constraint != "none")
         .collect();
     constrained.iter().filter_map(|(model, constraint)| {
-        let replied = trials
+        let (all, other) = trials
             .iter()
-            .filter(|trial| trial.model() == **model && !trial.failed());
-        let (all, other) = replied.fold((0_usize, 0_usize), |(all, other), trial| {
-            (all + 1, other + usize::from(!trial.is_letter()))
-        });
+            .filter(|trial| trial.model() == **model && !trial.failed())
+            .fold((0_usize, 0_usize), |(all, other), trial| {
+                (all + 1, other + usize::from(!trial.is_letter()))
+            });
         (other > 0).then(|| {
             let replies = plural(all, "reply", "replies");
             let text = format!(

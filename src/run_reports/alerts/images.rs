@@ -29,8 +29,9 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
             continue;
         }
         let words = std::iter::once(&question.text).chain(trial.choices());
-        let wording = || Digest::from_parts(words.map(String::as_bytes));
-        if let Some(reply) = LitReply::from_trial(trial, wording) {
+        if let Some(reply) =
+            LitReply::from_trial(trial, || Digest::from_parts(words.map(String::as_bytes)))
+        {
             replies.entry(trial.model()).or_default().push(reply);
         }
     }
@@ -43,18 +44,17 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
 
 /// Names of the models that need no endpoint.
 fn built_in_models(combined: &Combined) -> BTreeSet<&str> {
-    let is_built_in = |model: &str| {
-        combined
-            .runs
-            .iter()
-            .any(|run| run.manifest.is_built_in(without_run(model)))
-    };
     combined
         .trials
         .asked()
         .into_iter()
         .flatten()
         .map(|(model, _)| model)
-        .filter(|model| is_built_in(model))
+        .filter(|model| {
+            combined
+                .runs
+                .iter()
+                .any(|run| run.manifest.is_built_in(without_run(model)))
+        })
         .collect()
 }

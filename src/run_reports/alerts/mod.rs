@@ -7,9 +7,9 @@ mod images;
 mod limits;
 mod models;
 mod noise;
+mod parsing;
 mod providers;
 mod questions;
-mod readings;
 mod replies;
 mod servers;
 mod settings;
@@ -42,7 +42,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(replies::broken_off_alert(combined));
     alerts.extend(replies::people_alerts(combined));
     alerts.extend(images::image_alerts(combined));
-    alerts.extend(readings::reading_alerts(combined));
+    alerts.extend(parsing::parsing_alerts(combined));
     alerts.extend(confidence::confidence_alerts(
         &combined.runs,
         &combined.trials,
@@ -77,7 +77,7 @@ pub(super) fn alerts_without_truths(combined: &Combined, found: &SelfAgreement<'
     alerts.extend(joining_alerts(combined));
     alerts.extend(replies::reply_alerts(&found.health, "do not agree"));
     alerts.extend(replies::broken_off_alert(combined));
-    alerts.extend(readings::reading_alerts(combined));
+    alerts.extend(parsing::parsing_alerts(combined));
     alerts.extend(constraints::constraint_alerts(
         &combined.runs,
         &combined.trials,

@@ -23,19 +23,19 @@ pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             let Some(degradation) = condition.degradation() else {
                 continue;
             };
-            if let Some(reading) = degradation.reading() {
-                let levels = levels.entry(reading.to_string()).or_default();
+            if let Some(profile) = degradation.reading() {
+                let levels = levels.entry(profile.to_string()).or_default();
                 levels.insert(degradation.severity());
             }
         }
         let contents = run.manifest.columns.get("reading").into_iter().flatten();
-        for (reading, content) in contents {
-            let several = levels.get(reading).is_some_and(|levels| levels.len() > 1);
+        for (profile, content) in contents {
+            let several = levels.get(profile).is_some_and(|levels| levels.len() > 1);
             if several && content["--coupling"] == "independent" {
                 profiles_by_reason
                     .entry(same_noise(content))
                     .or_default()
-                    .insert(reading);
+                    .insert(profile);
             }
         }
     }
@@ -50,8 +50,8 @@ pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 }
 
 /// The reason why all levels of a noise profile have the same signal-to-noise ratio, if its light ratio r does not depend on the level.
-fn same_noise(reading: &Value) -> &'static str {
-    if reading["--draws"] == "shared" {
+fn same_noise(profile: &Value) -> &'static str {
+    if profile["--draws"] == "shared" {
         "the levels are one noisy image at several brightnesses"
     } else {
         "each level has other noise of the same strength"

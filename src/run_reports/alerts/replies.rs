@@ -45,12 +45,15 @@ pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
 
 /// The condition of a model with the largest share of replies that could not be parsed, if the share is above [`MAX_UNREAD`].
 fn worst_condition<'h>(health: &'h [Health], model: &str) -> Option<&'h Health> {
-    let share = |health: &Health| health.unreadable() as f64 / health.replies as f64;
     health
         .iter()
         .filter(|health| health.subject.model == model)
-        .filter(|health| health.replies > 0 && share(health) > MAX_UNREAD)
-        .max_by(|a, b| share(a).total_cmp(&share(b)))
+        .filter(|health| health.replies > 0 && unreadable_share(health) > MAX_UNREAD)
+        .max_by(|a, b| unreadable_share(a).total_cmp(&unreadable_share(b)))
+}
+
+fn unreadable_share(health: &Health) -> f64 {
+    health.unreadable() as f64 / health.replies as f64
 }
 
 /// The sentence about the replies of a condition that could not be parsed, with the number that the lenient parsing accepts.
@@ -115,16 +118,19 @@ mod tests {
     use super::*;
     use darkqa_score::subject::ModelInCondition;
 
-    #[test]
-    fn one_condition_that_cannot_be_read_is_named() {
-        let health = |condition: &str, read: usize| Health {
+    fn health(condition: &str, read: usize) -> Health {
+        Health {
             subject: ModelInCondition::new("m", Some(&condition.parse().unwrap())),
             replies: 100,
             read,
             lenient_only: 100 - read,
             unread: BTreeMap::new(),
             failed: BTreeMap::new(),
-        };
+        }
+    }
+
+    #[test]
+    fn one_condition_that_cannot_be_read_is_named() {
         let mut all: Vec<Health> = (0..19).map(|_| health("L0", 100)).collect();
         assert_eq!(reply_alerts(&all, "count as wrong"), []);
         all.push(health("L5-noise", 80));

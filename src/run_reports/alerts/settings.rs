@@ -24,9 +24,9 @@ pub(super) fn setting_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         differing_settings(&settings)
     };
     let flags = |flags: &[&str]| differing(&|run| Some(identity_fields(run, flags)));
-    let (constraints, parameters): (Vec<Setting>, Vec<Setting>) = differing(&remote_model_settings)
+    let (constraints, parameters) = differing(&remote_model_settings)
         .into_iter()
-        .partition(|setting| setting.flag == "--constrain");
+        .partition::<Vec<Setting>, _>(|setting| setting.flag == "--constrain");
     let version = differing(&|run| {
         let version = ("the version".to_owned(), run.version.clone());
         Some(Settings::from([version]))

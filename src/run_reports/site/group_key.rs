@@ -2,8 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use serde_json::Value;
-
 use crate::error::Result;
 use crate::report::site::{GroupDifference, GroupDigests};
 use crate::run_reports::combine::Combined;
@@ -12,7 +10,7 @@ use crate::run_reports::settings::{
     profile_and_variant_settings, shorten,
 };
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
-use crate::runs::stored::StoredRun;
+use crate::runs::stored::{StoredRun, text_setting};
 use crate::types::manifests::RunManifest;
 use crate::types::{AxisLevel, Digest, OpenDetail, RunQuestion, Variant};
 
@@ -104,11 +102,11 @@ impl GroupKey {
                 images.entry(place).or_default().extend(trial.sent());
             }
         }
-        let setting = |name: &str| {
-            let value = run.manifest.settings.get(name).and_then(Value::as_str);
-            value.unwrap_or("none").to_owned()
-        };
-        let (judge, protocol) = (setting(JUDGE), setting(PROTOCOL));
+        let [judge, protocol] = [JUDGE, PROTOCOL].map(|name| {
+            text_setting(&run.manifest, name)
+                .unwrap_or("none")
+                .to_owned()
+        });
         let key = Self {
             title: String::new(),
             digests: GroupDigests::default(),
@@ -251,7 +249,7 @@ fn light_settings(manifest: &RunManifest) -> Settings {
     ];
     let mut light: Settings = parts.into_iter().flatten().collect();
     light.remove(ENHANCEMENT);
-    if let Some(taken) = manifest.settings.get(SET_LIGHT).and_then(Value::as_str) {
+    if let Some(taken) = text_setting(manifest, SET_LIGHT) {
         light.insert(SET_LIGHT.to_owned(), taken.to_owned());
     }
     light
@@ -296,14 +294,19 @@ mod tests {
             key(&[("--prompts", "a")], b"one", "blue"),
             key(&[("--prompts", "a")], b"one", "red"),
         ];
-        let lines = |number: usize| keys[number].difference(&keys[0], 1).lines;
-        assert_eq!(lines(1), ["--prompts is a in table 1 and b in this one"]);
-        assert_eq!(lines(2), ["1 of 1 images differ"]);
         assert_eq!(
-            lines(3),
+            keys[1].difference(&keys[0], 1).lines,
+            ["--prompts is a in table 1 and b in this one"]
+        );
+        assert_eq!(
+            keys[2].difference(&keys[0], 1).lines,
+            ["1 of 1 images differ"]
+        );
+        assert_eq!(
+            keys[3].difference(&keys[0], 1).lines,
             ["questions with other choices or another true choice: 1"]
         );
-        assert!(lines(4).is_empty());
+        assert!(keys[4].difference(&keys[0], 1).lines.is_empty());
         let numbered = keys.into_iter().enumerate().collect();
         let groups: Vec<Vec<usize>> = group_members(numbered, |(_, key)| key)
             .into_iter()

@@ -180,10 +180,15 @@ fn page_of(files: Vec<(String, Vec<u8>)>) -> Result<Vec<u8>> {
 /// The link to the page of a run. The file is named after the run, with characters that are safe in URLs, and numbered if the name is
 /// already in `taken`.
 fn link(name: &str, manifest: &RunManifest, taken: &mut BTreeSet<String>) -> RunLink {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
     let stem: String = name
         .chars()
-        .map(|c| if plain(c) { c } else { '_' })
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || "-_.".contains(c) {
+                c
+            } else {
+                '_'
+            }
+        })
         .collect();
     let stem = stem.trim_start_matches('.');
     let stem = if stem.is_empty() { "run" } else { stem };

@@ -152,7 +152,7 @@ pub(super) fn image_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
 pub(super) fn trailing_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     vec![
         column("reading", Text, MayBeNull, |row: &Row<D>| {
-            Cell::text(row.condition.reading.as_deref())
+            Cell::text(row.condition.profile.as_deref())
         }),
         column("severity", Double, MayBeNull, |row| {
             double(row.condition.severity)

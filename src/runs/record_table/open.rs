@@ -3,13 +3,12 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use serde_json::Value;
-
 use super::common::{column, image_columns, leading_columns, reply_columns, trailing_columns};
 use super::row::{Row, SentImage, TableDetail};
 use crate::error::Result;
 use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
 use crate::runs::predictions::{AnswerState, answer_state};
+use crate::runs::stored::text_setting;
 use crate::store::CellKind::{Double, Int32, LongText, Text};
 use crate::store::Presence::{Always, MayBeNull};
 use crate::store::{Cell, Column, each_record};
@@ -65,9 +64,9 @@ impl TableDetail for OpenDetail {
     }
 
     fn context(folder: &Path, manifest: &RunManifest, questions: &[RunQuestion]) -> Result<Marks> {
-        let setting = |name| manifest.settings.get(name).and_then(Value::as_str);
-        let judge = setting(JUDGE).map(str::to_owned);
-        let protocol = setting(PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
+        let judge = text_setting(manifest, JUDGE).map(str::to_owned);
+        let protocol =
+            text_setting(manifest, PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let names = RecordedNames::from_manifest(manifest);
         let mut marks = MarkIndex::new(questions);
         each_record(folder, |record: Record<Self>, _| {
@@ -114,11 +113,6 @@ impl TableDetail for OpenDetail {
 impl Marks {
     /// The answer of a record, with its mark.
     fn marked_answer(&self, record: &Record<OpenDetail>) -> MarkedAnswer {
-        let unmarked = |outcome| MarkedAnswer {
-            answer: None,
-            outcome,
-            judge: None,
-        };
         let state = if record.failed() {
             AnswerState::Missing
         } else {
@@ -140,6 +134,14 @@ impl Marks {
             outcome,
             judge: self.judge.clone().filter(|_| mark.is_some()),
         }
+    }
+}
+
+fn unmarked(outcome: AnswerOutcome) -> MarkedAnswer {
+    MarkedAnswer {
+        answer: None,
+        outcome,
+        judge: None,
     }
 }
 

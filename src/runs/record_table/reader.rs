@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::vec;
 
 use super::batches::RowBatches;
-use super::row::{Row, TableDetail};
+use super::row::TableDetail;
 use crate::error::{Error, Result};
 use crate::runs::stored::ExperimentKind;
 use crate::store::{Cell, CellKind};
@@ -76,20 +76,22 @@ impl Records {
             .collect();
         let mut batches = RowBatches::<D>::open(folder)?;
         let headings = Arc::clone(&columns);
-        let next_batch = move || -> Result<Option<Vec<RunRecord>>> {
-            let rows = batches.next_batch()?;
-            let record = |row: &Row<D>| RunRecord {
-                columns: Arc::clone(&headings),
-                cells: table
-                    .iter()
-                    .map(|column| owned_cell((column.value)(row)))
-                    .collect(),
-            };
-            Ok(rows.map(|rows| rows.iter().map(record).collect()))
-        };
         Ok(Self {
             columns,
-            next_batch: Box::new(next_batch),
+            next_batch: Box::new(move || -> Result<Option<Vec<RunRecord>>> {
+                let rows = batches.next_batch()?;
+                Ok(rows.map(|rows| {
+                    rows.iter()
+                        .map(|row| RunRecord {
+                            columns: Arc::clone(&headings),
+                            cells: table
+                                .iter()
+                                .map(|column| owned_cell((column.value)(row)))
+                                .collect(),
+                        })
+                        .collect()
+                }))
+            }),
             batch: Vec::new().into_iter(),
         })
     }

@@ -75,7 +75,7 @@ pub(super) struct ConditionCells {
     pub(super) variant: String,
     pub(super) ev: Option<f64>,
     pub(super) severity: Option<f64>,
-    pub(super) reading: Option<String>,
+    pub(super) profile: Option<String>,
     pub(super) enhancer: Option<String>,
 }
 
@@ -88,7 +88,7 @@ impl ConditionCells {
             variant: columns.variant,
             ev: columns.ev,
             severity: columns.severity.map(Severity::value),
-            reading: columns.reading.map(ToString::to_string),
+            profile: columns.reading.map(ToString::to_string),
             enhancer: columns.enhancer.map(ToString::to_string),
         }
     }

@@ -93,12 +93,7 @@ const SECRET_FLAGS: [&str; 2] = ["--header", "--extra-body"];
 /// Converts the words of a `plan` command to those of an evaluation. `None` if one of them may be secret: a header, a request field, or a
 /// URL with a password or a query.
 pub(crate) fn recorded_command(words: &[String]) -> Option<Vec<String>> {
-    let may_be_secret = |word: &String| {
-        let flag = word.split('=').next().unwrap_or_default();
-        let is_url = word.contains("://");
-        SECRET_FLAGS.contains(&flag) || (is_url && word.contains(['@', '?']))
-    };
-    if words.iter().any(may_be_secret) {
+    if words.iter().any(|word| may_be_secret(word)) {
         return None;
     }
     let mut recorded = Vec::new();
@@ -116,16 +111,23 @@ pub(crate) fn recorded_command(words: &[String]) -> Option<Vec<String>> {
     Some(recorded)
 }
 
+fn may_be_secret(word: &str) -> bool {
+    let flag = word.split('=').next().unwrap_or_default();
+    let is_url = word.contains("://");
+    SECRET_FLAGS.contains(&flag) || (is_url && word.contains(['@', '?']))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn recorded(line: &str) -> Option<String> {
+        let words: Vec<String> = line.split(' ').map(str::to_owned).collect();
+        recorded_command(&words).map(|words| words.join(" "))
+    }
+
     #[test]
     fn no_secret_is_recorded() {
-        let recorded = |line: &str| {
-            let words: Vec<String> = line.split(' ').map(str::to_owned).collect();
-            recorded_command(&words).map(|words| words.join(" "))
-        };
         for (line, kept) in [
             (
                 "plan --model a --shard 1/4 --out r",

@@ -36,24 +36,25 @@ impl Coverage {
             overlaps: false,
         };
         for (shard, folder, manifest) in shards {
-            let wrong = |problem: String| {
-                let path = folder.to_owned();
-                Err(Error::Run { path, problem })
-            };
             let Some(part) = &manifest.part else {
-                return wrong(
-                    "the part does not say which frames it has: an earlier version made it; run it again".to_owned(),
-                );
+                let problem = "the part does not say which frames it has: an earlier version made it; run it again";
+                return Err(Error::Run {
+                    path: folder.to_owned(),
+                    problem: problem.to_owned(),
+                });
             };
             let place = part.place;
             if coverage.shards.is_empty() {
                 coverage.trials.resize(place.of, None);
             } else if coverage.trials.len() != place.of {
-                return wrong(format!(
-                    "shard {shard} is of a run about {} frames or walks, the others of one about {}",
-                    place.of,
-                    coverage.trials.len()
-                ));
+                return Err(Error::Run {
+                    path: folder.to_owned(),
+                    problem: format!(
+                        "shard {shard} is of a run about {} frames or walks, the others of one about {}",
+                        place.of,
+                        coverage.trials.len()
+                    ),
+                });
             }
             let own = coverage.trials.iter_mut().skip(place.first);
             for (known, trials) in own.zip(&part.trials) {
@@ -90,13 +91,18 @@ impl Coverage {
     /// if all shards are from one division.
     pub(super) fn absent(&self, range: impl Fn(Shard) -> Option<Range<usize>>) -> Vec<Shard> {
         let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
-        let is_needed = |shard: &Shard| match range(*shard) {
-            None => counts.len() == 1 && !self.shards.contains(shard),
-            Some(mut places) => places.any(|place| self.trials.get(place) == Some(&None)),
-        };
         counts
             .iter()
-            .map(|count| Shard::all(*count).filter(is_needed).collect::<Vec<Shard>>())
+            .map(|count| {
+                Shard::all(*count)
+                    .filter(|shard| match range(*shard) {
+                        None => counts.len() == 1 && !self.shards.contains(shard),
+                        Some(mut places) => {
+                            places.any(|place| self.trials.get(place) == Some(&None))
+                        }
+                    })
+                    .collect::<Vec<Shard>>()
+            })
             .filter(|absent| !absent.is_empty())
             .min_by_key(Vec::len)
             .unwrap_or_default()
@@ -198,12 +204,15 @@ mod tests {
         assert_eq!(mixed.trials(), 12);
         assert_eq!(mixed.gaps().collect::<Vec<_>>(), [2, 3, 5]);
         // If the sources of each shard are known, the division with the fewest missing shards is chosen.
-        let equal = |shard: Shard| {
-            let each = 6 / shard.count().get() as usize;
-            let first = shard.index() as usize * each;
-            Some(first..first + each)
-        };
-        let absent: Vec<String> = mixed.absent(equal).iter().map(Shard::to_string).collect();
+        let absent: Vec<String> = mixed
+            .absent(|shard| {
+                let each = 6 / shard.count().get() as usize;
+                let first = shard.index() as usize * each;
+                Some(first..first + each)
+            })
+            .iter()
+            .map(Shard::to_string)
+            .collect();
         assert_eq!(absent, ["2/3", "3/3"]);
     }
 

@@ -63,19 +63,18 @@ pub(super) fn check(
             plan.request_count(coverage.gaps())
         )
     });
-    let remedy = || remedy(parts, plan, &absent);
     match missing {
         MissingShards::Refuse => Err(Error::Run {
             path: first.folder.clone(),
             problem: format!(
                 "{problem}{counts}; --partial merges the others; {}",
-                remedy()
+                remedy(parts, plan, &absent)
             ),
         }),
         MissingShards::Accept => {
             tracing::warn!(
                 "{problem}{counts}; the summary covers only the others; {}",
-                remedy()
+                remedy(parts, plan, &absent)
             );
             Ok(true)
         }
@@ -84,9 +83,9 @@ pub(super) fn check(
 
 /// Warns about each shard that is not complete, unless complete shards together have all its trials.
 pub(super) fn warn_unfinished(parts: &[StoredShard], plan: Option<&RunPlan>) {
-    let (complete, unfinished): (Vec<&StoredShard>, Vec<&StoredShard>) = parts
+    let (complete, unfinished) = parts
         .iter()
-        .partition(|part| part.manifest.status == Status::Complete);
+        .partition::<Vec<&StoredShard>, _>(|part| part.manifest.status == Status::Complete);
     for part in unfinished
         .into_iter()
         .filter(|part| !part.is_covered_by(&complete))

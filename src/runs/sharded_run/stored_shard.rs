@@ -20,13 +20,12 @@ impl StoredShard {
     /// # Errors
     /// If the folder has no shard, or a file in it cannot be read.
     pub(super) fn open(folder: &Path) -> Result<Self> {
-        let wrong = |problem: &str| Error::Run {
-            path: folder.to_owned(),
-            problem: problem.to_owned(),
-        };
         let manifest = read_run_manifest(folder)?;
         let Some(shard) = manifest.shard.as_deref() else {
-            return Err(wrong("the run is not a shard: it was made without --shard"));
+            return Err(Error::Run {
+                path: folder.to_owned(),
+                problem: "the run is not a shard: it was made without --shard".to_owned(),
+            });
         };
         Ok(Self {
             shard: shard.parse()?,

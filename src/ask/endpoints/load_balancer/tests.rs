@@ -75,14 +75,15 @@ async fn an_endless_stated_wait_is_no_panic() {
     }
 }
 
+fn best(affinity: u64, replicas: &[usize]) -> usize {
+    *replicas
+        .iter()
+        .max_by_key(|index| rendezvous_weight(affinity, **index))
+        .unwrap()
+}
+
 #[test]
 fn removing_a_replica_moves_only_its_images() {
-    let best = |affinity, replicas: &[usize]| {
-        *replicas
-            .iter()
-            .max_by_key(|index| rendezvous_weight(affinity, **index))
-            .unwrap()
-    };
     for image in 0..1000 {
         let before = best(image, &[0, 1, 2, 3]);
         if before != 2 {

@@ -11,10 +11,9 @@ fn unlimited() -> Gate {
 }
 
 fn per_minute(requests: Option<u32>, tokens: Option<u32>) -> Quota {
-    let number = |number: Option<u32>| number.and_then(NonZeroU32::new);
     Quota {
-        requests: number(requests),
-        tokens: number(tokens),
+        requests: requests.and_then(NonZeroU32::new),
+        tokens: tokens.and_then(NonZeroU32::new),
     }
 }
 
@@ -37,14 +36,13 @@ async fn an_unlimited_gate_causes_no_delay() {
 async fn waiting_requests_respect_a_second_pause() {
     let gate = Arc::new(unlimited());
     let start = Instant::now();
-    let refused = |seconds| gate.record_rate_limited(start, Some(Duration::from_secs(seconds)));
-    refused(1);
+    gate.record_rate_limited(start, Some(Duration::from_secs(1)));
     let waiting = tokio::spawn({
         let gate = gate.clone();
         async move { gate.pass().await }
     });
     tokio::time::sleep(Duration::from_millis(900)).await;
-    refused(4);
+    gate.record_rate_limited(start, Some(Duration::from_secs(4)));
     waiting.await.unwrap();
     assert!(start.elapsed() >= Duration::from_millis(4900));
     // A request that is dropped while it waits changes nothing.
@@ -97,9 +95,12 @@ async fn implausible_numbers_do_not_stop_the_run() {
     assert!(passed.is_ok(), "a wait beyond the clock's range is ignored");
 }
 
+fn bucket(rate: f64, store: f64) -> Limit {
+    Limit::Bucket { rate, store }
+}
+
 #[tokio::test(start_paused = true)]
 async fn unknown_limits_are_learned() {
-    let bucket = |rate, store| Limit::Bucket { rate, store };
     // Ideal time in seconds, maximum ratio to it, and maximum number of refusals.
     for (limit, wait, items, ideal, max_ratio, max_refused) in [
         (
@@ -156,11 +157,11 @@ async fn unknown_limits_are_learned() {
 #[tokio::test(start_paused = true)]
 async fn random_refusals_cause_no_slowdown() {
     for seed in 0..5 {
-        let simulate_share = |share| {
+        let [with, without] = [0.05, 0.0].map(|share| {
             let limit = Limit::Random(share);
             simulate(limit, StatedWait::None, 300, Quota::default(), seed)
-        };
-        let (with, without) = (simulate_share(0.05).await, simulate_share(0.0).await);
+        });
+        let (with, without) = (with.await, without.await);
         assert_eq!(without.refused, 0);
         assert!(with.refused > 5, "{}", with.refused);
         let slowdown = with.seconds / without.seconds;
@@ -203,6 +204,15 @@ async fn no_minute_has_more_requests_than_the_quota() {
     }
 }
 
+/// Tokens of the requests within a minute from `first`.
+fn tokens_in_minute(used: &[(Instant, u64)], first: Instant) -> u64 {
+    used.iter()
+        .filter(|(sent, _)| *sent >= first)
+        .filter(|(sent, _)| *sent - first < Duration::from_mins(1))
+        .map(|(_, tokens)| tokens)
+        .sum()
+}
+
 #[tokio::test(start_paused = true)]
 async fn no_minute_has_more_tokens_than_the_quota() {
     let gate = Arc::new(Gate::new(per_minute(None, Some(60_000))));
@@ -225,14 +235,11 @@ async fn no_minute_has_more_tokens_than_the_quota() {
     let start = Instant::now();
     while asking.join_next().await.is_some() {}
     let used = used.lock().unwrap().clone();
-    let within = |first: Instant| -> u64 {
-        used.iter()
-            .filter(|(sent, _)| *sent >= first)
-            .filter(|(sent, _)| *sent - first < Duration::from_mins(1))
-            .map(|(_, tokens)| tokens)
-            .sum()
-    };
-    let max = used.iter().map(|(sent, _)| within(*sent)).max().unwrap();
+    let max = used
+        .iter()
+        .map(|(sent, _)| tokens_in_minute(&used, *sent))
+        .max()
+        .unwrap();
     assert!((50_000..=60_000).contains(&max), "{max}");
     // 200 requests of 1000 tokens take 3.3 minutes; the quota of the first minute may be used at once.
     let minutes = start.elapsed().as_secs_f64() / 60.0;

@@ -263,7 +263,6 @@ pub(in crate::dataset::ready_made) fn decode_base64(text: &str) -> Option<Vec<u8
     if text.len() <= MAX_NAME_LENGTH {
         return None;
     }
-    let is_base64 = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'/' | b'=');
     if text.bytes().all(is_base64) {
         return STANDARD.decode(text).ok();
     }
@@ -271,7 +270,6 @@ pub(in crate::dataset::ready_made) fn decode_base64(text: &str) -> Option<Vec<u8
         .split_ascii_whitespace()
         .next()
         .is_some_and(|line| line.len() >= MIN_BASE64_LINE);
-    let is_base64_or_space = |byte: u8| is_base64(byte) || byte.is_ascii_whitespace();
     if !is_wrapped || !text.bytes().all(is_base64_or_space) {
         return None;
     }
@@ -280,6 +278,14 @@ pub(in crate::dataset::ready_made) fn decode_base64(text: &str) -> Option<Vec<u8
         .filter(|byte| !byte.is_ascii_whitespace())
         .collect();
     STANDARD.decode(unwrapped).ok()
+}
+
+fn is_base64(byte: u8) -> bool {
+    byte.is_ascii_alphanumeric() || matches!(byte, b'+' | b'/' | b'=')
+}
+
+fn is_base64_or_space(byte: u8) -> bool {
+    is_base64(byte) || byte.is_ascii_whitespace()
 }
 
 #[cfg(test)]

@@ -38,18 +38,25 @@ impl ConversationPaths {
         let Cell::List(turns) = &*cell else {
             return None;
         };
-        let first_turn = |roles: &[&str], start: usize| {
-            let (index, turn) = turns
-                .iter()
-                .enumerate()
-                .skip(start)
-                .find(|(_, turn)| has_role(turn, roles))?;
-            Some((index, format!("{column}.{index}.{}", text_path(turn)?)))
-        };
-        let (index, question) = first_turn(&ASKING, 0)?;
-        let answer = first_turn(&ANSWERING, index).map(|(_, path)| path);
+        let (index, question) = first_turn(column, turns, &ASKING, 0)?;
+        let answer = first_turn(column, turns, &ANSWERING, index).map(|(_, path)| path);
         Some(Self { question, answer })
     }
+}
+
+/// Index of the first turn from `start` that has one of the roles, and the path of its text.
+fn first_turn(
+    column: &str,
+    turns: &[Cell],
+    roles: &[&str],
+    start: usize,
+) -> Option<(usize, String)> {
+    let (index, turn) = turns
+        .iter()
+        .enumerate()
+        .skip(start)
+        .find(|(_, turn)| has_role(turn, roles))?;
+    Some((index, format!("{column}.{index}.{}", text_path(turn)?)))
 }
 
 /// True if a turn is by one of these roles.

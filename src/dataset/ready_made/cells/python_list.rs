@@ -98,6 +98,10 @@ fn parse_bare(text: &str) -> Option<(String, &str)> {
 mod tests {
     use super::*;
 
+    fn pair(name: &str, text: Option<&str>) -> (String, Option<String>) {
+        (name.to_owned(), text.map(str::to_owned))
+    }
+
     #[test]
     fn python_literals_are_parsed_and_code_is_not() {
         for (text, items) in [
@@ -112,7 +116,6 @@ mod tests {
         ] {
             assert_eq!(python_list(text).unwrap(), items, "{text}");
         }
-        let pair = |name: &str, text: Option<&str>| (name.to_owned(), text.map(str::to_owned));
         assert_eq!(
             python_dict(r#"{'A': 'it\'s', "B": 2, 'C': None}"#).unwrap(),
             [

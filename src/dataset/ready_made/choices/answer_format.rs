@@ -41,12 +41,6 @@ impl AnswerFormat {
         answer: &str,
         options: &OptionList,
     ) -> Option<usize> {
-        let option_at = |wanted: usize| {
-            options
-                .positions
-                .iter()
-                .position(|position| *position == wanted)
-        };
         let answer = answer.trim();
         match self {
             Self::Letter => {
@@ -60,7 +54,10 @@ impl AnswerFormat {
                     return None;
                 }
                 let upper = character.to_ascii_uppercase();
-                option_at((0..Choices::MOST).find(|&index| letter(index) == upper)?)
+                option_at(
+                    options,
+                    (0..Choices::MOST).find(|&index| letter(index) == upper)?,
+                )
             }
             Self::Text => {
                 let answer = normalize_text(answer);
@@ -69,8 +66,8 @@ impl AnswerFormat {
                     .iter()
                     .position(|option| normalize_text(option) == answer)
             }
-            Self::Index0 => option_at(parse_index(answer)?),
-            Self::Index1 => option_at(parse_index(answer)?.checked_sub(1)?),
+            Self::Index0 => option_at(options, parse_index(answer)?),
+            Self::Index1 => option_at(options, parse_index(answer)?.checked_sub(1)?),
         }
     }
 
@@ -87,6 +84,14 @@ impl AnswerFormat {
         }
         self.choice_index(answer, options)
     }
+}
+
+/// Index of the option with this position in its row.
+fn option_at(options: &OptionList, wanted: usize) -> Option<usize> {
+    options
+        .positions
+        .iter()
+        .position(|position| *position == wanted)
 }
 
 /// Normalizes a text for comparison: one line in lower case, without surrounding space and full stops at its end.
@@ -248,19 +253,20 @@ mod tests {
         }
     }
 
+    fn find(answers: &[&str], texts: &[&str]) -> FormatSearch {
+        let options = options(texts);
+        let rows: Vec<RowAnswer<'_>> = answers
+            .iter()
+            .map(|answer| RowAnswer {
+                answer,
+                options: &options,
+            })
+            .collect();
+        find_format(&rows)
+    }
+
     #[test]
     fn one_format_must_fit_all_rows() {
-        let find = |answers: &[&str], texts: &[&str]| {
-            let options = options(texts);
-            let rows: Vec<RowAnswer<'_>> = answers
-                .iter()
-                .map(|answer| RowAnswer {
-                    answer,
-                    options: &options,
-                })
-                .collect();
-            find_format(&rows)
-        };
         let texts = ["x", "y", "z"];
         assert_eq!(
             find(&["1", "0"], &texts),

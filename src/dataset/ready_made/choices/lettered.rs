@@ -50,10 +50,6 @@ pub(in crate::dataset::ready_made) fn find_in_question(text: &str) -> LetteredOp
     let (body, _) = split_instructions(text);
     let tail = text[body.len()..].trim();
     let marks = marks(body);
-    let begins_line = |mark: &&Mark| {
-        let before = body[..mark.start].trim_end_matches([' ', '\t']);
-        before.is_empty() || before.ends_with('\n')
-    };
     let mut found = None;
     for start in (0..marks.len()).rev() {
         if marks[start].letter != 'A' {
@@ -74,7 +70,10 @@ pub(in crate::dataset::ready_made) fn find_in_question(text: &str) -> LetteredOp
         if !are_options {
             continue;
         }
-        let are_lines = run.iter().all(begins_line);
+        let are_lines = run.iter().all(|mark| {
+            let before = body[..mark.start].trim_end_matches([' ', '\t']);
+            before.is_empty() || before.ends_with('\n')
+        });
         match &found {
             None => {
                 found = Some((run[0].start, options, rest));
@@ -123,27 +122,28 @@ fn split_options<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a s
     let Some(last) = options.pop() else {
         return Ok((options, ""));
     };
-    let unclear = || {
-        format!(
-            "it is not clear where the last option ends: {:?}; write a line break behind it, or the options in columns of their own",
-            excerpt(&last, 80)
-        )
-    };
     let (last_line, rest) = match last.split_once('\n') {
         None => (last.as_str(), ""),
         Some((line, _)) if !options.iter().any(|option| option.contains('\n')) => {
             let end = run.last().map_or(text.len(), |mark| mark.end + line.len());
             (line, text[end..].trim())
         }
-        Some(_) => return Err(unclear()),
+        Some(_) => return Err(unclear_end(&last)),
     };
     if is_instruction(last_line) && !options.iter().any(|option| is_instruction(option)) {
-        return Err(unclear());
+        return Err(unclear_end(&last));
     }
     let last_option =
         last_line.trim_end_matches(|c: char| c.is_whitespace() || c == ',' || c == ';');
     options.push(last_option.to_owned());
     Ok((options, rest))
+}
+
+fn unclear_end(last: &str) -> String {
+    format!(
+        "it is not clear where the last option ends: {:?}; write a line break behind it, or the options in columns of their own",
+        excerpt(last, 80)
+    )
 }
 
 /// True if a text has the words of an instruction how to answer.

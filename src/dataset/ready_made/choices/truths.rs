@@ -65,7 +65,7 @@ pub(in crate::dataset::ready_made) fn find_truths(
             describe_columns(table)
         ));
     }
-    let (with_options, without_options): (Vec<Item>, Vec<Item>) = items
+    let (with_options, without_options) = items
         .into_iter()
         .map(|item| {
             if letters_are_not_options(table, roles, &item) {
@@ -74,7 +74,7 @@ pub(in crate::dataset::ready_made) fn find_truths(
                 item
             }
         })
-        .partition(|item| item.options.is_some());
+        .partition::<Vec<Item>, _>(|item| item.options.is_some());
     let mut truths = Truths::default();
     answer_with_options(table, roles, format, with_options, omissions, &mut truths)?;
     answer_without_options(table, roles, without_options, omissions, &mut truths)?;
@@ -97,12 +97,12 @@ fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
             },
         )
         .collect();
-    let is_option = |answer: &String| {
-        [AnswerFormat::Letter, AnswerFormat::Text]
-            .iter()
-            .any(|format| format.choice_index(answer, options).is_some())
-    };
-    answers.iter().any(|answer| yes_no_index(answer).is_some()) && !answers.iter().any(is_option)
+    answers.iter().any(|answer| yes_no_index(answer).is_some())
+        && !answers.iter().any(|answer| {
+            [AnswerFormat::Letter, AnswerFormat::Text]
+                .iter()
+                .any(|format| format.choice_index(answer, options).is_some())
+        })
 }
 
 /// True if the table is in this program's own format, in which the answer is the text of a choice.

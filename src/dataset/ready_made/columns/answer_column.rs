@@ -215,15 +215,18 @@ fn first_difference(one: &Candidate<'_>, other: &Candidate<'_>) -> Option<usize>
 
 /// Error message for two columns with different answers in a row.
 fn differing_answers(table: &Table, item: &Item, one: &Column, other: &Column) -> String {
-    let answer_in = |column: &Column| excerpt(&answer(table, item, column).unwrap_or_default(), 60);
     format!(
         "{}: the answers of {:?} and {:?} differ, {:?} and {:?}; {} or {} says which is meant",
         table.place(item.row),
         one.name,
         other.name,
-        answer_in(one),
-        answer_in(other),
+        answer_excerpt(table, item, one),
+        answer_excerpt(table, item, other),
         map_flag(Role::Answer, &one.name, None),
         map_flag(Role::Answer, &other.name, None)
     )
+}
+
+fn answer_excerpt(table: &Table, item: &Item, column: &Column) -> String {
+    excerpt(&answer(table, item, column).unwrap_or_default(), 60)
 }

@@ -28,14 +28,21 @@ impl FamilySource {
                 return column.clone().map_or(Self::None, Self::Column);
             }
         };
-        let rows = || questions.iter().map(|question| &table.rows[question.row]);
-        let varying = columns
-            .iter()
-            .find(|column| has_several_values(rows().map(|row| column.text(row))));
+        let varying = columns.iter().find(|column| {
+            has_several_values(
+                questions
+                    .iter()
+                    .map(|question| column.text(&table.rows[question.row])),
+            )
+        });
         if let Some(column) = varying {
             return Self::Column(column.clone());
         }
-        if has_several_values(rows().map(|row| config(table, row))) {
+        if has_several_values(
+            questions
+                .iter()
+                .map(|question| config(table, &table.rows[question.row])),
+        ) {
             return Self::Configuration;
         }
         columns.first().cloned().map_or(Self::None, Self::Column)

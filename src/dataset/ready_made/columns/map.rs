@@ -179,9 +179,14 @@ mod tests {
     fn map_names_columns_by_role() {
         let map: ColumnMap = TEXT.parse().unwrap();
         assert_eq!(map.to_string(), TEXT);
-        let columns = |role| map.entry(role).unwrap().columns.clone();
-        assert_eq!(columns(Role::Image), ["pics/{bild}.png"]);
-        assert_eq!(columns(Role::Family), Vec::<String>::new());
+        assert_eq!(
+            map.entry(Role::Image).unwrap().columns.clone(),
+            ["pics/{bild}.png"]
+        );
+        assert_eq!(
+            map.entry(Role::Family).unwrap().columns.clone(),
+            Vec::<String>::new()
+        );
         assert_eq!(
             map.entry(Role::Options).unwrap().format,
             CellFormat::Split("|".into())

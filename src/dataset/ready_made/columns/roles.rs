@@ -99,8 +99,7 @@ impl Roles {
         table: &Table,
         map: &ColumnMap,
     ) -> Result<Self, String> {
-        let columns_of = |role| columns_of(table, map, role);
-        let question = columns_of(Role::Question)?;
+        let question = columns_of(table, map, Role::Question)?;
         refuse_several_questions(table, map)?;
         let question = match (question.into_iter().next(), map.entry(Role::Question)) {
             (Some(column), _) => QuestionSource::Column(column),
@@ -108,27 +107,29 @@ impl Roles {
             (None, None) => return Err(no_question(table)),
         };
         let options_entry = map.entry(Role::Options);
-        let options = columns_of(Role::Options)?;
+        let options = columns_of(table, map, Role::Options)?;
         let (option_lists, option_cells) = match options_entry {
             Some(_) if options.len() > 1 => (Vec::new(), options),
             Some(_) => (options, Vec::new()),
             None => (options, option_cells(table)),
         };
-        let evidence = columns_of(Role::Evidence)?.into_iter().next();
+        let evidence = columns_of(table, map, Role::Evidence)?.into_iter().next();
         Ok(Self {
             question,
             images: image_columns(table, map)?,
             option_lists,
             option_cells,
-            answers: columns_of(Role::Answer)?,
-            ids: columns_of(Role::Id)?,
-            hint: columns_of(Role::Hint)?.into_iter().next(),
+            answers: columns_of(table, map, Role::Answer)?,
+            ids: columns_of(table, map, Role::Id)?,
+            hint: columns_of(table, map, Role::Hint)?.into_iter().next(),
             families: match map.entry(Role::Family) {
-                Some(_) => FamilyColumns::Chosen(columns_of(Role::Family)?.into_iter().next()),
-                None => FamilyColumns::Candidates(columns_of(Role::Family)?),
+                Some(_) => {
+                    FamilyColumns::Chosen(columns_of(table, map, Role::Family)?.into_iter().next())
+                }
+                None => FamilyColumns::Candidates(columns_of(table, map, Role::Family)?),
             },
             evidence,
-            scene: columns_of(Role::Scene)?.into_iter().next(),
+            scene: columns_of(table, map, Role::Scene)?.into_iter().next(),
             in_question: match options_entry {
                 Some(entry) if entry.columns.is_empty() => OptionsInQuestion::None,
                 _ => OptionsInQuestion::Search,

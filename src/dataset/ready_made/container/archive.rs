@@ -75,7 +75,6 @@ impl Archive {
     /// # Errors
     /// If it is not a ZIP file, or an entry is a link or has a path that is absolute or leads outside.
     pub(super) fn open(path: &Path) -> Result<Self> {
-        let wrong = |problem: String| Error::data(path.display(), problem);
         let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
         let remaining = Arc::new(AtomicU64::new(MAX_DIRECTORY_BYTES));
         let bounded = BoundedFile {
@@ -85,20 +84,29 @@ impl Archive {
         let opened = ZipArchive::new(BufReader::new(bounded));
         let count = opened.as_ref().map_or(0, ZipArchive::len);
         if count > MAX_ENTRIES || remaining.load(Ordering::Relaxed) == 0 {
-            return Err(wrong(format!(
-                "more than {MAX_ENTRIES} entries, which are not read; unpack it, and name its folder"
-            )));
+            return Err(Error::data(
+                path.display(),
+                format_args!(
+                    "more than {MAX_ENTRIES} entries, which are not read; unpack it, and name its folder"
+                ),
+            ));
         }
-        let mut zip = opened.map_err(|e| wrong(format!("not a whole ZIP file: {e}")))?;
+        let mut zip = opened
+            .map_err(|e| Error::data(path.display(), format_args!("not a whole ZIP file: {e}")))?;
         remaining.store(u64::MAX, Ordering::Relaxed);
         let mut indices = BTreeMap::new();
         for index in 0..zip.len() {
-            let entry = zip.by_index_raw(index).map_err(|e| wrong(e.to_string()))?;
+            let entry = zip
+                .by_index_raw(index)
+                .map_err(|e| Error::data(path.display(), e))?;
             let name = entry.name().to_owned();
             if entry.is_symlink() || !is_inside(&name) {
-                return Err(wrong(format!(
-                    "the entry {name:?} leads out of the file, or is a link; such files are not read"
-                )));
+                return Err(Error::data(
+                    path.display(),
+                    format_args!(
+                        "the entry {name:?} leads out of the file, or is a link; such files are not read"
+                    ),
+                ));
             }
             if entry.is_file() {
                 indices.insert(name, index);

@@ -65,27 +65,31 @@ fn parse_config(config: &Yaml) -> Result<Config, String> {
     if !matches!(config, Yaml::Fields(_)) {
         return Err("configs holds something other than mappings".to_owned());
     }
-    let text = |name: &str| match config.field(name) {
-        None | Some(Yaml::Nothing) => Ok(String::new()),
-        Some(Yaml::Text(text)) => Ok(text.clone()),
-        Some(_) => Err(format!("{name} is not a text")),
-    };
-    let name = match text("config_name")? {
+    let name = match text_field(config, "config_name")? {
         name if name.is_empty() => "default".to_owned(),
         name => name,
     };
     let with_name = |problem: String| format!("configuration {name:?}: {problem}");
     Ok(Config {
-        is_default: text("default")
+        is_default: text_field(config, "default")
             .map_err(with_name)?
             .eq_ignore_ascii_case("true"),
-        folder: text("data_dir").map_err(with_name)?,
+        folder: text_field(config, "data_dir").map_err(with_name)?,
         files: match config.field("data_files") {
             None | Some(Yaml::Nothing) => None,
             Some(files) => Some(parse_data_files(files).map_err(with_name)?),
         },
         name,
     })
+}
+
+/// A text field; empty if it is absent.
+fn text_field(config: &Yaml, name: &str) -> Result<String, String> {
+    match config.field(name) {
+        None | Some(Yaml::Nothing) => Ok(String::new()),
+        Some(Yaml::Text(text)) => Ok(text.clone()),
+        Some(_) => Err(format!("{name} is not a text")),
+    }
 }
 
 /// Parses the value of `data_files`.
@@ -160,15 +164,18 @@ mod tests {
         }
     }
 
-    #[test]
-    fn configs_of_cards_are_parsed() {
-        let card = "---\nlicense: mit\nconfigs:\n- config_name: Full\n  data_files:\n  - split: adversarial\n    path: Full/adversarial-*\n  - split: popular\n    path: \"Full/popular-*\"\n- config_name: default\n  default: true\n  data_files:\n  - split: test\n    path:\n    - data/a.parquet\n    - 'data/b: c.parquet'\n- config_name: one\n  data_files: one/*.csv\n- config_name: two\n  data_files: [\"x.csv\", y.csv]\ndataset_info:\n- config_name: none\n---\n# text\n- config_name: no\n";
-        let config = |name: &str, is_default, files: Vec<SplitPattern>| Config {
+    fn config(name: &str, is_default: bool, files: Vec<SplitPattern>) -> Config {
+        Config {
             name: name.to_owned(),
             is_default,
             folder: String::new(),
             files: Some(files),
-        };
+        }
+    }
+
+    #[test]
+    fn configs_of_cards_are_parsed() {
+        let card = "---\nlicense: mit\nconfigs:\n- config_name: Full\n  data_files:\n  - split: adversarial\n    path: Full/adversarial-*\n  - split: popular\n    path: \"Full/popular-*\"\n- config_name: default\n  default: true\n  data_files:\n  - split: test\n    path:\n    - data/a.parquet\n    - 'data/b: c.parquet'\n- config_name: one\n  data_files: one/*.csv\n- config_name: two\n  data_files: [\"x.csv\", y.csv]\ndataset_info:\n- config_name: none\n---\n# text\n- config_name: no\n";
         let expected = [
             config(
                 "Full",
@@ -199,26 +206,28 @@ mod tests {
         }
     }
 
+    fn first_config(config: &str) -> Result<Config, String> {
+        let card = format!("---\nlicense: mit\nconfigs:\n{config}tags:\n- x\n---\n");
+        parse_configs(&card).map(|mut configs| configs.remove(0))
+    }
+
     #[test]
     fn splits_may_be_field_names() {
-        let first = |config: &str| {
-            let card = format!("---\nlicense: mit\nconfigs:\n{config}tags:\n- x\n---\n");
-            parse_configs(&card).map(|mut configs| configs.remove(0))
-        };
-        let found = first("  - config_name: a\n    data_files:\n      test: data/test-*\n      train:\n      - x.csv\n      - y.csv\n").unwrap();
+        let found = first_config("  - config_name: a\n    data_files:\n      test: data/test-*\n      train:\n      - x.csv\n      - y.csv\n").unwrap();
         let files = vec![
             file("test", "data/test-*"),
             file("train", "x.csv"),
             file("train", "y.csv"),
         ];
         assert_eq!(found.files, Some(files));
-        let found = first("- data_files: {test: \"data/*.csv\"}\n  data_dir: inner\n").unwrap();
+        let found =
+            first_config("- data_files: {test: \"data/*.csv\"}\n  data_dir: inner\n").unwrap();
         assert_eq!(
             (found.name.as_str(), found.folder.as_str()),
             ("default", "inner")
         );
         assert_eq!(found.files, Some(vec![file("test", "data/*.csv")]));
-        let found = first("- config_name: a\n  data_dir: inner\n").unwrap();
+        let found = first_config("- config_name: a\n  data_dir: inner\n").unwrap();
         assert_eq!(found.files, None);
         for wrong in [
             "- config_name: a\n  data_files:\n  - split: test\n",
@@ -227,7 +236,7 @@ mod tests {
             "- a\n",
             "  a: b\n",
         ] {
-            assert!(first(wrong).is_err(), "{wrong}");
+            assert!(first_config(wrong).is_err(), "{wrong}");
         }
     }
 }

@@ -107,21 +107,13 @@ fn files_by_card(
     wanted: Option<&str>,
 ) -> Result<Vec<Candidate>> {
     let names: Vec<&str> = configs.iter().map(|config| config.name.as_str()).collect();
-    let find_config = |name: &str| configs.iter().find(|config| config.name == name);
-    let default = || match configs {
-        [only] => Some(only),
-        _ => configs
-            .iter()
-            .find(|config| config.is_default)
-            .or_else(|| find_config("default")),
-    };
     let chosen: Vec<&Config> = match wanted {
         Some("all") => configs.iter().collect(),
-        Some(name) => vec![find_config(name).ok_or_else(|| {
+        Some(name) => vec![find_config(configs, name).ok_or_else(|| {
             let problem = format_args!("no configuration {name:?}; there are {}", names.join(", "));
             Error::usage("--read config", problem)
         })?],
-        None => vec![default().ok_or_else(|| {
+        None => vec![default_config(configs).ok_or_else(|| {
             let problem = format_args!(
                 "{} configurations, {}; --read config=NAME names one, --read config=all takes them together",
                 names.len(),
@@ -151,6 +143,20 @@ fn files_by_card(
         }
     }
     Ok(candidates)
+}
+
+fn find_config<'a>(configs: &'a [Config], name: &str) -> Option<&'a Config> {
+    configs.iter().find(|config| config.name == name)
+}
+
+fn default_config(configs: &[Config]) -> Option<&Config> {
+    match configs {
+        [only] => Some(only),
+        _ => configs
+            .iter()
+            .find(|config| config.is_default)
+            .or_else(|| find_config(configs, "default")),
+    }
 }
 
 /// Files of a configuration with the name of their split in the card, which may be empty.
@@ -188,14 +194,18 @@ fn files_of_config(
 
 /// Files that match a pattern of the card.
 fn matching_files(tree: &Tree, pattern: &str, files: &[PathBuf]) -> Result<Vec<PathBuf>> {
-    let wrong = |problem: String| Error::data(tree.full_path(Path::new(CARD)).display(), problem);
     if pattern.split('/').any(|part| part == "..") || pattern.starts_with('/') {
-        return Err(wrong(format!(
-            "the files {pattern:?} lie outside the folder of the card"
-        )));
+        return Err(card_error(
+            tree,
+            format_args!("the files {pattern:?} lie outside the folder of the card"),
+        ));
     }
-    let glob = Pattern::new(pattern.trim_start_matches("./"))
-        .map_err(|e| wrong(format!("the files {pattern:?}: not a pattern: {e}")))?;
+    let glob = Pattern::new(pattern.trim_start_matches("./")).map_err(|e| {
+        card_error(
+            tree,
+            format_args!("the files {pattern:?}: not a pattern: {e}"),
+        )
+    })?;
     let options = MatchOptions {
         require_literal_separator: true,
         ..MatchOptions::default()
@@ -206,11 +216,16 @@ fn matching_files(tree: &Tree, pattern: &str, files: &[PathBuf]) -> Result<Vec<P
         .cloned()
         .collect();
     if matching.is_empty() {
-        return Err(wrong(format!(
-            "no file {pattern:?} beside it; download the whole repository"
-        )));
+        return Err(card_error(
+            tree,
+            format_args!("no file {pattern:?} beside it; download the whole repository"),
+        ));
     }
     Ok(matching)
+}
+
+fn card_error(tree: &Tree, problem: impl std::fmt::Display) -> Error {
+    Error::data(tree.full_path(Path::new(CARD)).display(), problem)
 }
 
 fn is_metadata(path: &Path) -> bool {
@@ -223,14 +238,15 @@ fn is_metadata(path: &Path) -> bool {
 /// # Errors
 /// If there are no files, or files of several kinds.
 fn files_by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
-    let (metadata, others): (Vec<PathBuf>, Vec<PathBuf>) =
-        files.into_iter().partition(|path| is_metadata(path));
+    let (metadata, others) = files
+        .into_iter()
+        .partition::<Vec<PathBuf>, _>(|path| is_metadata(path));
     if !metadata.is_empty() {
         return require_one_kind(tree, metadata);
     }
-    let (parquet, others): (Vec<PathBuf>, Vec<PathBuf>) = others
+    let (parquet, others) = others
         .into_iter()
-        .partition(|path| extension(path) == "parquet");
+        .partition::<Vec<PathBuf>, _>(|path| extension(path) == "parquet");
     if !parquet.is_empty() {
         return Ok(parquet);
     }

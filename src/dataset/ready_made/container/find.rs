@@ -143,14 +143,17 @@ fn files_at(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
 
 /// Files that match a pattern.
 fn matching_files(place: &Path, text: &str) -> Result<FoundFiles> {
-    let wrong = |problem: String| Error::usage("--data", format_args!("{text}: {problem}"));
-    let paths = glob::glob(text).map_err(|e| wrong(format!("not a pattern: {e}")))?;
+    let paths = glob::glob(text)
+        .map_err(|e| Error::usage("--data", format_args!("{text}: not a pattern: {e}")))?;
     let files: Vec<PathBuf> = paths
         .filter_map(std::result::Result::ok)
         .filter(|path| path.is_file())
         .collect();
     if files.is_empty() {
-        return Err(wrong("no file has such a name".to_owned()));
+        return Err(Error::usage(
+            "--data",
+            format_args!("{text}: no file has such a name"),
+        ));
     }
     check_shards(&files)?;
     let folder = place

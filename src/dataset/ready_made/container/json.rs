@@ -157,15 +157,8 @@ fn push_value(
     table: &mut Table,
 ) -> Result<(), String> {
     let fields = parse_object(value, number)?;
-    let place = |inner| RowPlace::Json {
-        offset: value.offset,
-        length: value.bytes.len(),
-        number,
-        unit: JsonUnit::Object,
-        inner,
-    };
     let Some(list) = inner else {
-        return push_row(table, place(None), fields, None);
+        return push_row(table, object_place(value, number, None), fields, None);
     };
     let name: Arc<str> = list.into();
     let mut outer = fields;
@@ -178,10 +171,20 @@ fn push_value(
                 "object {number}: {list:?} is not a list of objects"
             ));
         };
-        let place = place(Some(Box::new((index, Arc::clone(&name)))));
+        let place = object_place(value, number, Some(Box::new((index, Arc::clone(&name)))));
         push_row(table, place, row, Some(&outer))?;
     }
     Ok(())
+}
+
+fn object_place(value: &JsonValue, number: u64, inner: Option<Box<(usize, Arc<str>)>>) -> RowPlace {
+    RowPlace::Json {
+        offset: value.offset,
+        length: value.bytes.len(),
+        number,
+        unit: JsonUnit::Object,
+        inner,
+    }
 }
 
 /// Parses a value that must be an object; `number` is its position, counted from 1.
@@ -281,11 +284,7 @@ pub(super) fn cell(
     inner: Option<(usize, &str)>,
     column: &str,
 ) -> Result<Cell> {
-    let unreadable = |e| Error::file(path, "read", e);
-    let mut file = reading::open(path).map_err(unreadable)?;
-    file.seek(SeekFrom::Start(offset)).map_err(unreadable)?;
-    let mut bytes = vec![0; length];
-    file.read_exact(&mut bytes).map_err(unreadable)?;
+    let bytes = read_range(path, offset, length).map_err(|e| Error::file(path, "read", e))?;
     let value: Value = serde_json::from_slice(&bytes).map_err(|e| {
         Error::data(
             path.display(),
@@ -296,4 +295,12 @@ pub(super) fn cell(
         .and_then(|(index, list)| value.get(list)?.get(index)?.get(column))
         .or_else(|| value.get(column));
     Ok(cell.cloned().map_or(Cell::Absent, Cell::from))
+}
+
+fn read_range(path: &Path, offset: u64, length: usize) -> std::io::Result<Vec<u8>> {
+    let mut file = reading::open(path)?;
+    file.seek(SeekFrom::Start(offset))?;
+    let mut bytes = vec![0; length];
+    file.read_exact(&mut bytes)?;
+    Ok(bytes)
 }

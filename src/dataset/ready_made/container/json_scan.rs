@@ -300,7 +300,7 @@ mod tests {
 
     #[test]
     fn invalid_json_is_refused() {
-        for (text, says) in [
+        for (text, message) in [
             (r#"{"items": [1, 2"#, "the file ends at byte"),
             (r#"{"items": ["abc"#, "inside a value"),
             (r#"{"items" 1}"#, "':' is expected"),
@@ -313,7 +313,7 @@ mod tests {
             ),
         ] {
             let problem = items(text, 4).unwrap_err();
-            assert!(problem.contains(says), "{text}: {problem}");
+            assert!(problem.contains(message), "{text}: {problem}");
         }
     }
 }

@@ -11,7 +11,7 @@ use std::sync::{Arc, OnceLock};
 use parquet::basic::Compression;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::{ByteArray, ByteArrayType};
-use parquet::errors::ParquetError;
+
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
@@ -103,7 +103,7 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
         }
         table.push(place, cells)
     };
-    let read_rows = || {
+    guarded(|| {
         let reader = SerializedFileReader::new(file).map_err(|e| e.to_string())?;
         let mut number = 0;
         for group in 0..reader.num_row_groups() {
@@ -119,8 +119,8 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
             }
         }
         Ok(())
-    };
-    guarded(read_rows).map_err(|problem| match too_long {
+    })
+    .map_err(|problem| match too_long {
         Some((row, problem)) => Error::data(format_args!("{}, {row}", path.display()), problem),
         None => corrupt_file(path, &problem),
     })
@@ -175,7 +175,6 @@ fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
 
 /// Converts a Parquet value to a cell. NaN is an absent cell; types without a cell of their own become text.
 fn convert_field(field: Field) -> Cell {
-    let number = |text: String| Cell::Number(text.into());
     match field {
         Field::Null => Cell::Absent,
         Field::Bool(is_true) => Cell::Bool(is_true),
@@ -183,16 +182,16 @@ fn convert_field(field: Field) -> Cell {
         Field::Bytes(bytes) => Cell::Bytes(bytes.data().into()),
         Field::Float(value) if value.is_nan() => Cell::Absent,
         Field::Double(value) if value.is_nan() => Cell::Absent,
-        Field::Float(value) => number(value.to_string()),
-        Field::Double(value) => number(value.to_string()),
-        Field::Byte(value) => number(value.to_string()),
-        Field::Short(value) => number(value.to_string()),
-        Field::Int(value) => number(value.to_string()),
-        Field::Long(value) => number(value.to_string()),
-        Field::UByte(value) => number(value.to_string()),
-        Field::UShort(value) => number(value.to_string()),
-        Field::UInt(value) => number(value.to_string()),
-        Field::ULong(value) => number(value.to_string()),
+        Field::Float(value) => number(&value),
+        Field::Double(value) => number(&value),
+        Field::Byte(value) => number(&value),
+        Field::Short(value) => number(&value),
+        Field::Int(value) => number(&value),
+        Field::Long(value) => number(&value),
+        Field::UByte(value) => number(&value),
+        Field::UShort(value) => number(&value),
+        Field::UInt(value) => number(&value),
+        Field::ULong(value) => number(&value),
         Field::Group(record) => Cell::Fields(
             record
                 .into_columns()
@@ -205,6 +204,10 @@ fn convert_field(field: Field) -> Cell {
         }
         other => Cell::Text(other.to_string()),
     }
+}
+
+fn number(value: &impl ToString) -> Cell {
+    Cell::Number(value.to_string().into())
 }
 
 /// Reader of one leaf column of a row group. It keeps its position between calls, because the next image is usually a few rows ahead.
@@ -261,8 +264,9 @@ impl Cursor {
 
     /// Reads the value of a row, or one item if the column is a list, and moves past the row.
     fn read_value(&mut self, row: usize, item: usize) -> Result<Vec<u8>, String> {
-        let message = |e: ParquetError| e.to_string();
-        self.reader.skip_records(row - self.next).map_err(message)?;
+        self.reader
+            .skip_records(row - self.next)
+            .map_err(|e| e.to_string())?;
         self.next = row + 1;
         let (mut definitions, mut repetitions) = (Vec::new(), Vec::new());
         let mut values: Vec<ByteArray> = Vec::new();
@@ -273,7 +277,7 @@ impl Cursor {
                 Some(&mut repetitions),
                 &mut values,
             )
-            .map_err(message)?;
+            .map_err(|e| e.to_string())?;
         let item = if self.is_list { item } else { 0 };
         if definitions
             .get(item)
@@ -316,7 +320,7 @@ pub(super) fn bytes(
         Step::Item(at) => Some(*at),
         Step::Field(_) => None,
     });
-    let read = || {
+    guarded(|| {
         let columns = footer
             .row_groups()
             .get(group)
@@ -343,8 +347,8 @@ pub(super) fn bytes(
             .and_then(|items| items.into_iter().nth(item))
             .map(String::into_bytes)
             .ok_or_else(|| "the value is gone".to_owned())
-    };
-    guarded(read).map_err(|problem| corrupt_file(path, &problem))
+    })
+    .map_err(|problem| corrupt_file(path, &problem))
 }
 
 /// Index of the first leaf column under `column` whose path has the fields of `steps` in their order, the last one at its end; any leaf

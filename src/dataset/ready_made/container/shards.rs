@@ -62,14 +62,15 @@ pub(super) fn single_shard_note(path: &Path) -> Option<String> {
 mod tests {
     use super::*;
 
+    fn files(numbers: &[usize]) -> Vec<PathBuf> {
+        numbers
+            .iter()
+            .map(|n| PathBuf::from(format!("d/test-0000{n}-of-00003.jsonl.gz")))
+            .collect::<Vec<PathBuf>>()
+    }
+
     #[test]
     fn missing_shard_is_an_error() {
-        let files = |numbers: &[usize]| {
-            numbers
-                .iter()
-                .map(|n| PathBuf::from(format!("d/test-0000{n}-of-00003.jsonl.gz")))
-                .collect::<Vec<PathBuf>>()
-        };
         assert!(check_shards(&files(&[0, 1, 2])).is_ok());
         let problem = check_shards(&files(&[0, 2])).unwrap_err().to_string();
         assert!(

@@ -42,8 +42,10 @@ pub(super) fn split_in_name(path: &Path) -> String {
 
 /// The usual word for a split; the name itself if there is none.
 fn usual_word(name: &str) -> &str {
-    let known = SPLIT_WORDS.iter().find(|(word, _)| *word == name);
-    known.map_or(name, |(_, usual)| usual)
+    SPLIT_WORDS
+        .iter()
+        .find(|(word, _)| *word == name)
+        .map_or(name, |(_, usual)| usual)
 }
 
 /// Files of the wanted split, or of all splits for `all`. The default is the only split, or `test` if several exist.
@@ -91,10 +93,6 @@ pub(super) fn choose_split(
 /// Lists the splits with their numbers of rows, such as `test (rows: 1000)`. Rows are counted for Parquet files in a folder, which have
 /// the count in their footer; other splits get the number of files.
 fn list_splits(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
-    let rows = |file: &&Path| match (tree, &*extension(file)) {
-        (Tree::Folder { .. }, "parquet") => parquet::count(&tree.full_path(file)).ok(),
-        _ => None,
-    };
     splits
         .iter()
         .map(|(split, files)| {
@@ -103,7 +101,13 @@ fn list_splits(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
             } else {
                 split
             };
-            let counts: Option<u64> = files.iter().map(rows).sum();
+            let counts: Option<u64> = files
+                .iter()
+                .map(|file| match (tree, &*extension(file)) {
+                    (Tree::Folder { .. }, "parquet") => parquet::count(&tree.full_path(file)).ok(),
+                    _ => None,
+                })
+                .sum();
             match counts {
                 Some(rows) => format!("{name} (rows: {rows})"),
                 None => format!("{name} (files: {})", files.len()),

@@ -143,16 +143,19 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
 
 /// Reads one whole cell, given the position of its record and the name of its column.
 pub(super) fn cell(path: &Path, delimiter: u8, position: &Position, column: &str) -> Result<Cell> {
-    let file_error = |e: csv::Error| Error::data(path.display(), e);
     let mut reader = open_reader(path, delimiter)?;
     let index = reader
         .byte_headers()
-        .map_err(file_error)?
+        .map_err(|e| Error::data(path.display(), e))?
         .iter()
         .position(|name| name.trim_ascii() == column.as_bytes());
     let mut record = ByteRecord::new();
-    reader.seek(position.clone()).map_err(file_error)?;
-    reader.read_byte_record(&mut record).map_err(file_error)?;
+    reader
+        .seek(position.clone())
+        .map_err(|e| Error::data(path.display(), e))?;
+    reader
+        .read_byte_record(&mut record)
+        .map_err(|e| Error::data(path.display(), e))?;
     let cell = index
         .and_then(|index| record.get(index))
         .unwrap_or_default();

@@ -30,10 +30,6 @@ impl Tree {
     /// If the cache does not name a snapshot.
     pub(super) fn from_folder(place: &Path) -> Result<Self> {
         let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
-        let is_cached_repository = |path: &Path| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            name.starts_with("datasets--")
-        };
         if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
             let repository = canonical
                 .ancestors()
@@ -120,6 +116,11 @@ impl Tree {
     }
 }
 
+fn is_cached_repository(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with("datasets--")
+}
+
 /// Scan of a folder and its subfolders.
 struct Scan {
     /// Folders that links may lead into.
@@ -159,34 +160,37 @@ mod tests {
     #[test]
     fn links_out_are_skipped() {
         let outer = tempfile::tempdir().unwrap();
-        let at = |name: &str| outer.path().join(name);
-        fs::create_dir_all(at("set/inner")).unwrap();
+        let root = outer.path();
+        fs::create_dir_all(root.join("set/inner")).unwrap();
         for name in ["secret.csv", "set/a.csv", "set/.hidden.csv"] {
-            fs::write(at(name), "a").unwrap();
+            fs::write(root.join(name), "a").unwrap();
         }
-        std::os::unix::fs::symlink(at("secret.csv"), at("set/b.csv")).unwrap();
-        std::os::unix::fs::symlink(at("set/a.csv"), at("set/inner/c.csv")).unwrap();
-        std::os::unix::fs::symlink(at("nothing.csv"), at("set/d.csv")).unwrap();
-        let (files, outside) = Tree::from_folder(&at("set")).unwrap().files().unwrap();
+        std::os::unix::fs::symlink(root.join("secret.csv"), root.join("set/b.csv")).unwrap();
+        std::os::unix::fs::symlink(root.join("set/a.csv"), root.join("set/inner/c.csv")).unwrap();
+        std::os::unix::fs::symlink(root.join("nothing.csv"), root.join("set/d.csv")).unwrap();
+        let (files, outside) = Tree::from_folder(&root.join("set"))
+            .unwrap()
+            .files()
+            .unwrap();
         assert_eq!(files, [Path::new("a.csv"), Path::new("inner/c.csv")]);
-        assert_eq!(outside, [at("set/b.csv"), at("set/d.csv")]);
+        assert_eq!(outside, [root.join("set/b.csv"), root.join("set/d.csv")]);
     }
 
     #[cfg(unix)]
     #[test]
     fn links_into_hub_cache_are_followed() {
         let outer = tempfile::tempdir().unwrap();
-        let at = |name: &str| outer.path().join("datasets--a--b").join(name);
-        fs::create_dir_all(at("snapshots/1")).unwrap();
-        std::os::unix::fs::symlink("../../blobs/f00", at("snapshots/1/a.csv")).unwrap();
+        let root = outer.path().join("datasets--a--b");
+        fs::create_dir_all(root.join("snapshots/1")).unwrap();
+        std::os::unix::fs::symlink("../../blobs/f00", root.join("snapshots/1/a.csv")).unwrap();
         let found = || {
-            let tree = Tree::from_folder(&at("snapshots/1")).unwrap();
+            let tree = Tree::from_folder(&root.join("snapshots/1")).unwrap();
             tree.files().unwrap()
         };
         // The link leads nowhere until its file is downloaded.
-        assert_eq!(found(), (Vec::new(), vec![at("snapshots/1/a.csv")]));
-        fs::create_dir(at("blobs")).unwrap();
-        fs::write(at("blobs/f00"), "a").unwrap();
+        assert_eq!(found(), (Vec::new(), vec![root.join("snapshots/1/a.csv")]));
+        fs::create_dir(root.join("blobs")).unwrap();
+        fs::write(root.join("blobs/f00"), "a").unwrap();
         assert_eq!(found(), (vec!["a.csv".into()], Vec::new()));
     }
 }

@@ -107,10 +107,13 @@ mod tests {
         Yaml::Text(text.to_owned())
     }
 
+    fn field(name: &str, value: Yaml) -> (String, Yaml) {
+        (name.to_owned(), value)
+    }
+
     #[test]
     fn parses_block_and_flow_style() {
         let read = value("- name: 'it''s' # what\n  files:\n  - a: 1\n    b: [x, \"y, z\"]\n  - c\n- {d: e, f: [g]}\n-\n  - h\n").unwrap();
-        let field = |name: &str, value| (name.to_owned(), value);
         let expected = Yaml::List(vec![
             Yaml::Fields(vec![
                 field("name", text("it's")),

@@ -76,7 +76,6 @@ impl FromStr for SkipBad {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let expected = || "a share of the rows expected, as 20%".to_owned();
         if text == "skip" {
             return Ok(Self::default());
         }
@@ -86,7 +85,7 @@ impl FromStr for SkipBad {
             .strip_suffix('%')
             .unwrap_or(share)
             .parse()
-            .map_err(|_| expected())?;
+            .map_err(|_| "a share of the rows expected, as 20%")?;
         if !(0.0..=100.0).contains(&share) {
             return Err("a share from 0% to 100% expected".to_owned());
         }

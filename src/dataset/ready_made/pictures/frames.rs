@@ -193,7 +193,6 @@ impl<'a> Frames<'a> {
 
     /// Finds an image that a row refers to.
     fn locate(&self, row: usize, image: RowImage) -> Result<LocatedImage> {
-        let row_error = |problem| Error::data(self.table.place(row), problem);
         match image {
             RowImage::Embedded {
                 column,
@@ -205,20 +204,26 @@ impl<'a> Frames<'a> {
                 steps,
                 facts,
             }),
-            RowImage::File(path) => self
-                .file(row, &path)
-                .map_err(|problem| row_error(self.explain_path_error(row, &path, problem))),
+            RowImage::File(path) => self.file(row, &path).map_err(|problem| {
+                Error::data(
+                    self.table.place(row),
+                    self.explain_path_error(row, &path, problem),
+                )
+            }),
             RowImage::Frame(name) => Ok(LocatedImage::Frame(FrameId(name))),
             RowImage::RowOrFile(text) => match self.image_of_row(row, &text) {
                 Some(image) => Ok(image),
                 None => self.file(row, &text).map_err(|problem| {
                     let problem = self.explain_path_error(row, &text, problem);
                     let is_number = text.bytes().all(|byte| byte.is_ascii_digit());
-                    row_error(if is_number {
-                        format!("{problem}; and no row with an image has the id {text}")
-                    } else {
-                        problem
-                    })
+                    Error::data(
+                        self.table.place(row),
+                        if is_number {
+                            format!("{problem}; and no row with an image has the id {text}")
+                        } else {
+                            problem
+                        },
+                    )
                 }),
             },
         }
@@ -375,10 +380,12 @@ const MAX_PATH_LENGTH: usize = 200;
 
 /// Replaces the error for a path if the text is damaged base64 or too long for a path. Long texts are not repeated in the message.
 fn explain_non_path(text: &str, problem: String) -> String {
-    let is_base64 = |c: char| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace();
     let length = text.chars().count();
     let start = excerpt(text, 24);
-    let is_long = length > MAX_NAME_LENGTH && text.chars().all(is_base64);
+    let is_long = length > MAX_NAME_LENGTH
+        && text
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace());
     if text.starts_with("data:") || is_long {
         format!(
             "its image is base64 that is cut or damaged ({length} characters, {start:?}); --skip bad leaves such rows out"

@@ -66,8 +66,10 @@ pub(in crate::dataset::ready_made) fn images(row: &Row, roles: &Roles) -> Vec<Ro
             for column in columns {
                 let mut in_column = Vec::new();
                 add_column_images(row, column, &mut in_column);
-                let is_embedded = |image: &RowImage| matches!(image, RowImage::Embedded { .. });
-                if in_column.iter().any(is_embedded) {
+                if in_column
+                    .iter()
+                    .any(|image| matches!(image, RowImage::Embedded { .. }))
+                {
                     return in_column;
                 }
                 if found.is_empty() {
@@ -107,7 +109,6 @@ fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowIma
     if cell.is_absent() {
         return;
     }
-    let with = |step: Step| [steps, &[step]].concat();
     match cell {
         Cell::File(facts) => found.push(RowImage::Embedded {
             column,
@@ -116,7 +117,7 @@ fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowIma
         }),
         Cell::List(cells) => {
             for (index, cell) in cells.iter().enumerate() {
-                add_images(cell, column, &with(Step::Item(index)), found);
+                add_images(cell, column, &with_step(steps, Step::Item(index)), found);
             }
         }
         Cell::Fields(_) => {
@@ -125,13 +126,22 @@ fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowIma
                 .filter_map(|name| Some((name, cell.field(name)?)))
                 .find(|(_, cell)| !cell.is_absent());
             if let Some((name, cell)) = field {
-                add_images(cell, column, &with(Step::Field(name.to_owned())), found);
+                add_images(
+                    cell,
+                    column,
+                    &with_step(steps, Step::Field(name.to_owned())),
+                    found,
+                );
             }
         }
         Cell::Text(text) => add_text_images(text, column, steps, found),
         Cell::Number(text) => found.push(RowImage::RowOrFile(text.to_string())),
         Cell::Absent | Cell::Bool(_) | Cell::Bytes(_) => {}
     }
+}
+
+fn with_step(steps: &[Step], step: Step) -> Vec<Step> {
+    [steps, &[step]].concat()
 }
 
 /// Adds the images in a text: a file in base64, a list of texts, a path, or the id of a row.

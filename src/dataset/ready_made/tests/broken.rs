@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::fixture::{base64, bytes, row, set};
 use super::{open, refusal};
@@ -26,13 +26,14 @@ fn damages() -> Vec<Value> {
     ]
 }
 
+fn good(id: i64) -> Map<String, Value> {
+    row(
+        json!({"id": id, "question": "What is it?", "options": ["x", "y"], "answer": "x", "category": "c", "hint": "h", "image": base64(1)}),
+    )
+}
+
 #[test]
 fn row_with_any_damaged_column_is_handled() {
-    let good = |id: i64| {
-        row(
-            json!({"id": id, "question": "What is it?", "options": ["x", "y"], "answer": "x", "category": "c", "hint": "h", "image": base64(1)}),
-        )
-    };
     for column in [
         "id", "question", "options", "answer", "category", "hint", "image",
     ] {
@@ -98,7 +99,7 @@ fn damaged_parquet_file_is_an_error() {
 #[test]
 fn errors_in_text_files_name_the_line() {
     let (folder, _) = set("set.json", &[]);
-    for (name, content, says) in [
+    for (name, content, message) in [
         ("a.jsonl", &b"{\"id\": 1}\n{\n"[..], "a.jsonl, line 2: EOF"),
         ("a.json", b"[{\"id\": 1}, {\"id\"", "the file ends at byte"),
         ("b.json", b"3", "neither a list nor an object"),
@@ -129,17 +130,16 @@ fn errors_in_text_files_name_the_line() {
         let path = folder.path().join(name);
         fs::write(&path, content).unwrap();
         let problem = refusal(&path, &SetArgs::default());
-        assert!(problem.contains(says), "{name}: {problem}");
+        assert!(problem.contains(message), "{name}: {problem}");
     }
+}
+
+fn question(id: usize, image: &str) -> Map<String, Value> {
+    row(json!({"id": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": image}))
 }
 
 #[test]
 fn unusable_images_are_left_out_with_skip_bad() {
-    let question = |id: usize, image: &str| {
-        row(
-            json!({"id": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": image}),
-        )
-    };
     for image in ["none.png", &"QUJD".repeat(40), &"QUJD".repeat(200)[1..]] {
         let whole = base64(1);
         let rows: Vec<_> = (0..40)
@@ -162,19 +162,20 @@ fn unusable_images_are_left_out_with_skip_bad() {
     assert!(problem.len() < 400, "{problem}");
 }
 
+fn by_index(index: u8) -> Map<String, Value> {
+    row(
+        json!({"id": index, "question": "?", "options": ["x", "y"], "correct_choice_idx": index, "image": base64(1 + index)}),
+    )
+}
+
 /// As in A-OKVQA, MathVista and LLaVA's lists of conversations.
 #[test]
 fn columns_by_index_and_in_lists_are_read() {
-    let by_index = |index: u8| {
-        row(
-            json!({"id": index, "question": "?", "options": ["x", "y"], "correct_choice_idx": index, "image": base64(1 + index)}),
-        )
-    };
     let (_folder, path) = set("set.jsonl", &[by_index(0), by_index(1)]);
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions[1].choices.truth(), Some(1));
-    let said = json!([{"value": "Which? (A) x (B) y"}, {"value": "B"}]);
-    let listed = row(json!({"id": 1, "conversations": said, "image": base64(1)}));
+    let turns = json!([{"value": "Which? (A) x (B) y"}, {"value": "B"}]);
+    let listed = row(json!({"id": 1, "conversations": turns, "image": base64(1)}));
     let (_folder, path) = set("set.jsonl", &[listed]);
     let map = "question=conversations.0.value,answer=conversations.1.value";
     let args = SetArgs {
@@ -183,20 +184,17 @@ fn columns_by_index_and_in_lists_are_read() {
     };
     let dataset = open(&path, &args).unwrap();
     assert_eq!(dataset.questions[0].choices.truth(), Some(1));
-    let beside = row(
+    let with_pixels = row(
         json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": "none.png", "pixels": bytes(1)}),
     );
-    let (_folder, path) = set("set.parquet", &[beside]);
+    let (_folder, path) = set("set.parquet", &[with_pixels]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(problem.contains("image=pixels"), "{problem}");
 }
 
 #[test]
 fn outside_paths_and_invalid_images_are_errors() {
-    let question = |image: &str| {
-        row(json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": image}))
-    };
-    for (image, says) in [
+    for (image, message) in [
         ("../secret.png", "lies outside"),
         ("/etc/hostname", "lies outside"),
         ("https://example.org/0.png", "download them first"),
@@ -204,23 +202,23 @@ fn outside_paths_and_invalid_images_are_errors() {
         ("17", "no row with an image has the id 17"),
     ] {
         for form in ["tsv", "jsonl", "parquet"] {
-            let (_folder, path) = set(&format!("set.{form}"), &[question(image)]);
+            let (_folder, path) = set(&format!("set.{form}"), &[question(1, image)]);
             let problem = refusal(&path, &SetArgs::default());
-            assert!(problem.contains(says), "{form}: {problem}");
+            assert!(problem.contains(message), "{form}: {problem}");
         }
     }
-    for (cell, says) in [
+    for (cell, message) in [
         (base64(1)[..80].to_owned(), "not a"),
         ("QUJD".repeat(40), "not an image"),
     ] {
-        let (_folder, path) = set("set.tsv", &[question(&cell)]);
+        let (_folder, path) = set("set.tsv", &[question(1, &cell)]);
         let dataset = open(&path, &SetArgs::default()).unwrap();
         let picture = dataset
             .picture(&FrameId("1".into()))
             .and_then(|picture| picture.decode());
         let problem = picture.unwrap_err().to_string();
         assert!(
-            problem.contains("set.tsv, line 2: ") && problem.contains(says),
+            problem.contains("set.tsv, line 2: ") && problem.contains(message),
             "{problem}"
         );
     }
@@ -228,14 +226,9 @@ fn outside_paths_and_invalid_images_are_errors() {
 
 #[test]
 fn changed_file_is_an_error() {
-    let question = |colour| {
-        row(
-            json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(colour)}),
-        )
-    };
-    let (_folder, path) = set("set.tsv", &[question(1)]);
+    let (_folder, path) = set("set.tsv", &[question(1, &base64(1))]);
     let dataset = open(&path, &SetArgs::default()).unwrap();
-    super::fixture::write(&path, &[question(2)]);
+    super::fixture::write(&path, &[question(1, &base64(2))]);
     let problem = dataset
         .picture(&FrameId("1".into()))
         .unwrap_err()
@@ -246,14 +239,14 @@ fn changed_file_is_an_error() {
     );
 }
 
+fn line(image: &str) -> String {
+    json!({"file_name": image, "question": "?", "options": ["x", "y"], "answer": "x"}).to_string()
+}
+
 #[test]
 fn malicious_archives_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let line = |image: &str| {
-        json!({"file_name": image, "question": "?", "options": ["x", "y"], "answer": "x"})
-            .to_string()
-    };
-    for (name, entries, says) in [
+    for (name, entries, message) in [
         (
             "a.zip",
             vec![("../a.png", "x".to_owned())],
@@ -292,7 +285,7 @@ fn malicious_archives_are_refused() {
             .collect();
         super::shapes::pack(&path, &entries);
         let problem = refusal(&path, &SetArgs::default());
-        assert!(problem.contains(says), "{name}: {problem}");
+        assert!(problem.contains(message), "{name}: {problem}");
     }
     let path = folder.path().join("g.zip");
     fs::write(&path, b"PK no").unwrap();

@@ -63,20 +63,21 @@ fn gap_in_second_column_hides_no_difference() {
     assert!(refusal(&path, &skipping()).contains("\"label\" differ"));
 }
 
+fn rows(other: &str, gap: &Value) -> Vec<Value> {
+    (0..40)
+        .map(|at| (at, if at == 5 { gap.clone() } else { json!("yes") }))
+        .map(|(at, answer)| json!({"id": at, "question": "Is it red?", "answer": answer, "label": other, "image": base64(1)}))
+        .collect()
+}
+
 #[test]
 fn yes_no_columns_are_compared_where_both_have_answers() {
-    let rows = |other: &str, gap: Value| -> Vec<Value> {
-        (0..40).map(|at| {
-            let answer = if at == 5 { gap.clone() } else { json!("yes") };
-            json!({"id": at, "question": "Is it red?", "answer": answer, "label": other, "image": base64(1)})
-        }).collect()
-    };
-    let (_folder, path) = with(rows("no", json!("")));
+    let (_folder, path) = with(rows("no", &json!("")));
     assert!(refusal(&path, &skipping()).contains("\"answer\" and \"label\" differ"));
     // Numbers mean no and yes if they agree with the other column.
-    let (_folder, path) = with(rows("1", json!("yes")));
+    let (_folder, path) = with(rows("1", &json!("yes")));
     assert_eq!(read(&open(&path, &skipping()).unwrap())[0].4, "yes");
-    let (_folder, path) = with(rows("0", json!("yes")));
+    let (_folder, path) = with(rows("0", &json!("yes")));
     assert!(refusal(&path, &skipping()).contains("differ"));
     // A column of correctness is not an answer column.
     let (_folder, path) = with(vec![
@@ -102,11 +103,11 @@ fn printed_flags_are_quoted_for_the_shell() {
         let (_, command) = problem.split_once("; --map ").unwrap();
         let (command, _) = command.split_once(" or --map ").unwrap();
         let mut shell = std::process::Command::new("sh");
-        let said = shell
+        let output = shell
             .args(["-c", &format!("printf %s {command}")])
             .output()
             .unwrap();
-        let pasted = String::from_utf8(said.stdout).unwrap();
+        let pasted = String::from_utf8(output.stdout).unwrap();
         assert_eq!(
             read(&open(&path, &map(&pasted)).unwrap())[0].4,
             "y",

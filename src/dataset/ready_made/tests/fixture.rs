@@ -181,12 +181,12 @@ impl Levels {
 /// Writes a Parquet file of two row groups, with the column types that hubs use.
 fn parquet(path: &Path, rows: &[Map<String, Value>]) {
     let columns = columns(rows);
-    let text = || Some(LogicalType::String);
+    let text = Some(LogicalType::String);
     let forms: Vec<Form> = columns.iter().map(|column| form(rows, column)).collect();
     let fields = columns.iter().zip(&forms).map(|(column, form)| match form {
-        Form::Text => leaf(column, Physical::BYTE_ARRAY, text()),
+        Form::Text => leaf(column, Physical::BYTE_ARRAY, text.clone()),
         Form::Number => leaf(column, Physical::INT64, None),
-        Form::Texts => list(column, leaf("element", Physical::BYTE_ARRAY, text())),
+        Form::Texts => list(column, leaf("element", Physical::BYTE_ARRAY, text.clone())),
         Form::Image => image(column),
         Form::Images => list(column, image("element")),
     });
@@ -242,11 +242,6 @@ fn parquet(path: &Path, rows: &[Map<String, Value>]) {
 
 /// Leaves of a column of texts, lists or images.
 fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> {
-    let bytes = |value: &Value| {
-        let text = value["bytes"].as_str()?;
-        Some(STANDARD.decode(text).unwrap())
-    };
-    let path = |value: &Value| value["path"].as_str().map(|text| text.as_bytes().to_vec());
     let cells = rows
         .iter()
         .map(|row| row.get(column).filter(|value| !value.is_null()));
@@ -280,8 +275,8 @@ fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> 
             let (mut first, mut second) = (Levels::default(), Levels::default());
             for cell in cells {
                 let absent = i16::from(cell.is_some());
-                first.add(cell.and_then(bytes), 2, absent, 0);
-                second.add(cell.and_then(path), 2, absent, 0);
+                first.add(cell.and_then(decoded_bytes), 2, absent, 0);
+                second.add(cell.and_then(path_bytes), 2, absent, 0);
             }
             vec![first, second]
         }
@@ -294,11 +289,20 @@ fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> 
                     continue;
                 };
                 for (at, item) in items.iter().enumerate() {
-                    first.add(bytes(item), 4, 3, i16::from(at > 0));
-                    second.add(path(item), 4, 3, i16::from(at > 0));
+                    first.add(decoded_bytes(item), 4, 3, i16::from(at > 0));
+                    second.add(path_bytes(item), 4, 3, i16::from(at > 0));
                 }
             }
             vec![first, second]
         }
     }
+}
+
+fn path_bytes(value: &Value) -> Option<Vec<u8>> {
+    value["path"].as_str().map(|text| text.as_bytes().to_vec())
+}
+
+fn decoded_bytes(value: &Value) -> Option<Vec<u8>> {
+    let text = value["bytes"].as_str()?;
+    Some(STANDARD.decode(text).unwrap())
 }

@@ -1,6 +1,6 @@
 //! Rows with missing or repeated values do not change how other rows are read.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::super::settings::LeaveOut;
 use super::fixture::{base64, row, set, write};
@@ -20,10 +20,15 @@ fn skipping() -> SetArgs {
     }
 }
 
+fn question_with_answer(answer: i64) -> Value {
+    json!({"question": "?", "options": ["a", "b", "c", "d"], "answer": answer, "image": base64(answer as u8)})
+}
+
 #[test]
 fn broken_row_does_not_decide_the_answer_format() {
-    let question = |answer: i64| json!({"question": "?", "options": ["a", "b", "c", "d"], "answer": answer, "image": base64(answer as u8)});
-    let rows = (0..39).map(|n| question(1 + n % 3)).chain([question(9)]);
+    let rows = (0..39)
+        .map(|n| question_with_answer(1 + n % 3))
+        .chain([question_with_answer(9)]);
     let (_folder, path) = with(rows.collect());
     let problem = refusal(&path, &skipping());
     assert!(problem.contains("index0 or as index1"), "{problem}");
@@ -65,31 +70,39 @@ fn unnumbered_image_column_joins_numbered_ones() {
     assert!(refusal(&path, &skipping()).contains("1 of 1 rows show 2 images"));
 }
 
+fn question_about(id: i64, image: &str) -> Map<String, Value> {
+    row(
+        json!({"index": id, "question": format!("{id}?"), "options": ["x", "y"], "answer": "x", "image": image}),
+    )
+}
+
 #[test]
 fn row_reference_stays_in_the_same_file() {
-    let question = |id: i64, image: &str| {
-        row(
-            json!({"index": id, "question": format!("{id}?"), "options": ["x", "y"], "answer": "x", "image": image}),
-        )
-    };
-    let (folder, first) = set("a.tsv", &[question(1, &base64(1)), question(2, "1")]);
+    let (folder, first) = set(
+        "a.tsv",
+        &[question_about(1, &base64(1)), question_about(2, "1")],
+    );
     write(
         &first.with_file_name("b.tsv"),
-        &[question(1, &base64(3)), question(4, "1")],
+        &[question_about(1, &base64(3)), question_about(4, "1")],
     );
     let dataset = open(&folder.path().join("*.tsv"), &skipping()).unwrap();
     let reds: Vec<u8> = read(&dataset).into_iter().map(|read| read.5).collect();
     assert_eq!(reds, [1, 1, 3, 3]);
 }
 
+fn question_with_id(id: &str, red: u8) -> Map<String, Value> {
+    row(
+        json!({"index": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(red)}),
+    )
+}
+
 #[test]
 fn ids_that_differ_only_in_space_are_not_unique() {
-    let question = |id: &str, red| {
-        row(
-            json!({"index": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(red)}),
-        )
-    };
-    let (_folder, path) = set("set.csv", &[question("1", 1), question("1 ", 2)]);
+    let (_folder, path) = set(
+        "set.csv",
+        &[question_with_id("1", 1), question_with_id("1 ", 2)],
+    );
     let reds: Vec<u8> = read(&open(&path, &skipping()).unwrap())
         .into_iter()
         .map(|read| read.5)

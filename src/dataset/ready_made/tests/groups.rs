@@ -50,22 +50,21 @@ fn with(text: &str) -> SetArgs {
 #[test]
 fn groups_follow_column_template_or_run_of_numbers() {
     let (_folder, path) = made(&rows());
-    let read = |text: &str| open(&path, &with(text)).unwrap();
     // There are no groups by default.
-    assert_eq!(groups(&read("id=nr")), [None; 5]);
-    let by_image = read("id=nr,group=image");
+    assert_eq!(groups(&open(&path, &with("id=nr")).unwrap()), [None; 5]);
+    let by_image = open(&path, &with("id=nr,group=image")).unwrap();
     assert_eq!(
         groups(&by_image)[..3],
         [Some(("0.png", 2)), Some(("0.png", 2)), Some(("1.png", 2))]
     );
     // The open question is left out, and its group is incomplete.
     assert_eq!(groups(&by_image)[4], Some(("2.png", 2)));
-    let said = by_image.summary().join("\n");
+    let summary = by_image.summary().join("\n");
     assert!(
-        said.contains("group = image: 3 groups of 2 questions, 1 with questions that are left out, never complete"),
-        "{said}"
+        summary.contains("group = image: 3 groups of 2 questions, 1 with questions that are left out, never complete"),
+        "{summary}"
     );
-    let template = read("id=nr,group={set}_{figure}");
+    let template = open(&path, &with("id=nr,group={set}_{figure}")).unwrap();
     assert_eq!(
         groups(&template),
         [
@@ -76,26 +75,26 @@ fn groups_follow_column_template_or_run_of_numbers() {
             Some(("s1_1", 1))
         ]
     );
-    let said = template.summary().join("\n");
+    let summary = template.summary().join("\n");
     assert!(
-        said.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete; 1 question without a group"),
-        "{said}"
+        summary.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete; 1 question without a group"),
+        "{summary}"
     );
-    let alone = read("id=nr,group={nr:1}");
-    let said = alone.summary().join("\n");
+    let alone = open(&path, &with("id=nr,group={nr:1}")).unwrap();
+    let summary = alone.summary().join("\n");
     assert!(
-        said.contains("5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"),
-        "{said}"
+        summary.contains("5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"),
+        "{summary}"
     );
     let from_one: Vec<&str> = vec!["0", "0", "1", "1", "2"];
-    let runs = read("id=nr,group={nr:2 from 1}");
+    let runs = open(&path, &with("id=nr,group={nr:2 from 1}")).unwrap();
     let names: Vec<&str> = groups(&runs)
         .into_iter()
         .flatten()
         .map(|(name, _)| name)
         .collect();
     assert_eq!(names, from_one);
-    let from_nought = read("id=nr,group={nr:2}");
+    let from_nought = open(&path, &with("id=nr,group={nr:2}")).unwrap();
     assert_ne!(groups(&from_nought), groups(&runs));
     assert!(
         from_nought
@@ -108,7 +107,7 @@ fn groups_follow_column_template_or_run_of_numbers() {
 #[test]
 fn invalid_group_error_names_expected() {
     let (_folder, path) = made(&rows());
-    for (text, says) in [
+    for (text, message) in [
         (
             "group=figures",
             "names the column \"figures\", which is not there",
@@ -119,55 +118,58 @@ fn invalid_group_error_names_expected() {
         ("group={nr:0}", "{COLUMN:2} or {COLUMN:2 from 1} expected"),
     ] {
         let problem = refusal(&path, &with(text));
-        assert!(problem.contains(says), "{text}: {problem}");
+        assert!(problem.contains(message), "{text}: {problem}");
     }
+}
+
+fn foreign_question(id: &str) -> Map<String, Value> {
+    let mut row = stored_question(id);
+    row.remove("group_size");
+    row.insert("level".to_owned(), json!("easy"));
+    row
+}
+
+fn stored_question(id: &str) -> Map<String, Value> {
+    row(json!({
+        "id": id, "image": "0.png", "family": "f", "question": "?", "choices": ["x", "y"], "answer": "x", "group": "g", "group_size": 3,
+    }))
 }
 
 #[test]
 fn stored_questions_keep_their_groups() {
     // Some questions of a run, from a group of three.
-    let own = |id: &str| {
-        row(json!({
-            "id": id, "image": "0.png", "family": "f", "question": "?", "choices": ["x", "y"], "answer": "x", "group": "g", "group_size": 3,
-        }))
-    };
-    let (_folder, path) = made(&[own("a"), own("b")]);
+    let (_folder, path) = made(&[stored_question("a"), stored_question("b")]);
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(groups(&dataset), [Some(("g", 3)); 2]);
     let off = open(&path, &map("group=")).unwrap();
     assert_eq!(groups(&off), [None; 2]);
     // A column with this name in a foreign set does not make groups.
-    let strange = |id: &str| {
-        let mut row = own(id);
-        row.remove("group_size");
-        row.insert("level".to_owned(), json!("easy"));
-        row
-    };
-    let (_folder, path) = made(&[strange("a"), strange("b")]);
+    let (_folder, path) = made(&[foreign_question("a"), foreign_question("b")]);
     assert_eq!(
         groups(&open(&path, &SetArgs::default()).unwrap()),
         [None; 2]
     );
 }
 
+fn open_preset(name: &str, path: &std::path::Path, args: &SetArgs) -> Dataset {
+    let place = crate::dataset::parse_data_place(&format!("{name}:{}", path.display())).unwrap();
+    Dataset::open(&place, None, args).unwrap()
+}
+
+fn mme_question(number: usize) -> Map<String, Value> {
+    row(json!({
+        "question_id": format!("{}.png", number / 2), "image": format!("{}.png", number / 2), "question": format!("Is it {number}?"),
+        "answer": "Yes", "category": "colour",
+    }))
+}
+
 #[test]
 fn presets_have_groups() {
-    let known = |name: &str, path: &std::path::Path, args: &SetArgs| {
-        let place =
-            crate::dataset::parse_data_place(&format!("{name}:{}", path.display())).unwrap();
-        Dataset::open(&place, None, args).unwrap()
-    };
-    let mme = |number: usize| {
-        row(json!({
-            "question_id": format!("{}.png", number / 2), "image": format!("{}.png", number / 2), "question": format!("Is it {number}?"),
-            "answer": "Yes", "category": "colour",
-        }))
-    };
-    let rows: Vec<Map<String, Value>> = (0..4).map(mme).collect();
+    let rows: Vec<Map<String, Value>> = (0..4).map(mme_question).collect();
     let (_folder, path) = made(&rows);
-    let dataset = known("mme", &path, &SetArgs::default());
+    let dataset = open_preset("mme", &path, &SetArgs::default());
     assert_eq!(groups(&dataset)[0], Some(("colour_0.png", 2)));
-    let own = known("mme", &path, &map("group=question"));
+    let own = open_preset("mme", &path, &map("group=question"));
     assert_eq!(groups(&own)[0], Some(("Is it 0?", 1)));
     // Without the column, a note says that there are no groups.
     let without = rows.into_iter().map(|mut row| {
@@ -175,11 +177,11 @@ fn presets_have_groups() {
         row
     });
     let (_folder, path) = made(&without.collect::<Vec<_>>());
-    let dataset = known("mme", &path, &SetArgs::default());
+    let dataset = open_preset("mme", &path, &SetArgs::default());
     assert_eq!(groups(&dataset), [None; 4]);
-    let said = dataset.summary().join("\n");
+    let summary = dataset.summary().join("\n");
     assert!(
-        said.contains("no groups: MME scores questions together by {category}_{question_id} or"),
-        "{said}"
+        summary.contains("no groups: MME scores questions together by {category}_{question_id} or"),
+        "{summary}"
     );
 }

@@ -2,14 +2,17 @@
 
 use std::fs;
 use std::io::Write as _;
+use std::path::PathBuf;
 
 use base64::Engine as _;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::super::settings::LeaveOut;
 use super::fixture::{base64, png, row, set};
 use super::{open, read, refusal};
 use crate::dataset::ready_made::SetArgs;
+use crate::dataset::{DataPlace, Dataset};
+use crate::error::Result;
 
 fn question(fields: Value) -> Value {
     let mut row = row(fields);
@@ -36,10 +39,10 @@ fn names_of_rows_become_ids() {
     let mut ids: Vec<String> = read(&dataset).into_iter().map(|read| read.0).collect();
     ids.sort();
     assert_eq!(ids, ["q2", "q7"]);
-    let said = dataset.summary().join("\n");
+    let summary = dataset.summary().join("\n");
     assert!(
-        said.contains("id = id") && said.contains("the names of the rows"),
-        "{said}"
+        summary.contains("id = id") && summary.contains("the names of the rows"),
+        "{summary}"
     );
     // A column of ids takes precedence.
     let text = json!({"q7": question(json!({"question_id": 1})), "q2": question(json!({"question_id": 2}))}).to_string();
@@ -80,11 +83,14 @@ fn family_column_varies_among_asked_questions() {
     assert_eq!(families, ["cups", "balls"]);
 }
 
+fn choice_row(id: i64) -> [Map<String, Value>; 1] {
+    [row(question(json!({"id": id, "category": "choice"})))]
+}
+
 #[test]
 fn configuration_is_the_family_if_no_column_varies() {
-    let rows = |id: i64| [row(question(json!({"id": id, "category": "choice"})))];
-    let (folder, path) = set("art/test.jsonl", &rows(1));
-    super::fixture::write(&folder.path().join("music.jsonl"), &rows(2));
+    let (folder, path) = set("art/test.jsonl", &choice_row(1));
+    super::fixture::write(&folder.path().join("music.jsonl"), &choice_row(2));
     let card = "---\nconfigs:\n- config_name: Art\n  data_files: art/test.jsonl\n- config_name: Music\n  data_files: music.jsonl\n---\n";
     fs::write(folder.path().join("README.md"), card).unwrap();
     let args = SetArgs {
@@ -162,12 +168,16 @@ fn zip_file_has_its_own_name_and_map() {
 fn ambiguous_image_in_zip_is_refused() {
     let table = b"id,question,image,A,B,answer\n1,Which?,images/0.png,x,y,B\n";
     let (near, top) = (png(3), png(5));
-    let of = |files: &[(&str, &[u8])]| zip(&[files, &[("data/metadata.csv", table)]].concat());
+    let metadata: (&str, &[u8]) = ("data/metadata.csv", table);
     for (name, image, red) in [("data/images/0.png", &near, 3), ("images/0.png", &top, 5)] {
-        let (_folder, path) = of(&[(name, image)]);
+        let (_folder, path) = zip(&[(name, image), metadata]);
         assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].5, red);
     }
-    let (_folder, path) = of(&[("data/images/0.png", &near), ("images/0.png", &top)]);
+    let (_folder, path) = zip(&[
+        ("data/images/0.png", &near),
+        ("images/0.png", &top),
+        metadata,
+    ]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(
         problem.contains("may be \"data/images/0.png\" or \"images/0.png\"")
@@ -176,22 +186,23 @@ fn ambiguous_image_in_zip_is_refused() {
     );
 }
 
+fn rows_with_answers(answers: [&str; 2]) -> Vec<Map<String, Value>> {
+    (0..40)
+        .map(|at| {
+            let answer = answers.get(at).unwrap_or(&"x");
+            let text = if at < 2 {
+                "Which?".to_owned()
+            } else {
+                format!("{at}?")
+            };
+            row(question(json!({"question": text, "answer": answer})))
+        })
+        .collect()
+}
+
 #[test]
 fn equal_rows_with_different_answers_are_refused() {
-    let rows = |answers: [&str; 2]| -> Vec<_> {
-        (0..40)
-            .map(|at| {
-                let answer = answers.get(at).unwrap_or(&"x");
-                let text = if at < 2 {
-                    "Which?".to_owned()
-                } else {
-                    format!("{at}?")
-                };
-                row(question(json!({"question": text, "answer": answer})))
-            })
-            .collect()
-    };
-    let (_folder, path) = set("set.jsonl", &rows(["x", "y"]));
+    let (_folder, path) = set("set.jsonl", &rows_with_answers(["x", "y"]));
     let problem = refusal(&path, &SetArgs::default());
     assert!(
         problem.contains("2 of 40 rows are broken")
@@ -212,7 +223,7 @@ fn equal_rows_with_different_answers_are_refused() {
             .contains("left out: 2 of 40 rows")
     );
     // An exact repeat is asked again, with a note.
-    let (_folder, path) = set("set.jsonl", &rows(["x", "x"]));
+    let (_folder, path) = set("set.jsonl", &rows_with_answers(["x", "x"]));
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 40);
     assert!(
@@ -221,6 +232,26 @@ fn equal_rows_with_different_answers_are_refused() {
             .join("\n")
             .contains("that repeat an earlier one, with its image and options: 1;")
     );
+}
+
+fn open_with_images(rows: &[Map<String, Value>], args: &SetArgs) -> Result<Dataset> {
+    let (folder, path) = set("set.jsonl", rows);
+    for (name, colour) in [("a.png", 1), ("b.png", 2)] {
+        fs::write(folder.path().join(name), png(colour)).unwrap();
+    }
+    open(&path, args)
+}
+
+fn rows_ending_with(same: &Value, last: [(&Value, &str); 3]) -> Vec<Map<String, Value>> {
+    (0..60)
+        .map(|at: usize| {
+            let last = at.checked_sub(38).and_then(|at| last.get(at));
+            let (image, answer) = last.copied().unwrap_or((same, "x"));
+            let text = last.map_or_else(|| format!("{at}?"), |_| "Which?".to_owned());
+            let fields = json!({"id": at, "question": text, "answer": answer, "image": image});
+            row(question(fields))
+        })
+        .collect()
 }
 
 #[test]
@@ -235,34 +266,17 @@ fn contradictions_are_found_with_ids_too() {
         [json!(base64(1)), json!(base64(2))],
         [json!("a.png"), json!("b.png")],
     ] {
-        let rows = |last: [(&Value, &str); 3]| -> Vec<_> {
-            (0..60)
-                .map(|at: usize| {
-                    let last = at.checked_sub(38).and_then(|at| last.get(at));
-                    let (image, answer) = last.copied().unwrap_or((&same, "x"));
-                    let text = last.map_or_else(|| format!("{at}?"), |_| "Which?".to_owned());
-                    let fields =
-                        json!({"id": at, "question": text, "answer": answer, "image": image});
-                    row(question(fields))
-                })
-                .collect()
-        };
-        let opened = |last, args| {
-            let (folder, path) = set("set.jsonl", &rows(last));
-            for (name, colour) in [("a.png", 1), ("b.png", 2)] {
-                fs::write(folder.path().join(name), png(colour)).unwrap();
-            }
-            open(&path, args)
-        };
         let differ = [(&same, "x"), (&same, "x"), (&same, "y")];
-        let problem = opened(differ, &strict).unwrap_err().to_string();
+        let problem = open_with_images(&rows_ending_with(&same, differ), &strict)
+            .unwrap_err()
+            .to_string();
         assert!(
             problem.contains("3 of 60 rows are broken")
                 && problem.contains("line 39 (\"x\")")
                 && problem.contains("line 41 (\"y\") ask the same of the same image"),
             "{problem}"
         );
-        let kept = opened(differ, &skip).unwrap();
+        let kept = open_with_images(&rows_ending_with(&same, differ), &skip).unwrap();
         let ids: Vec<&str> = kept.questions().iter().map(|kept| &*kept.id.0).collect();
         assert_eq!(ids.len(), 57);
         assert!(!ids.iter().any(|id| ["38", "39", "40"].contains(id)));
@@ -271,7 +285,13 @@ fn contradictions_are_found_with_ids_too() {
             [(&same, "x"), (&same, "x"), (&other, "y")],
             [(&same, "y"), (&same, "y"), (&same, "y")],
         ] {
-            assert_eq!(opened(fine, &strict).unwrap().questions().len(), 60);
+            assert_eq!(
+                open_with_images(&rows_ending_with(&same, fine), &strict)
+                    .unwrap()
+                    .questions()
+                    .len(),
+                60
+            );
         }
     }
 }
@@ -279,13 +299,13 @@ fn contradictions_are_found_with_ids_too() {
 #[test]
 fn dataset_json_maps_columns_of_questions() {
     let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    fs::write(at("0.png"), png(9)).unwrap();
+    let root = folder.path();
+    fs::write(root.join("0.png"), png(9)).unwrap();
     let line = json!({"id": "a", "frame": "0.png", "frage": "Which?", "choices": ["x", "y"], "answer": "y"});
-    fs::write(at("questions.jsonl"), line.to_string()).unwrap();
+    fs::write(root.join("questions.jsonl"), line.to_string()).unwrap();
     assert!(refusal(folder.path(), &SetArgs::default()).contains("no question among its columns"));
     fs::write(
-        at("dataset.json"),
+        root.join("dataset.json"),
         r#"{"schema": "darkqa.dataset/1", "map": "question=frage"}"#,
     )
     .unwrap();
@@ -325,33 +345,35 @@ fn bmp_image_is_read() {
     );
 }
 
+fn numbered_row(id: i64) -> [Map<String, Value>; 1] {
+    [row(question(
+        json!({"id": id, "image": format!("{id}.png")}),
+    ))]
+}
+
+fn open_joined(paths: &[&PathBuf]) -> Result<Dataset> {
+    let paths = paths.iter().map(|path| (*path).clone()).collect();
+    let place = DataPlace::Files(paths);
+    Dataset::open(&place, None, &SetArgs::default())
+}
+
 #[test]
 fn several_files_are_joined_in_order() {
-    let rows = |id: i64| {
-        [row(question(
-            json!({"id": id, "image": format!("{id}.png")}),
-        ))]
-    };
-    let (folder, path) = set("b/one.csv", &rows(1));
+    let (folder, path) = set("b/one.csv", &numbered_row(1));
     let second = folder.path().join("a/two.tsv");
     fs::create_dir(second.parent().unwrap()).unwrap();
-    super::fixture::write(&second, &rows(2));
+    super::fixture::write(&second, &numbered_row(2));
     fs::write(path.with_file_name("1.png"), png(1)).unwrap();
     fs::write(second.with_file_name("2.png"), png(2)).unwrap();
-    let joined = |paths: &[&std::path::PathBuf]| {
-        let paths = paths.iter().map(|path| (*path).clone()).collect();
-        let place = crate::dataset::DataPlace::Files(paths);
-        crate::dataset::Dataset::open(&place, None, &SetArgs::default())
-    };
-    let both = read(&joined(&[&path, &second]).unwrap());
+    let both = read(&open_joined(&[&path, &second]).unwrap());
     let ids: Vec<(&str, u8)> = both.iter().map(|read| (read.0.as_str(), read.5)).collect();
     assert_eq!(ids, [("1", 1), ("2", 2)]);
-    let turned = read(&joined(&[&second, &path]).unwrap());
+    let turned = read(&open_joined(&[&second, &path]).unwrap());
     assert_eq!(turned[0].0, "2");
     // Other columns, a folder, and the same file again are refused.
     let other = folder.path().join("b/other.csv");
     super::fixture::write(&other, &[row(question(json!({"id": 3, "hint": "h"})))]);
-    let problem = joined(&[&path, &other]).unwrap_err().to_string();
+    let problem = open_joined(&[&path, &other]).unwrap_err().to_string();
     assert!(
         problem.contains("other.csv")
             && problem.contains("\"hint\" is in")
@@ -361,7 +383,7 @@ fn several_files_are_joined_in_order() {
     let problem = refusal(&folder.path().join("b/*.csv"), &SetArgs::default());
     assert!(problem.contains("\"hint\" is in"), "{problem}");
     for wrong in [&folder.path().to_owned(), &path] {
-        let problem = joined(&[&path, wrong]).unwrap_err().to_string();
+        let problem = open_joined(&[&path, wrong]).unwrap_err().to_string();
         assert!(problem.contains("--data"), "{problem}");
     }
 }

@@ -2,14 +2,17 @@
 
 use std::fs;
 use std::io::Write as _;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::fixture::{base64, row, set};
 use super::{open, read, refusal};
+use crate::dataset::Dataset;
 use crate::dataset::ready_made::SetArgs;
+use crate::error::Result;
 
-fn file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
+fn file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
     fs::write(&path, bytes).unwrap();
@@ -65,21 +68,22 @@ fn unterminated_record_is_an_error() {
     );
 }
 
+fn with_long_row(length: usize) -> (tempfile::TempDir, PathBuf) {
+    let mut long = question();
+    long.insert("evidence".to_owned(), json!("x".repeat(length)));
+    set("set.parquet", &[question(), question(), long])
+}
+
 #[test]
 fn huge_parquet_row_is_an_error() {
-    let with = |length: usize| {
-        let mut long = question();
-        long.insert("evidence".to_owned(), json!("x".repeat(length)));
-        set("set.parquet", &[question(), question(), long])
-    };
-    let (_folder, path) = with((64 << 20) + 1);
+    let (_folder, path) = with_long_row((64 << 20) + 1);
     let problem = refusal(&path, &SetArgs::default());
     assert!(
         problem.contains("set.parquet, row 3: more than 64 MB in a row")
             && !problem.contains("not a whole"),
         "{problem}"
     );
-    let (_folder, path) = with(1 << 20);
+    let (_folder, path) = with_long_row(1 << 20);
     assert_eq!(
         open(&path, &SetArgs::default()).unwrap().questions().len(),
         3
@@ -148,6 +152,15 @@ fn rows_flag_is_refused_for_other_files() {
     }
 }
 
+fn open_with_card(folder: &Path, text: &str) -> Result<Dataset> {
+    fs::write(
+        folder.join("README.md"),
+        format!("---\nconfigs:\n{text}---\n"),
+    )
+    .unwrap();
+    open(folder, &SetArgs::default())
+}
+
 #[test]
 fn card_with_split_fields_and_folder_is_read() {
     let (folder, path) = set("data/inner/test-a.csv", &[question()]);
@@ -155,25 +168,24 @@ fn card_with_split_fields_and_folder_is_read() {
         &path.with_file_name("train-a.csv"),
         &[question(), question()],
     );
-    let card = |text: &str| {
-        fs::write(
-            folder.path().join("README.md"),
-            format!("---\nconfigs:\n{text}---\n"),
-        )
-        .unwrap();
-        open(folder.path(), &SetArgs::default())
-    };
     let mapping = "- config_name: default\n  data_files:\n    test: data/inner/test-*\n    train: data/inner/train-*\n";
     let from = "- config_name: default\n  data_dir: data/inner\n";
     let both = "- config_name: default\n  data_dir: data\n  data_files: {test: \"inner/test-*\"}\n";
     for text in [mapping, from, both] {
-        assert_eq!(card(text).unwrap().questions().len(), 1, "{text}");
+        assert_eq!(
+            open_with_card(folder.path(), text)
+                .unwrap()
+                .questions()
+                .len(),
+            1,
+            "{text}"
+        );
     }
     let train = SetArgs {
         split: Some("train".to_owned()),
         ..SetArgs::default()
     };
-    card(mapping).unwrap();
+    open_with_card(folder.path(), mapping).unwrap();
     assert_eq!(open(folder.path(), &train).unwrap().questions().len(), 2);
     // If the card cannot be parsed, a note says that file names decide.
     fs::rename(
@@ -181,12 +193,16 @@ fn card_with_split_fields_and_folder_is_read() {
         folder.path().join("test.csv"),
     )
     .unwrap();
-    let dataset = card("- config_name: default\n  data_files: &x y\n").unwrap();
+    let dataset = open_with_card(
+        folder.path(),
+        "- config_name: default\n  data_files: &x y\n",
+    )
+    .unwrap();
     assert_eq!(read(&dataset).len(), 1);
-    let said = dataset.summary().join("\n");
+    let summary = dataset.summary().join("\n");
     assert!(
-        said.contains("README.md cannot be read") && said.contains("names of files decide"),
-        "{said}"
+        summary.contains("README.md cannot be read") && summary.contains("names of files decide"),
+        "{summary}"
     );
     let named = SetArgs {
         config_name: Some("default".to_owned()),

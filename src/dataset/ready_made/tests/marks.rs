@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::fixture::{base64, row, set};
-use super::{map, open, read, refusal};
+use super::{Read, map, open, read, refusal};
 use crate::dataset::ready_made::SetArgs;
 
 fn asked(question: &str, answer: impl Into<Value>) -> Value {
@@ -112,16 +112,17 @@ fn empty_options_map_keeps_the_whole_question() {
     );
 }
 
+fn open_with_options(options: &Value) -> Result<Read, String> {
+    let (_folder, path) = with(vec![
+        json!({"question": "?", "options": options, "answer": "B", "image": base64(1)}),
+    ]);
+    open(&path, &SetArgs::default())
+        .map(|dataset| read(&dataset)[0].clone())
+        .map_err(|e| e.to_string())
+}
+
 #[test]
 fn object_with_letter_keys_has_options() {
-    let open_as = |options: Value| {
-        let (_folder, path) = with(vec![
-            json!({"question": "?", "options": options, "answer": "B", "image": base64(1)}),
-        ]);
-        open(&path, &SetArgs::default())
-            .map(|dataset| read(&dataset)[0].clone())
-            .map_err(|e| e.to_string())
-    };
     for options in [
         json!({"A": "red", "B": "green", "C": null}),
         json!({"b": "green", "a": "red"}),
@@ -129,14 +130,14 @@ fn object_with_letter_keys_has_options() {
         json!("{'A': 'red', 'B': 'green', 'C': None}"),
         json!({"A": "A. red", "B": "B. green"}),
     ] {
-        let found = open_as(options.clone()).unwrap();
+        let found = open_with_options(&options).unwrap();
         assert_eq!(
             (found.3.as_slice(), found.4.as_str()),
             (&["red".to_owned(), "green".to_owned()][..], "green"),
             "{options}"
         );
     }
-    for (options, says) in [
+    for (options, message) in [
         (
             json!({"A": "red", "C": "green"}),
             "have C where B is expected",
@@ -155,9 +156,9 @@ fn object_with_letter_keys_has_options() {
         ),
         (json!({"A": "red", "B": ["green"]}), "hold no text at B"),
     ] {
-        let problem = open_as(options.clone()).unwrap_err();
+        let problem = open_with_options(&options).unwrap_err();
         assert!(
-            problem.contains(says) && problem.contains("object 1"),
+            problem.contains(message) && problem.contains("object 1"),
             "{options}: {problem}"
         );
     }

@@ -20,6 +20,10 @@ fn with(fields: &[Value]) -> (tempfile::TempDir, std::path::PathBuf) {
     set("set.json", &rows)
 }
 
+fn answer_read_as(path: &std::path::Path, format: &str) -> String {
+    read(&open(path, &map(format)).unwrap())[0].4.clone()
+}
+
 #[test]
 fn ambiguous_answer_format_is_refused() {
     let numbers = json!({"options": ["red", "green", "blue"], "answer": 1});
@@ -33,11 +37,10 @@ fn ambiguous_answer_format_is_refused() {
         problem.contains("--map answer=answer:index0 or --map answer=answer:index1"),
         "{problem}"
     );
-    let read_as = |how: &str| read(&open(&path, &map(how)).unwrap())[0].4.clone();
     assert_eq!(
         (
-            read_as("answer=answer:index0"),
-            read_as("answer=answer:index1")
+            answer_read_as(&path, "answer=answer:index0"),
+            answer_read_as(&path, "answer=answer:index1")
         ),
         ("green".into(), "red".into())
     );

@@ -45,19 +45,24 @@ fn scene_column_is_read_in_every_format() {
         let (_folder, path) = made(name, &rows("Scene", TWO.map(|scene| json!(scene))));
         let read = open(&path, &SetArgs::default()).unwrap();
         assert_eq!(scenes(&read), ["a", "a", "b"], "{name}");
-        let said = read.summary().join("\n");
+        let summary = read.summary().join("\n");
         assert!(
-            said.contains("scene = Scene: 2 scenes of 3 images"),
-            "{said}"
+            summary.contains("scene = Scene: 2 scenes of 3 images"),
+            "{summary}"
         );
     }
     let (_folder, path) = made(
         "set.jsonl",
         &rows("house", [3, 3, 3, 3, 4, 4].map(|n| json!(n))),
     );
-    let read = |args: &SetArgs| scenes(&open(&path, args).unwrap());
-    assert_eq!(read(&SetArgs::default()), ["", "", ""]);
-    assert_eq!(read(&map("scene=house")), ["3", "3", "4"]);
+    assert_eq!(
+        scenes(&open(&path, &SetArgs::default()).unwrap()),
+        ["", "", ""]
+    );
+    assert_eq!(
+        scenes(&open(&path, &map("scene=house")).unwrap()),
+        ["3", "3", "4"]
+    );
 }
 
 #[test]
@@ -92,10 +97,10 @@ fn some_frames_may_have_no_scene() {
     let (_folder, path) = made("set.jsonl", &rows("scene", some));
     let read = open(&path, &map("id=id")).unwrap();
     assert_eq!(scenes(&read), ["a", "", "b"]);
-    let said = read.summary().join("\n");
+    let summary = read.summary().join("\n");
     assert!(
-        said.contains("2 scenes of 3 images, 1 image without a scene"),
-        "{said}"
+        summary.contains("2 scenes of 3 images, 1 image without a scene"),
+        "{summary}"
     );
 }
 
@@ -121,9 +126,9 @@ fn contradictory_scenes_are_refused_or_ignored() {
     let (_folder, path) = made("set.jsonl", &foreign);
     let read = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(scenes(&read), ["", "", ""]);
-    let said = read.summary().join("\n");
+    let summary = read.summary().join("\n");
     assert!(
-        said.contains("scene is not used as the scene: the image \"0.png\" is of"),
-        "{said}"
+        summary.contains("scene is not used as the scene: the image \"0.png\" is of"),
+        "{summary}"
     );
 }

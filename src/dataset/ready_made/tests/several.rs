@@ -58,9 +58,12 @@ fn rows() -> Vec<Map<String, Value>> {
         .collect()
 }
 
+fn image(name: &str, red: u8) -> (String, u8) {
+    (name.to_owned(), red)
+}
+
 #[test]
 fn images_are_named_by_the_lowest_row_id() {
-    let image = |name: &str, red: u8| (name.to_owned(), red);
     let expected = [
         ("3".to_owned(), "?".to_owned(), vec![image("3", 2)]),
         (

@@ -150,14 +150,15 @@ fn options_in_the_question_and_yes_or_no() {
     );
 }
 
+fn yes_no_question(text: &str, answer: &str, red: u8) -> Map<String, Value> {
+    row(json!({"question": text, "gt_answer": answer, "image": bytes(red)}))
+}
+
 #[test]
 fn digits_mean_yes_or_no_only_in_yes_no_sets() {
-    let question = |text: &str, answer: &str, red| {
-        row(json!({"question": text, "gt_answer": answer, "image": bytes(red)}))
-    };
     let rows = [
-        question("Is it red?", "1", 1),
-        question("Does it move?", "0", 2),
+        yes_no_question("Is it red?", "1", 1),
+        yes_no_question("Does it move?", "0", 2),
     ];
     let truths: Vec<String> = in_every_form(&rows, &SetArgs::default())
         .into_iter()
@@ -166,20 +167,25 @@ fn digits_mean_yes_or_no_only_in_yes_no_sets() {
     assert_eq!(truths, ["yes", "no"]);
     // The answer to "how many" is a number: the question is open, not a yes/no question.
     let rows = [
-        question("How many cups?", "1", 1),
-        question("How many cats?", "0", 2),
+        yes_no_question("How many cups?", "1", 1),
+        yes_no_question("How many cats?", "0", 2),
     ];
     let (_folder, path) = set("set.json", &rows);
     assert!(super::refusal(&path, &SetArgs::default()).contains("no options in 2 of 2 rows"));
 }
 
+fn question_with_id(id: i64, colour: u8) -> Map<String, Value> {
+    row(json!({"id": id, "question": "Is it there?", "answer": "yes", "image": bytes(colour)}))
+}
+
 #[test]
 fn equal_images_share_the_lowest_id() {
     // POPE: many questions per image.
-    let question = |id: i64, colour| {
-        row(json!({"id": id, "question": "Is it there?", "answer": "yes", "image": bytes(colour)}))
-    };
-    let mut rows = vec![question(10, 1), question(9, 1), question(11, 2)];
+    let mut rows = vec![
+        question_with_id(10, 1),
+        question_with_id(9, 1),
+        question_with_id(11, 2),
+    ];
     for turn in 0..3 {
         rows.rotate_left(turn);
         for form in FORMS {
@@ -191,15 +197,16 @@ fn equal_images_share_the_lowest_id() {
     }
 }
 
+fn question_with_one_id(text: &str) -> Map<String, Value> {
+    row(json!({"question_id": "one.png", "question": text, "answer": "yes", "image": bytes(1)}))
+}
+
 #[test]
 fn id_columns_with_duplicates_are_skipped() {
-    let question = |text: &str| {
-        row(json!({"question_id": "one.png", "question": text, "answer": "yes", "image": bytes(1)}))
-    };
     let rows = [
-        question("Is it red?"),
-        question("Is it blue?"),
-        question("Is it red?"),
+        question_with_one_id("Is it red?"),
+        question_with_one_id("Is it blue?"),
+        question_with_one_id("Is it red?"),
     ];
     let questions = in_every_form(&rows, &SetArgs::default());
     assert_ne!(questions[0].0, questions[1].0);
@@ -248,11 +255,11 @@ fn rows_that_cannot_be_asked_need_a_flag() {
     );
     let (_folder, path) = set("set.parquet", &rows);
     let problem = super::refusal(&path, &SetArgs::default());
-    for says in [
+    for message in [
         "1 of 3 rows show 2 images; --multi-image skip",
         "no image in 1 of 3 rows; --skip no-image",
     ] {
-        assert!(problem.contains(says), "{problem}");
+        assert!(problem.contains(message), "{problem}");
     }
     let summary = open(&path, &args).unwrap().summary().join("\n");
     assert!(
@@ -341,64 +348,83 @@ fn rows_in_json_are_found_by_path() {
     assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].5, 3);
 }
 
+fn choice_question(text: &str, red: u8) -> Map<String, Value> {
+    row(json!({"question": text, "options": ["x", "y"], "answer": "x", "image": bytes(red)}))
+}
+
+fn texts_and_families(
+    folder: &std::path::Path,
+    config: Option<&str>,
+    split: Option<&str>,
+) -> Result<Vec<(String, String)>, String> {
+    let args = SetArgs {
+        config_name: config.map(str::to_owned),
+        split: split.map(str::to_owned),
+        ..SetArgs::default()
+    };
+    let dataset = open(folder, &args).map_err(|e| e.to_string())?;
+    Ok(read(&dataset)
+        .into_iter()
+        .map(|read| (read.2, read.1))
+        .collect())
+}
+
+fn pair(text: &str, family: &str) -> (String, String) {
+    (text.to_owned(), family.to_owned())
+}
+
+/// A path in the folder; its parent is created.
+fn path_in(folder: &std::path::Path, name: &str) -> std::path::PathBuf {
+    let path = folder.join(name);
+    fs::create_dir_all(path.parent().unwrap()).unwrap();
+    path
+}
+
 #[test]
 fn repository_has_configurations_splits_and_shards() {
-    let question = |text: &str, red| {
-        row(json!({"question": text, "options": ["x", "y"], "answer": "x", "image": bytes(red)}))
-    };
     let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| {
-        let path = folder.path().join(name);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        path
-    };
     let card = "---\nconfigs:\n- config_name: one\n  data_files:\n  - split: test\n    path: one/test-*\n- config_name: two\n  data_files:\n  - split: val\n    path: two/*.parquet\n  - split: train\n    path: two/b.csv\n---\n";
-    fs::write(at("README.md"), card).unwrap();
+    fs::write(path_in(folder.path(), "README.md"), card).unwrap();
     write(
-        &at("one/test-00000-of-00002.parquet"),
-        &[question("first", 1)],
+        &path_in(folder.path(), "one/test-00000-of-00002.parquet"),
+        &[choice_question("first", 1)],
     );
     write(
-        &at("one/test-00001-of-00002.parquet"),
-        &[question("second", 2)],
+        &path_in(folder.path(), "one/test-00001-of-00002.parquet"),
+        &[choice_question("second", 2)],
     );
-    write(&at("two/a.parquet"), &[question("third", 3)]);
-    write(&at("two/b.csv"), &[question("fourth", 4)]);
-    let texts = |config: Option<&str>, split: Option<&str>| {
-        let args = SetArgs {
-            config_name: config.map(str::to_owned),
-            split: split.map(str::to_owned),
-            ..SetArgs::default()
-        };
-        let dataset = open(folder.path(), &args).map_err(|e| e.to_string())?;
-        let questions = read(&dataset).into_iter();
-        Ok::<Vec<(String, String)>, String>(questions.map(|read| (read.2, read.1)).collect())
-    };
-    let pair = |text: &str, family: &str| (text.to_owned(), family.to_owned());
+    write(
+        &path_in(folder.path(), "two/a.parquet"),
+        &[choice_question("third", 3)],
+    );
+    write(
+        &path_in(folder.path(), "two/b.csv"),
+        &[choice_question("fourth", 4)],
+    );
     assert!(
-        texts(None, None)
+        texts_and_families(folder.path(), None, None)
             .unwrap_err()
             .contains("2 configurations, one, two; --read config=NAME")
     );
     assert!(
-        texts(Some("three"), None)
+        texts_and_families(folder.path(), Some("three"), None)
             .unwrap_err()
             .contains("there are one, two")
     );
     assert_eq!(
-        texts(Some("one"), None).unwrap(),
+        texts_and_families(folder.path(), Some("one"), None).unwrap(),
         [pair("first", "other"), pair("second", "other")]
     );
     assert!(
-        texts(Some("two"), None)
+        texts_and_families(folder.path(), Some("two"), None)
             .unwrap_err()
             .contains("the splits train (files: 1), val (rows: 1); --read split=NAME")
     );
     assert_eq!(
-        texts(Some("two"), Some("train")).unwrap(),
+        texts_and_families(folder.path(), Some("two"), Some("train")).unwrap(),
         [pair("fourth", "other")]
     );
-    let all = texts(Some("all"), Some("all")).unwrap();
+    let all = texts_and_families(folder.path(), Some("all"), Some("all")).unwrap();
     assert_eq!(
         all,
         [
@@ -408,9 +434,9 @@ fn repository_has_configurations_splits_and_shards() {
             pair("fourth", "two")
         ]
     );
-    fs::remove_file(at("one/test-00001-of-00002.parquet")).unwrap();
+    fs::remove_file(path_in(folder.path(), "one/test-00001-of-00002.parquet")).unwrap();
     assert!(
-        texts(Some("one"), None)
+        texts_and_families(folder.path(), Some("one"), None)
             .unwrap_err()
             .contains("number 1 is missing")
     );

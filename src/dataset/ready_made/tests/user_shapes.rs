@@ -1,6 +1,6 @@
 //! Sets of users and recent benchmarks: read, or refused with a map that reads them.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::fixture::{base64, bytes, png, row, set};
 use super::{map, open, read, refusal};
@@ -86,19 +86,20 @@ fn question_column_with_unknown_name_is_suggested() {
     );
 }
 
+fn question_with_image_in(column: &str) -> Map<String, Value> {
+    let mut fields = row(
+        json!({"pid": "1", "question": "?", "image": "images/1.jpg", "choices": ["x", "y"], "answer": "y"}),
+    );
+    fields.insert(column.to_owned(), bytes(77));
+    fields
+}
+
 #[test]
 fn image_data_is_preferred_to_a_path() {
-    let fields = |column: &str| {
-        let mut fields = row(
-            json!({"pid": "1", "question": "?", "image": "images/1.jpg", "choices": ["x", "y"], "answer": "y"}),
-        );
-        fields.insert(column.to_owned(), bytes(77));
-        fields
-    };
-    let (_folder, path) = set("set.parquet", &[fields("decoded_image")]);
+    let (_folder, path) = set("set.parquet", &[question_with_image_in("decoded_image")]);
     assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].5, 77);
     // A column without a known name is suggested.
-    let (_folder, path) = set("set.parquet", &[fields("pixels")]);
+    let (_folder, path) = set("set.parquet", &[question_with_image_in("pixels")]);
     let problem = refusal(&path, &SetArgs::default());
     assert_eq!(
         read(&open(&path, &map_in(&problem)).unwrap())[0].5,
@@ -107,19 +108,20 @@ fn image_data_is_preferred_to_a_path() {
     );
 }
 
+fn question_with_index_in(column: &str, at: usize) -> Map<String, Value> {
+    let mut fields = row(
+        json!({"question_id": at.to_string(), "question": "?", "image": base64(at as u8), "choices": ["x", "y", "z"], "answer": ""}),
+    );
+    fields.insert(column.to_owned(), json!(at));
+    fields
+}
+
 #[test]
 fn index_answers_are_read_or_suggested() {
-    let fields = |column: &str, at: usize| {
-        let mut fields = row(
-            json!({"question_id": at.to_string(), "question": "?", "image": base64(at as u8), "choices": ["x", "y", "z"], "answer": ""}),
-        );
-        fields.insert(column.to_owned(), json!(at));
-        fields
-    };
     for form in ["json", "csv", "tsv", "parquet"] {
         let rows = [
-            fields("correct_choice_idx", 2),
-            fields("correct_choice_idx", 0),
+            question_with_index_in("correct_choice_idx", 2),
+            question_with_index_in("correct_choice_idx", 0),
         ];
         let (_folder, path) = set(&format!("set.{form}"), &rows);
         let args = if form == "json" {
@@ -132,7 +134,10 @@ fn index_answers_are_read_or_suggested() {
             Err(e) => panic!("{form}: {e}"),
         }
     }
-    let rows = [fields("richtig", 2), fields("richtig", 0)];
+    let rows = [
+        question_with_index_in("richtig", 2),
+        question_with_index_in("richtig", 0),
+    ];
     let (_folder, path) = set("set.json", &rows);
     let problem = refusal(&path, &SetArgs::default());
     assert!(problem.contains("--map answer=richtig:index0"), "{problem}");
@@ -150,13 +155,13 @@ fn template_has_a_number_width() {
         let args = map(&format!("image={template}"));
         assert_eq!(read(&open(&path, &args).unwrap())[0].5, 5, "{template}");
     }
-    for (template, says) in [
+    for (template, message) in [
         ("val/{image_id:099}.png", "a width of at most 64"),
         ("val/{image_id:x}.png", "image_id:x"),
         ("val/{image_id", "'}' is missing"),
     ] {
         let problem = refusal(&path, &map(&format!("image={template}")));
-        assert!(problem.contains(says), "{problem}");
+        assert!(problem.contains(message), "{problem}");
     }
 }
 

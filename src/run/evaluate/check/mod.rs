@@ -203,14 +203,13 @@ fn check_plan(args: EvaluateArgs, progress: &Progress, findings: &mut Findings) 
 fn save_questions(path: &Path, dataset: &Dataset, questions: &[Question]) -> Result<()> {
     let mut text = String::new();
     for question in questions {
-        let digest = |frame| match dataset.picture(frame) {
-            Ok(Picture::Encoded(file)) => Some(hex(&Sha256::digest(file.bytes()))),
-            _ => None,
-        };
         let digests: Vec<Option<String>> = dataset
             .shown_frames(&question.frame)
             .iter()
-            .map(digest)
+            .map(|frame| match dataset.picture(frame) {
+                Ok(Picture::Encoded(file)) => Some(hex(&Sha256::digest(file.bytes()))),
+                _ => None,
+            })
             .collect();
         let digest = match &*digests {
             [only] => json!(only),

@@ -101,15 +101,14 @@ fn warn_of_repeats(questions: &[Question], findings: &mut Findings) {
 fn warn_of_contained_answers(questions: &[Question], findings: &mut Findings) {
     for question in questions {
         let text = format!(" {} ", words(&question.text));
-        let is_contained = |choice: &String| text.contains(&format!(" {} ", words(choice)));
         let texts = question.choices.texts();
         let Some(truth) = question.choices.truth().map(|truth| &texts[truth]) else {
             continue;
         };
         let is_other_contained = texts
             .iter()
-            .any(|choice| choice != truth && is_contained(choice));
-        if words(truth).len() > 2 && is_contained(truth) && !is_other_contained {
+            .any(|choice| choice != truth && contains_words(&text, choice));
+        if words(truth).len() > 2 && contains_words(&text, truth) && !is_other_contained {
             let line = format!(
                 "the question {:?} holds its answer {:?}: {:?}",
                 excerpt(&question.id.0, 60),
@@ -119,6 +118,10 @@ fn warn_of_contained_answers(questions: &[Question], findings: &mut Findings) {
             findings.add_of_kind("questions that hold their answers", Mark::Warning, line);
         }
     }
+}
+
+fn contains_words(text: &str, choice: &str) -> bool {
+    text.contains(&format!(" {} ", words(choice)))
 }
 
 /// The words of a text in lower case, separated by single spaces.

@@ -17,11 +17,10 @@ use darkqa_light::LightSettings;
 pub(super) fn check_settings(args: &EvaluateArgs, findings: &mut Findings) {
     let place = args.scene.place(args.data.place());
     let set = args.scene.set_light(&place);
-    let enhancers = |set| args.job.enhancers.clone().for_set(set);
     let light = set.and_then(|set| Ok((set, LightSettings::resolve(&args.job.light, set)?)));
     match &light {
         Ok((set, light)) => {
-            let used = check_used(light, &enhancers(*set));
+            let used = check_used(light, &args.job.enhancers.clone().for_set(*set));
             add(findings, used.map(|()| None));
         }
         Err(e) => findings.problem(e.to_string()),

@@ -103,10 +103,9 @@ impl MockServer {
                 self.accepted[0] + minute - now
             }
             Limit::Fixed(max) => {
-                let minute_of = |at: Instant| (at - self.start).as_secs() / 60;
-                let current = minute_of(now);
+                let current = minute_of(self.start, now);
                 self.accepted
-                    .retain(|accepted| minute_of(*accepted) == current);
+                    .retain(|accepted| minute_of(self.start, *accepted) == current);
                 if self.accepted.len() < max {
                     self.accepted.push(now);
                     return Ok(());
@@ -132,13 +131,16 @@ pub(super) struct Simulation {
 impl Simulation {
     /// Maximum number of requests in any 60 seconds.
     pub(super) fn max_per_minute(&self) -> usize {
-        let count_from = |first: &Instant| {
-            self.sent
-                .iter()
-                .filter(|sent| *sent >= first && **sent - *first < Duration::from_mins(1))
-                .count()
-        };
-        self.sent.iter().map(count_from).max().unwrap_or(0)
+        self.sent
+            .iter()
+            .map(|first| {
+                self.sent
+                    .iter()
+                    .filter(|sent| *sent >= first && **sent - *first < Duration::from_mins(1))
+                    .count()
+            })
+            .max()
+            .unwrap_or(0)
     }
 }
 
@@ -198,4 +200,8 @@ pub(super) async fn simulate(
         refused: refused.load(Relaxed),
         sent,
     }
+}
+
+fn minute_of(start: Instant, at: Instant) -> u64 {
+    (at - start).as_secs() / 60
 }

@@ -1,4 +1,4 @@
-//! Alerts about replies that were parsed by another version of the lenient rules: [`reading_alerts`].
+//! Alerts about replies that were parsed by another version of the lenient rules: [`parsing_alerts`].
 
 use crate::run_reports::combine::Combined;
 use crate::run_reports::lenient_change::LenientChange;
@@ -6,7 +6,7 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::types::TrialRef;
 
 /// One alert for each run whose lenient parsing would change under the rules of this version.
-pub(super) fn reading_alerts(combined: &Combined) -> Vec<Alert> {
+pub(super) fn parsing_alerts(combined: &Combined) -> Vec<Alert> {
     combined
         .runs
         .iter()
