@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::tables;
 use crate::drawing::chart::Figure;
-use crate::drawing::samples::{SamplePage, samples};
+use crate::drawing::samples::{SampleTable, samples};
 use crate::tables::{ENHANCERS, Section};
 use crate::text::table::Table;
 use crate::types::Thumbnail;
@@ -16,7 +16,7 @@ pub(super) struct PageSection<'a> {
     title: &'static str,
     note: &'static str,
     figures: Vec<&'a Figure>,
-    samples: Vec<SamplePage>,
+    samples: Vec<SampleTable>,
     tables: Vec<tables::PageTable<'a>>,
 }
 

@@ -151,7 +151,7 @@ pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rg
         .map(|(pair, images)| CropRow {
             name: format!("{} (drop {:.2} EV)", pair.pair, pair.drop),
             images: images.iter().collect(),
-            amplified: f64::from(pair.drop).exp2(),
+            gain: f64::from(pair.drop).exp2(),
         })
         .collect();
     let noise = pairs.iter().take(1).flat_map(|(pair, _)| &pair.noise);
