@@ -2,7 +2,7 @@
 
 use crate::drawing::chart;
 use crate::drawing::chart::Figure;
-use crate::drawing::figures::{Names, drawings};
+use crate::drawing::figures::{Names, figure_specs};
 use crate::drawing::paper::figure;
 use crate::drawing::samples::{self, samples};
 use crate::drawing::views;
@@ -22,9 +22,9 @@ pub fn products<'a>(
     report: &'a ChoiceReport<'a>,
     inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures: Vec<Figure> = drawings(report.findings, &Names::default())
+    let figures: Vec<Figure> = figure_specs(report.findings, &Names::default())
         .into_iter()
-        .chain(views::drawings(report.findings))
+        .chain(views::figure_specs(report.findings))
         .map(|drawing| figure(drawing.name, &drawing.caption, &drawing.chart))
         .collect::<Result<_>>()?;
     let page = page(report, &figures, inputs)?;
@@ -40,7 +40,7 @@ pub(super) fn files(
     inputs: &PageInputs<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = table_files(tables, sentences, "Findings and tables")?;
-    files.extend(chart::files(figures));
+    files.extend(chart::svg_files(figures));
     for samples in samples(inputs.thumbnails) {
         let name = format!("figures/{}.svg", samples.name);
         files.push((name, samples::figure(&samples).into_bytes()));

@@ -2,8 +2,8 @@
 
 use super::open_report::OpenReport;
 use super::tables::ladder;
-use crate::drawing::chart::drawn::Drawn;
-use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use crate::drawing::chart::figure_chart::FigureChart;
+use crate::drawing::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
 use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
@@ -51,7 +51,7 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     charts
         .into_iter()
         .filter(|(_, _, chart)| !chart.panels.is_empty())
-        .map(|(name, caption, chart)| figure(name, caption, &Drawn::Lines(chart)))
+        .map(|(name, caption, chart)| figure(name, caption, &FigureChart::Lines(chart)))
         .collect()
 }
 
@@ -113,7 +113,7 @@ fn curve(
     PlotLine {
         name: format!("{}, {}", series.model, series.light(&[])),
         style,
-        content: PanelContent::Curve(points),
+        content: LineContent::Curve(points),
         model: Some(series.model.to_owned()),
         items: None,
     }
@@ -124,7 +124,7 @@ fn flat_line(subject: &ModelInCondition, cell: &OpenCell, style: LineStyle) -> O
     Some(PlotLine {
         name: format!("{} without images", subject.model),
         style,
-        content: PanelContent::Flat(cell.score?.value),
+        content: LineContent::Flat(cell.score?.value),
         model: Some(subject.model.clone()),
         items: None,
     })

@@ -42,7 +42,7 @@ pub(crate) fn products(
     let figures = figure::figures(report)?;
     let page = page::page(report, tables, &figures)?;
     let mut files = table_files(tables, &[], "Table")?;
-    files.extend(chart::files(figures));
+    files.extend(chart::svg_files(figures));
     files.extend(upstream::files(report)?);
     files.push((PAGE.to_owned(), page.into_bytes()));
     Ok(files)

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::inputs::PageInputs;
 use super::strip::Strip;
-use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::chart::{Chart, Figure};
 use crate::drawing::figures::{Names, overview, split};
 use crate::drawing::paper::figure;
@@ -161,7 +161,7 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
                 panels: split(chart.panels.clone()),
                 ..chart.clone()
             };
-            figure("head", caption, &Drawn::Lines(chart))
+            figure("head", caption, &FigureChart::Lines(chart))
         })
         .transpose()
 }

@@ -17,23 +17,23 @@ pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
             .classes
             .iter()
             .map(|(class, coverage)| (class.clone(), count(coverage)));
-        CountPanel::ranked(title, counts)
+        CountPanel::from_counts(title, counts)
     };
     let families = summary.candidates.iter();
     let rooms = summary.rooms.iter();
     let mut panels = vec![
-        CountPanel::ranked(
+        CountPanel::from_counts(
             "Questions by family",
             families.map(|(family, candidates)| (family.to_string(), candidates.asked)),
         ),
-        CountPanel::ranked(
+        CountPanel::from_counts(
             "Frames by room",
             rooms.map(|(room, counts)| (room.clone(), counts.frames as u64)),
         ),
     ];
     for family in Family::PAPER {
         if let Some(answers) = summary.answers.get(&family) {
-            panels.push(CountPanel::ranked(
+            panels.push(CountPanel::from_counts(
                 &format!("Answers: {family}"),
                 answers
                     .iter()

@@ -1,7 +1,7 @@
 //! Figures of a run without true answers: [`figures`].
 
-use crate::drawing::chart::drawn::Drawn;
-use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use crate::drawing::chart::figure_chart::FigureChart;
+use crate::drawing::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
 use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
@@ -56,7 +56,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
     for (name, caption, measure, panels) in charts {
         let has_points = |panel: &Panel| {
             panel.lines.iter().any(
-                |line| matches!(&line.content, PanelContent::Curve(points) if !points.is_empty()),
+                |line| matches!(&line.content, LineContent::Curve(points) if !points.is_empty()),
             )
         };
         let panels: Vec<Panel> = panels.into_iter().filter(has_points).collect();
@@ -69,7 +69,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
             columns: 2,
             note: note.clone(),
         };
-        figures.push(figure(name, caption, &Drawn::Lines(chart))?);
+        figures.push(figure(name, caption, &FigureChart::Lines(chart))?);
     }
     Ok(figures)
 }
@@ -118,7 +118,7 @@ fn line(
     PlotLine {
         name: series.model.to_owned(),
         style: style(found, series.model),
-        content: PanelContent::Curve(points),
+        content: LineContent::Curve(points),
         model: Some(series.model.to_owned()),
         items: None,
     }
@@ -141,7 +141,7 @@ fn floors(found: &SelfAgreement<'_>) -> Vec<PlotLine> {
             Some(PlotLine {
                 name: format!("{model} without images"),
                 style: style(found, model),
-                content: PanelContent::Flat(cell.agreement?.value),
+                content: LineContent::Flat(cell.agreement?.value),
                 model: Some(model.to_owned()),
                 items: None,
             })
