@@ -2,6 +2,8 @@
 
 mod answers;
 mod confidence;
+mod enhancers;
+mod mean;
 mod names;
 mod overview;
 mod photographed;
@@ -22,6 +24,7 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::{CHANCE, ModelInCondition, pooled_models};
 
+use mean::mean;
 pub(crate) use names::{KnownNames, Names};
 pub(crate) use overview::{OverviewPanels, overview};
 pub(crate) use split::split;
@@ -182,15 +185,6 @@ impl<'a> FigureBuilder<'a> {
     /// `None` for raw images, then each enhancer.
     fn raw_and_enhanced(&self) -> impl Iterator<Item = Option<&EnhancerName>> {
         std::iter::once(None).chain(self.enhancers.iter().copied().map(Some))
-    }
-
-    /// True if clean frames (L0) were enhanced.
-    fn has_enhanced_clean(&self) -> bool {
-        self.findings
-            .grid
-            .subjects
-            .iter()
-            .any(|subject| subject.level == Some(AxisLevel::L0) && subject.enhancer.is_some())
     }
 
     /// Accuracy of a model in a condition on a family, or on all (`None`), by strict parsing.
@@ -512,50 +506,6 @@ impl<'a> FigureBuilder<'a> {
         )
     }
 
-    /// Accuracy raw and with each enhancer by level: one panel for each model in each variant.
-    fn enhancers(&self) -> Option<(String, Chart)> {
-        let mut panels = Vec::new();
-        for variant in self.tested_variants() {
-            for model in &self.models {
-                let mut lines = Vec::new();
-                for (index, enhancer) in self.raw_and_enhanced().enumerate() {
-                    let points = self.accuracy_points(model, &variant, enhancer);
-                    // A single level makes no line, except L0 enhanced, which is drawn as a point.
-                    let has_clean = points
-                        .first()
-                        .is_some_and(|(level, _)| *level == AxisLevel::L0);
-                    if points.len() > 1 || has_clean {
-                        lines.push(PlotLine {
-                            name: self.enhancer_line_name(enhancer),
-                            style: LineStyle(index),
-                            content: LineContent::Curve(points),
-                            model: Some((*model).to_owned()),
-                            items: LineItems::for_model(&[*model], &variant, enhancer),
-                        });
-                    }
-                }
-                if lines.len() > 1 {
-                    let (name, light) = (
-                        self.names.display_name(model),
-                        self.condition_text(&variant, None),
-                    );
-                    let title = format!("{name}, {light}, n {}", self.item_count(None));
-                    panels.push(Panel {
-                        title,
-                        lines,
-                        model: Some((*model).to_owned()),
-                    });
-                }
-            }
-        }
-        let caption = if self.has_enhanced_clean() {
-            "Each enhancer against the raw images, by level. L0 is the untouched frame, in the line of an enhancer enhanced with it where that was asked."
-        } else {
-            "Each enhancer against the raw dark images, by level. L0 is the untouched frame."
-        };
-        self.chart(ACCURACY, panels, 2, caption)
-    }
-
     /// Accuracy of each model by level in the main variant: one panel for each family.
     fn families(&self) -> Option<(String, Chart)> {
         let variant = &self.main_variant()?;
@@ -601,34 +551,4 @@ impl<'a> FigureBuilder<'a> {
         };
         Some((caption.to_owned(), chart))
     }
-}
-
-/// Mean of curves at the levels that all of them have, with the curves' range as interval. A single curve is returned unchanged.
-fn mean(curves: &[Vec<(AxisLevel, Estimate)>]) -> Vec<(AxisLevel, Estimate)> {
-    if let [single] = curves {
-        return single.clone();
-    }
-    let levels: BTreeSet<AxisLevel> = curves.iter().flatten().map(|(level, _)| *level).collect();
-    levels
-        .into_iter()
-        .filter_map(|level| Some((level, mean_at(curves, level)?)))
-        .collect()
-}
-
-/// Mean of curves at one level, with their range; `None` if a curve has no point there.
-fn mean_at(curves: &[Vec<(AxisLevel, Estimate)>], level: AxisLevel) -> Option<Estimate> {
-    let values: Option<Vec<f64>> = curves
-        .iter()
-        .map(|curve| {
-            let point = curve.iter().find(|(other, _)| *other == level);
-            point.map(|(_, estimate)| estimate.value)
-        })
-        .collect();
-    let values = values.filter(|values| !values.is_empty())?;
-    Some(Estimate {
-        value: values.iter().sum::<f64>() / values.len() as f64,
-        low: values.iter().copied().fold(f64::INFINITY, f64::min),
-        high: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
-        n: values.len(),
-    })
 }

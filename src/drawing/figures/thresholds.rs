@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::{FigureBuilder, FigureSpec};
 use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::chart::thresholds::{Scale, ThresholdChart, ThresholdRow};
-use crate::tables::level_words;
+use crate::tables::missing_threshold_reason;
 use crate::text::words::stops;
 use crate::types::degradations::Axis;
 use darkqa_score::accuracies::Curve;
@@ -22,7 +22,7 @@ pub(crate) fn missing_threshold_message(findings: &Findings<'_>, figure: &str) -
     let (_, axis) = NAMES.into_iter().find(|(name, _)| *name == figure)?;
     let reasons: BTreeSet<String> = curves_on(findings, axis)
         .filter_map(|curve| curve.summary.threshold.as_ref().err())
-        .map(level_words)
+        .map(missing_threshold_reason)
         .collect();
     let reasons: Vec<String> = reasons.into_iter().collect();
     (!reasons.is_empty()).then(|| format!("no curve has a threshold: {}", reasons.join("; ")))

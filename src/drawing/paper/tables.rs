@@ -1,8 +1,8 @@
 //! LaTeX tables that fit the columns of a paper: [`tables`].
 //!
-//! A table is set at 8 pt, its intervals at 5 pt. Widths are estimated with the bundled font, which is wider than the Times of these papers.
-//! The first layout that fits is used: intervals with one decimal, intervals without decimals, names on several lines, and last the
-//! columns in several parts below one another.
+//! A table is set at 8 pt, its intervals at 5 pt. Widths are estimated with the bundled font, which is wider than Times, the font of these
+//! papers. The first layout that fits is used: intervals with one decimal, intervals without decimals, names on several lines, and last
+//! the columns in several parts below one another.
 
 use std::fmt::Write;
 use std::ops::Range;
