@@ -1,4 +1,4 @@
-//! All files of a report: [`products`].
+//! Files of a report: [`products`].
 
 use crate::drawing::chart;
 use crate::drawing::chart::Figure;
@@ -25,13 +25,13 @@ pub fn products<'a>(
     let figures: Vec<Figure> = figure_specs(report.findings, &Names::default())
         .into_iter()
         .chain(views::figure_specs(report.findings))
-        .map(|drawing| figure(drawing.name, &drawing.caption, &drawing.chart))
+        .map(|spec| figure(spec.name, &spec.caption, &spec.chart))
         .collect::<Result<_>>()?;
     let page = page(report, &figures, inputs)?;
     files(&report.tables, &report.sentences, figures, page, inputs)
 }
 
-/// The files of a report with its figures, samples and page.
+/// Files of tables, figures, sample images and the page.
 pub(super) fn files(
     tables: &[Table],
     sentences: &[Sentence],
@@ -49,7 +49,7 @@ pub(super) fn files(
     Ok(files)
 }
 
-/// The tables as CSV files, and one LaTeX file that begins with the findings; `head` names both there.
+/// Tables as CSV files, and as one LaTeX file that starts with the findings; `head` is the title of the LaTeX file.
 pub(super) fn table_files(
     tables: &[Table],
     sentences: &[Sentence],
