@@ -9,7 +9,7 @@ use crate::tables::{ENHANCERS, Section};
 use crate::text::table::Table;
 use crate::types::Thumbnail;
 
-/// A section as the template reads it.
+/// Section for the template.
 #[derive(Serialize)]
 pub(super) struct PageSection<'a> {
     id: &'static str,
