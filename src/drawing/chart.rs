@@ -1,11 +1,11 @@
-//! Figures of reports: a [`Chart`] of lines over the levels, and others.
+//! Data of a report's figures, before they are drawn: line charts over the levels ([`Chart`]), bars, points, counts and thresholds.
 //!
 //! Lines differ by colour, and also by dash and marker, so that they can be distinguished without colour.
 
 pub(crate) mod bars;
 pub(crate) mod counts;
 pub(crate) mod data;
-pub(crate) mod drawn;
+pub(crate) mod figure_chart;
 pub(crate) mod points;
 pub(crate) mod reliability;
 pub(crate) mod thresholds;
@@ -20,8 +20,8 @@ use darkqa_score::estimate::Estimate;
 /// Colour of axes and text, and of lines that belong to no model.
 pub(crate) const INK: [u8; 3] = [34, 34, 34];
 
-/// Six colours, found by search: contrast with white of 3.1 at least, and a distance by CIEDE2000 of any two of 21 at least in normal,
-/// protanopic, deuteranopic and tritanopic sight (Machado, Oliveira and Fernandes 2009, severity 1).
+/// Six colours, found by search. Each has a contrast with white of at least 3.1. Any two differ by a CIEDE2000 distance of at least 21 in
+/// normal, protanopic, deuteranopic and tritanopic vision (Machado, Oliveira and Fernandes 2009, severity 1).
 pub(crate) const COLOURS: [[u8; 3]; 6] = [
     [0x01, 0x97, 0xea],
     [0x72, 0x11, 0x57],
@@ -31,7 +31,7 @@ pub(crate) const COLOURS: [[u8; 3]; 6] = [
     [0x2d, 0x45, 0x19],
 ];
 
-/// One figure of a report.
+/// A drawn figure of a report.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Figure {
     /// Name of the figure in files.
@@ -40,29 +40,29 @@ pub(crate) struct Figure {
     pub caption: String,
     /// The figure as SVG.
     pub svg: String,
-    /// The data of the chart for the script of the page; `None` for a figure that the page shows as it is.
+    /// Data of the chart as JSON, for the page's script; `None` for a figure that the page shows as a static image.
     pub data: Option<String>,
 }
 
-/// Figures as files: name and contents.
-pub(crate) fn files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u8>)> {
+/// SVG files of the figures: path in the report's folder, and contents.
+pub(crate) fn svg_files(figures: Vec<Figure>) -> impl Iterator<Item = (String, Vec<u8>)> {
     figures.into_iter().map(|figure| {
         let name = format!("figures/{}.svg", figure.name);
         (name, figure.svg.into_bytes())
     })
 }
 
-/// Colour, dash and marker of a line. The same number gives the same style in every figure of a report.
+/// Number of a line's colour, dash and marker. The same number gives the same style in every figure of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct LineStyle(pub usize);
 
 impl LineStyle {
-    /// Style of lines that belong to no model: chance, and the most frequent true answer.
+    /// Style of reference lines: chance, and the most frequent true answer.
     pub(crate) const REFERENCE: Self = Self(27);
-    /// Style of the model that a reader asked to be drawn black.
+    /// Style of the model that `--reference` draws in black.
     pub(crate) const BLACK: Self = Self(1000);
 
-    /// Red, green and blue of the colour.
+    /// Colour of the line, as red, green and blue.
     pub(crate) fn rgb(self) -> [u8; 3] {
         match self {
             Self::REFERENCE => INK,
@@ -74,21 +74,21 @@ impl LineStyle {
 
 /// Data of a line in a panel.
 #[derive(Debug, Clone)]
-pub(crate) enum PanelContent {
+pub(crate) enum LineContent {
     /// Points over the levels, with a band of their intervals.
     Curve(Vec<(AxisLevel, Estimate)>),
-    /// A share that is the same at all levels.
+    /// A horizontal line: a share that does not depend on the level.
     Flat(f64),
-    /// Shares at a darkness that is no level.
+    /// Separate marks for photographs in the dark.
     Marks(Vec<DarkMark>),
 }
 
-/// A share at a darkness that is no level: a photograph in the dark. It is never joined to a curve, which is of synthetic images.
+/// Share of a set of photographs in the dark. Their darkness is measured, not one of the levels, so the mark is never joined to a curve of
+/// synthetic images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DarkMark {
-    /// Lower quartile, median and upper quartile of the exposure drop, in EV.
+    /// Lower quartile, median and upper quartile of the photographs' exposure drop, in EV.
     pub ev: [f64; 3],
-    /// The share with its interval.
     pub share: Estimate,
 }
 
@@ -98,14 +98,14 @@ pub(crate) struct PlotLine {
     /// Name in the legend. Lines with the same name share one entry.
     pub name: String,
     pub style: LineStyle,
-    pub content: PanelContent,
-    /// The model that it is about; `None` of a line about several, or about none.
+    pub content: LineContent,
+    /// The line's model; `None` for a line about several models, or about none.
     pub model: Option<String>,
-    /// The items behind its points in the list of the page; `None` if the list does not show them.
+    /// Filter that selects the line's items in the list of the page; `None` if the list does not show them.
     pub items: Option<LineItems>,
 }
 
-/// The items behind the points of a line: those that a model was asked in one variant, of one family or of all.
+/// Filter for the page's list of items: the items that a model was asked in one variant, in one family or in all.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct LineItems {
     model: String,
@@ -116,7 +116,7 @@ pub(crate) struct LineItems {
 }
 
 impl LineItems {
-    /// The items of all families that the only one of these models was asked; `None` of several models.
+    /// Selects the items of all families; `None` unless `models` has exactly one model.
     pub(crate) fn for_model(
         models: &[&str],
         variant: &Variant,
@@ -139,30 +139,30 @@ pub(crate) struct Panel {
     /// Title, with the number of questions.
     pub title: String,
     pub lines: Vec<PlotLine>,
-    /// The model that all its lines are about; `None` if there are several.
+    /// The model of all lines; `None` if there are several.
     pub model: Option<String>,
 }
 
 impl PlotLine {
-    /// Whether nothing of the line is drawn.
+    /// True if nothing of the line is drawn.
     pub(crate) fn is_empty(&self) -> bool {
         match &self.content {
-            PanelContent::Curve(points) => points.is_empty(),
-            PanelContent::Marks(marks) => marks.is_empty(),
-            PanelContent::Flat(_) => false,
+            LineContent::Curve(points) => points.is_empty(),
+            LineContent::Marks(marks) => marks.is_empty(),
+            LineContent::Flat(_) => false,
         }
     }
 }
 
 impl Panel {
-    /// The levels of its curves, from L0.
+    /// Levels of all curves of the panel, from L0.
     pub(crate) fn levels(&self) -> Vec<AxisLevel> {
         let mut levels: Vec<AxisLevel> = self
             .lines
             .iter()
             .flat_map(|line| match &line.content {
-                PanelContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
-                PanelContent::Flat(_) | PanelContent::Marks(_) => Vec::new(),
+                LineContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
+                LineContent::Flat(_) | LineContent::Marks(_) => Vec::new(),
             })
             .collect();
         levels.sort_unstable();
@@ -170,14 +170,14 @@ impl Panel {
         levels
     }
 
-    /// The right end of the axis, in the unit of the levels.
-    pub(crate) fn farthest(&self) -> f64 {
+    /// Largest value on the horizontal axis, in the unit of the levels.
+    pub(crate) fn axis_end(&self) -> f64 {
         let marks = self
             .lines
             .iter()
             .flat_map(|line| match &line.content {
-                PanelContent::Marks(marks) => &marks[..],
-                PanelContent::Flat(_) | PanelContent::Curve(_) => &[],
+                LineContent::Marks(marks) => &marks[..],
+                LineContent::Flat(_) | LineContent::Curve(_) => &[],
             })
             .map(|mark| mark.ev[2]);
         self.levels()
@@ -204,6 +204,6 @@ pub(crate) struct Chart {
     pub panels: Vec<Panel>,
     /// Number of panels in a row.
     pub columns: usize,
-    /// Further text of the caption.
+    /// Text for the end of the caption.
     pub note: String,
 }

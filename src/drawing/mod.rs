@@ -1,4 +1,4 @@
-//! Figures: a [`chart`] is what a figure shows, [`paper`] draws it as SVG and PDF, and [`sheet`] arranges images that are handed in.
+//! Figures: a [`chart`] has a figure's data, [`paper`] draws it as SVG and PDF, and [`sheet`] arranges given images as one image.
 
 pub(crate) mod chart;
 pub(crate) mod figures;

@@ -1,4 +1,4 @@
-//! Thumbnails of the first frames by level, for the page ([`samples`]) and as a figure ([`figure`]).
+//! Sample images of the first frames by level, as a table of the page ([`samples`]) and as a figure ([`figure`]).
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -10,10 +10,10 @@ use crate::types::degradations::Axis;
 use crate::types::text::shown;
 use crate::types::{AxisLevel, Condition, EnhancerName, FrameId, RunGroup, Thumbnail, Variant};
 
-/// The samples of one axis.
+/// Table of sample images at the levels of one axis.
 #[derive(Serialize)]
-pub(crate) struct SamplePage {
-    /// Name of the figure's file.
+pub(crate) struct SampleTable {
+    /// File name of the figure, without its extension.
     #[serde(skip)]
     pub(crate) name: &'static str,
     levels: Vec<String>,
@@ -32,62 +32,60 @@ struct SampleImage {
     alt: String,
 }
 
-/// Maximum number of frames that are shown.
+/// Maximum number of frames in a table (chosen).
 const MAX_FRAMES: usize = 3;
 
-/// The first frames by level, with a row for each variant and enhancer: a page for each axis. Empty without thumbnails.
-pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SamplePage> {
-    let axis = |thumbnail: &Thumbnail| thumbnail.condition.level().axis();
-    Axis::present(|on| {
+/// Sample images of the first frames: a table for each axis, with a row for each frame, variant and enhancer. Empty without thumbnails.
+pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SampleTable> {
+    Axis::present(|axis| {
         thumbnails
             .iter()
-            .any(|thumbnail| axis(thumbnail) == Some(on))
+            .any(|thumbnail| thumbnail.condition.level().axis() == Some(axis))
     })
     .into_iter()
-    .filter_map(|on| {
-        let all: Vec<&Thumbnail> = thumbnails
+    .filter_map(|axis| {
+        let on_axis: Vec<&Thumbnail> = thumbnails
             .iter()
-            .filter(|of| of.condition.level().is_shown_on(on))
+            .filter(|thumbnail| thumbnail.condition.level().is_shown_on(axis))
             .collect();
-        axis_page(&all, on)
+        axis_table(&on_axis, axis)
     })
     .collect()
 }
 
-/// The page of the thumbnails of one axis; `None` without any.
-fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
+/// Table of the thumbnails on one axis; `None` without any.
+fn axis_table(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SampleTable> {
     let mut frames: Vec<&FrameId> = thumbnails
         .iter()
         .map(|thumbnail| &thumbnail.frame)
         .collect();
     frames.sort_unstable();
     frames.dedup();
-    let levels: BTreeSet<AxisLevel> = thumbnails.iter().map(|of| of.condition.level()).collect();
-    let lines = lines(thumbnails);
+    let levels: BTreeSet<AxisLevel> = thumbnails
+        .iter()
+        .map(|thumbnail| thumbnail.condition.level())
+        .collect();
+    let lights = row_lights(thumbnails);
     let mut rows = Vec::new();
     for frame in frames.into_iter().take(MAX_FRAMES) {
-        for (variant, enhancer) in &lines {
-            let is_shown = |condition: &Condition, at: AxisLevel| {
-                condition.level() == at
-                    && (condition.kind_reading() == *variant
-                        && condition.enhancer.as_ref() == *enhancer
-                        || at == AxisLevel::L0
-                            && condition.enhancer.as_ref() == *enhancer
-                            && RunGroup::meet(condition.group.as_ref(), variant.group.as_ref()))
-            };
-            let images = levels.iter().map(|at| {
-                let thumbnail = thumbnails
-                    .iter()
-                    .filter(|thumbnail| thumbnail.frame == *frame)
-                    .find(|thumbnail| is_shown(&thumbnail.condition, *at))?;
-                Some(SampleImage {
-                    url: thumbnail.small.clone(),
-                    alt: format!("{} at {}", frame, thumbnail.condition),
+        for (variant, enhancer) in &lights {
+            let images = levels
+                .iter()
+                .map(|level| {
+                    let thumbnail = thumbnails.iter().find(|thumbnail| {
+                        thumbnail.frame == *frame
+                            && thumbnail.condition.level() == *level
+                            && belongs_to_row(&thumbnail.condition, variant, *enhancer)
+                    })?;
+                    Some(SampleImage {
+                        url: thumbnail.small.clone(),
+                        alt: format!("{} at {}", frame, thumbnail.condition),
+                    })
                 })
-            });
+                .collect();
             rows.push(SampleRow {
                 name: format!("{frame}, {}", light(variant, *enhancer)),
-                images: images.collect(),
+                images,
             });
         }
     }
@@ -95,7 +93,7 @@ fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
         AxisLevel::PAIR => level.to_string(),
         _ => format!("{level}, {} {}", level.value(), axis.unit),
     });
-    (!rows.is_empty()).then(|| SamplePage {
+    (!rows.is_empty()).then(|| SampleTable {
         name: match axis {
             Axis::MOTION => "blur_samples",
             _ => "samples",
@@ -105,28 +103,42 @@ fn axis_page(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SamplePage> {
     })
 }
 
-/// The rows of a frame: each variant, raw and with each enhancer. The clean frames stand in the rows of the degraded ones; they have a
-/// row of their own if there is no other, raw or with the same enhancer.
-fn lines<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(Variant, Option<&'a EnhancerName>)> {
-    let all = thumbnails
-        .iter()
-        .map(|t| (t.condition.kind_reading(), t.condition.enhancer.as_ref()));
-    let (mut lines, clean): (BTreeSet<_>, BTreeSet<_>) =
-        all.partition(|(variant, _)| variant.is_degraded());
-    for (_, enhancer) in clean {
-        if lines.iter().all(|(_, other)| *other != enhancer) {
-            lines.insert((Variant::NONE, enhancer));
-        }
-    }
-    lines
+/// True if an image of a condition belongs to the row of a variant and an enhancer. Clean frames (L0) belong to all variants of their run
+/// groups.
+fn belongs_to_row(
+    condition: &Condition,
+    variant: &Variant,
+    enhancer: Option<&EnhancerName>,
+) -> bool {
+    let is_clean_frame = condition.level() == AxisLevel::L0
+        && RunGroup::meet(condition.group.as_ref(), variant.group.as_ref());
+    condition.enhancer.as_ref() == enhancer
+        && (condition.kind_reading() == *variant || is_clean_frame)
 }
 
-/// Width and height of an image in the figure, and width of the names and height of the levels, in pixels.
+/// Variant and enhancer of each row of a frame. Clean frames are in the rows of the degraded ones; they get a row of their own if no
+/// degraded image has the same enhancer (or none).
+fn row_lights<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(Variant, Option<&'a EnhancerName>)> {
+    let (mut lights, clean): (BTreeSet<_>, BTreeSet<_>) = thumbnails
+        .iter()
+        .map(|thumbnail| &thumbnail.condition)
+        .map(|condition| (condition.kind_reading(), condition.enhancer.as_ref()))
+        .partition(|(variant, _)| variant.is_degraded());
+    for (_, enhancer) in clean {
+        if lights.iter().all(|(_, other)| *other != enhancer) {
+            lights.insert((Variant::NONE, enhancer));
+        }
+    }
+    lights
+}
+
+/// Width and height of an image in the figure, in pixels.
 const CELL: [usize; 2] = [200, 150];
+/// Width of the row names and height of the level names, in pixels.
 const HEAD: [usize; 2] = [180, 28];
 
-/// The samples as one SVG, with the images embedded.
-pub(crate) fn figure(samples: &SamplePage) -> String {
+/// Draws a table as one SVG, with the images embedded.
+pub(crate) fn figure(samples: &SampleTable) -> String {
     let size = [
         HEAD[0] + samples.levels.len() * (CELL[0] + 4),
         HEAD[1] + samples.rows.len() * (CELL[1] + 4),
@@ -147,7 +159,7 @@ pub(crate) fn figure(samples: &SamplePage) -> String {
         let y = HEAD[1] + index * (CELL[1] + 4);
         for (line, part) in row.name.split(", ").enumerate() {
             let baseline = y + CELL[1] / 2 + line * 18;
-            let part = escaped(part);
+            let part = escape_xml(part);
             let _ = writeln!(svg, "<text x=\"8\" y=\"{baseline}\">{part}</text>");
         }
         for (column, image) in row.images.iter().enumerate() {
@@ -164,8 +176,8 @@ pub(crate) fn figure(samples: &SamplePage) -> String {
     svg + "</svg>\n"
 }
 
-/// Text with the special characters of XML escaped.
-fn escaped(text: &str) -> String {
+/// Escapes hidden characters, and the special characters of XML.
+fn escape_xml(text: &str) -> String {
     shown(text)
         .replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -177,11 +189,20 @@ mod tests {
     use super::*;
     use crate::types::Digest;
 
-    /// The samples of thumbnails of one axis.
-    fn only(thumbnails: &[Thumbnail]) -> SamplePage {
-        let mut pages = samples(thumbnails);
-        assert_eq!(pages.len(), 1);
-        pages.remove(0)
+    /// The only table of some thumbnails.
+    fn single_table(thumbnails: &[Thumbnail]) -> SampleTable {
+        let mut tables = samples(thumbnails);
+        assert_eq!(tables.len(), 1);
+        tables.remove(0)
+    }
+
+    /// Image URLs of a row; empty without an image.
+    fn urls(row: &SampleRow) -> Vec<String> {
+        row.images
+            .iter()
+            .map(|image| image.as_ref().map(|image| image.url.clone()))
+            .map(Option::unwrap_or_default)
+            .collect()
     }
 
     fn thumbnail(condition: &str) -> Thumbnail {
@@ -198,49 +219,47 @@ mod tests {
     }
 
     #[test]
-    fn each_axis_has_its_page() {
+    fn each_axis_has_a_table() {
         let all = ["L0", "L3-auto", "T8.33-motion", "T33.33-motion"].map(thumbnail);
-        let pages = samples(&all);
-        let names: Vec<&str> = pages.iter().map(|page| page.name).collect();
+        let tables = samples(&all);
+        let names: Vec<&str> = tables.iter().map(|table| table.name).collect();
         assert_eq!(names, ["samples", "blur_samples"]);
-        assert_eq!(pages[0].levels, ["L0, 0 EV", "L3, 6 EV"]);
+        assert_eq!(tables[0].levels, ["L0, 0 EV", "L3, 6 EV"]);
         assert_eq!(
-            pages[1].levels,
+            tables[1].levels,
             ["L0, 0 ms", "T8.33, 8.33 ms", "T33.33, 33.33 ms"]
         );
-        assert!(pages[1].rows.len() == 1 && pages[1].rows[0].images.iter().all(Option::is_some));
+        assert!(tables[1].rows.len() == 1 && tables[1].rows[0].images.iter().all(Option::is_some));
         assert!(samples(&[]).is_empty());
     }
 
     #[test]
-    fn each_row_has_its_images_and_names_are_escaped() {
+    fn clean_frames_are_in_rows_of_the_same_enhancer() {
         let thumbnails = ["L0", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
-        let samples = only(&thumbnails);
-        let urls = |row: &SampleRow| -> Vec<String> {
-            row.images
-                .iter()
-                .map(|image| image.as_ref().map(|i| i.url.clone()))
-                .map(Option::unwrap_or_default)
-                .collect()
-        };
+        let samples = single_table(&thumbnails);
         let rows: Vec<Vec<String>> = samples.rows.iter().map(urls).collect();
         assert_eq!(rows[0], ["data:L0", "data:L3-ev"]);
         assert_eq!(rows[1], ["data:L0", "data:L3-noise"]);
         assert_eq!(rows[2], ["", "data:L3-noise+lift"]);
         let enhanced = ["L0", "L0+lift", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
-        let enhanced = only(&enhanced);
+        let enhanced = single_table(&enhanced);
         let rows: Vec<Vec<String>> = enhanced.rows.iter().map(urls).collect();
         assert_eq!(rows[1], ["data:L0", "data:L3-noise"]);
         assert_eq!(rows[2], ["data:L0+lift", "data:L3-noise+lift"]);
         let clean = ["L0", "L0+lift", "L3-noise"].map(thumbnail);
-        let clean = only(&clean);
+        let clean = single_table(&clean);
         let rows: BTreeSet<Vec<String>> = clean.rows.iter().map(urls).collect();
         let expected = [["data:L0", "data:L3-noise"], ["data:L0+lift", ""]];
         assert_eq!(
             rows,
             expected.map(|row| row.map(str::to_owned).to_vec()).into()
         );
-        let svg = figure(&samples);
+    }
+
+    #[test]
+    fn figures_embed_images_and_escape_names() {
+        let thumbnails = ["L0", "L3-ev", "L3-noise", "L3-noise+lift"].map(thumbnail);
+        let svg = figure(&single_table(&thumbnails));
         assert_eq!(svg.matches("<image").count(), 5);
         assert!(svg.contains("a&lt;b&gt;&amp;c") && !svg.contains("a<b>"));
     }

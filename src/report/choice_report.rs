@@ -1,4 +1,4 @@
-//! All that a report of questions with choices shows: [`ChoiceReport`].
+//! Content of a report on multiple-choice questions: [`ChoiceReport`].
 
 use crate::sentences::{Sentence, sentences};
 use crate::tables::{EnhancerRow, enhancers, observer_notes, tables, with_training};
@@ -6,26 +6,25 @@ use crate::text::alert::{Alert, AlertKind};
 use crate::text::table::Table;
 use darkqa_score::findings::Findings;
 
-/// The findings of one run or several, in words and as tables. The terminal, the page and all files are made from it.
+/// Findings of one or more runs, as sentences and as tables. The terminal output, the page and all files are made from it.
 #[derive(Debug)]
 pub struct ChoiceReport<'a> {
-    /// The numbers that are shown.
+    /// Findings without a hidden observer.
     pub findings: &'a Findings<'a>,
-    /// Warnings above the numbers.
+    /// Warnings at the top of the report.
     pub alerts: Vec<Alert>,
-    /// The findings in words.
+    /// Findings as sentences.
     pub(crate) sentences: Vec<Sentence>,
-    /// The tables; the first is the summary.
+    /// All tables; the first is the summary.
     pub tables: Vec<Table>,
 }
 
 impl<'a> ChoiceReport<'a> {
-    /// The report of these findings.
+    /// Writes the sentences and the tables of a report.
     #[must_use]
     pub fn new(findings: &'a Findings<'a>, alerts: Vec<Alert>) -> Self {
         let shown = findings.shown();
-        let notes = observer_notes(&findings.observer);
-        let notes = notes
+        let notes = observer_notes(&findings.observer)
             .into_iter()
             .map(|note| Alert::new(AlertKind::Observer, note));
         Self {
@@ -36,9 +35,9 @@ impl<'a> ChoiceReport<'a> {
         }
     }
 
-    /// The report with how each enhancer was used.
-    pub(crate) fn with_enhancers(mut self, used: &[EnhancerRow]) -> Self {
-        self.tables.extend(enhancers(used));
+    /// Adds the table of how each enhancer was used.
+    pub(crate) fn with_enhancers(mut self, rows: &[EnhancerRow]) -> Self {
+        self.tables.extend(enhancers(rows));
         self
     }
 }

@@ -1,59 +1,60 @@
-//! The page of an examined enhancer: [`page`].
+//! HTML page of an examined enhancer: [`page`].
 
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::report::template::filled;
+use crate::report::template::render;
 
 /// Template of the page.
 const PAGE: &str = include_str!("doctor.html");
 
-/// All that the page shows.
+/// Values of the page.
 #[derive(Debug, Serialize)]
 pub(crate) struct DoctorPage {
     /// Name of the model's file.
     pub(crate) model: String,
     /// The conclusion from the images.
     pub(crate) conclusion: String,
-    /// Whether there is one plausible convention.
+    /// True if exactly one convention is plausible.
     pub(crate) is_settled: bool,
     /// The lines of the proposed sidecar.
     pub(crate) sidecar: String,
     /// The dark frames, as data URLs.
     pub(crate) frames: Vec<String>,
     pub(crate) columns: Vec<DoctorColumn>,
-    /// How the model is fed and read now.
+    /// Current input and output conventions of the model.
     pub(crate) description: String,
-    /// Changes because of the sizes of the frames.
+    /// Resizing or padding that the sizes of the frames require.
     pub(crate) sizes: String,
 }
 
-/// The images of one convention.
+/// Images made with one convention of the model's input and output.
 #[derive(Debug, Serialize)]
 pub(crate) struct DoctorColumn {
     pub(crate) title: String,
-    /// The fault; `None` if the images are plausible.
+    /// Reason why the images are implausible; `None` if they are plausible.
     pub(crate) problem: Option<String>,
-    /// The image of each frame.
+    /// One image for each frame.
     pub(crate) cells: Vec<DoctorCell>,
 }
 
-/// One image with its figures.
+/// One image with its numbers.
 #[derive(Debug, Serialize)]
 pub(crate) struct DoctorCell {
     /// The image as a data URL.
     pub(crate) image: String,
-    /// Its brightness and what clamping cuts off.
+    /// Brightness, and share of values that clamping changes.
     pub(crate) facts: String,
+    /// Reason why the image is implausible; `None` if it is plausible.
     pub(crate) problem: Option<String>,
 }
 
-/// The page as one HTML file.
+/// Renders the page as one HTML file.
 ///
 /// # Errors
-/// If the template cannot be filled.
+/// If the template cannot be rendered.
 pub(crate) fn page(page: &DoctorPage) -> Result<String> {
-    filled(PAGE, page)
+    render(PAGE, page)
 }
 
 #[cfg(test)]

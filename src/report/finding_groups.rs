@@ -1,21 +1,21 @@
-//! The findings of a report by group: [`FindingGroups`]. The page, the terminal and Markdown open with the same summary and the same
-//! finding of each group, and list all findings in the same groups.
+//! Findings of a report by group: [`FindingGroups`]. The page, the terminal and Markdown all start with the same summary and the same
+//! main finding of each group, and list all findings in the same groups.
 
 use std::fmt::{self, Write as _};
 
 use crate::sentences::{Sentence, capitalised};
 use crate::text::words::{percent, points};
 
-/// A group of findings, by the kinds of its sentences.
+/// Title of a group, and the kinds of sentences that belong to it.
 struct GroupKinds {
     title: &'static str,
-    /// Kinds that may stand for the group, the most important first.
+    /// Kinds of which a finding can be the main finding of the group, the most important first.
     leading: &'static [&'static str],
     /// Kinds that are only in the list of all findings.
     further: &'static [&'static str],
 }
 
-/// The groups in their order. A sentence of another kind is in the last group.
+/// All groups in order. Sentences of any other kind are in the last group.
 const GROUPS: [GroupKinds; 7] = [
     GroupKinds {
         title: "Baseline",
@@ -68,47 +68,50 @@ const GROUPS: [GroupKinds; 7] = [
     },
 ];
 
-/// Most findings that a report opens with, and most enhancers that the summary names; chosen for one screen.
+/// Maximum number of main findings at the start of a report (chosen to fit one screen).
 const MAX_FIRST: usize = 5;
+/// Maximum number of enhancers in the summary (chosen).
 const MAX_ENHANCERS: usize = 3;
-/// Most sentences of one finding that a report opens with; chosen.
+/// Maximum number of sentences in the text of a finding (chosen).
 const MAX_CLAUSES: usize = 3;
 
-/// The findings of a report in groups, without empty groups.
+/// Findings of a report in groups, without empty groups.
 pub(super) struct FindingGroups<'a>(Vec<FindingGroup<'a>>);
 
-/// The findings of one group, the most important kind first.
+/// Findings of one group, the most important kind first.
 pub(super) struct FindingGroup<'a> {
     pub(super) title: &'static str,
     findings: Vec<Finding<'a>>,
-    /// Place of the finding that stands for the group; `None` if no kind of the group's findings may.
+    /// Index of the main finding; `None` if no finding is of a leading kind.
     first: Option<usize>,
 }
 
-/// The sentences about one thing: an enhancer, or one effect under several noise profiles.
+/// Sentences about the same subject, such as one enhancer, or one effect under several noise profiles.
 pub(super) struct Finding<'a> {
     sentences: Vec<&'a Sentence>,
 }
 
-/// The effect of a finding in one light.
+/// Effect of a finding in one variant.
 pub(super) struct FindingInterval {
-    /// The effect with its interval, in words.
+    /// Text of the effect with its interval.
     pub(super) effect: String,
-    /// The light, if it is not that of the finding's text.
+    /// Variant, if it differs from the variant of the finding's text.
     pub(super) light: Option<String>,
-    /// The level, or the levels.
+    /// Level, or range of levels.
     pub(super) at: Option<String>,
 }
 
-/// A difference in points, or a share in percent, with the ends of its interval.
+/// Value of an effect and both ends of its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Effect {
+    /// Difference in percentage points.
     Difference([f64; 3]),
+    /// Share in percent.
     Share([f64; 3]),
 }
 
 impl<'a> FindingGroups<'a> {
-    /// The groups of these sentences.
+    /// Groups the sentences of a report.
     pub(super) fn new(sentences: &'a [Sentence]) -> Self {
         let mut groups: Vec<FindingGroup<'a>> = GROUPS
             .iter()
@@ -118,76 +121,79 @@ impl<'a> FindingGroups<'a> {
         Self(groups)
     }
 
-    /// All groups.
     pub(super) fn all(&self) -> &[FindingGroup<'a>] {
         &self.0
     }
 
-    /// The number of findings.
+    /// Number of findings in all groups.
     pub(super) fn count(&self) -> usize {
         self.0.iter().map(|group| group.findings.len()).sum()
     }
 
-    /// The findings that a report opens with, each with the title of its group.
-    pub(super) fn first(&self) -> Vec<(&'static str, &Finding<'a>)> {
+    /// Main findings at the start of a report, each with the title of its group.
+    pub(super) fn main_findings(&self) -> Vec<(&'static str, &Finding<'a>)> {
         self.0
             .iter()
-            .filter_map(|group| Some((group.title, &group.findings[group.first?])))
+            .filter_map(|group| Some((group.title, group.main_finding()?)))
             .take(MAX_FIRST)
             .collect()
     }
 
-    /// The report in one sentence: what darkness does, and what each enhancer was detected to do; without either, the first finding.
-    /// Empty without findings.
+    fn group(&self, title: &str) -> Option<&FindingGroup<'a>> {
+        self.0.iter().find(|group| group.title == title)
+    }
+
+    /// Summary of the report in one sentence: the effect of darkness, and the detected effects of enhancers. Without either, it is the
+    /// first main finding; without any finding, it is empty.
     pub(super) fn summary(&self) -> String {
-        let group = |title: &str| self.0.iter().find(|group| group.title == title);
-        let darkness = group("Darkness").and_then(|group| Some(&group.findings[group.first?]));
+        let darkness = self
+            .group("Darkness")
+            .and_then(FindingGroup::main_finding)
+            .map(Finding::text);
+        let enhancers = self.group("Enhancers").map(FindingGroup::enhancer_effects);
         let clauses: Vec<String> = darkness
-            .map(Finding::text)
             .into_iter()
-            .chain(group("Enhancers").map(FindingGroup::enhancers))
+            .chain(enhancers)
             .filter(|clause| !clause.is_empty())
             .collect();
-        match (&clauses[..], self.first().first()) {
+        match (&clauses[..], self.main_findings().first()) {
             ([], Some((_, first))) => self.sentence(&[first.text()]),
             ([], None) => String::new(),
             _ => self.sentence(&clauses),
         }
     }
 
-    /// One sentence of some clauses; the light of the first one is named once, at its beginning.
+    /// Joins clauses to one sentence. A variant at the start of the first clause is not repeated in the others.
     fn sentence(&self, clauses: &[String]) -> String {
-        let findings = self.0.iter().flat_map(|group| &group.findings);
-        let prefix = findings
-            .filter_map(|finding| finding.shown().scope.light.as_ref())
+        let prefix = self
+            .0
+            .iter()
+            .flat_map(|group| &group.findings)
+            .filter_map(|finding| finding.main_sentence().scope.light.as_ref())
             .map(|light| format!("{light}: "))
             .find(|prefix| clauses[0].starts_with(prefix))
             .unwrap_or_default();
-        let bare = clauses
+        let clauses: Vec<&str> = clauses
             .iter()
-            .map(|clause| clause.strip_prefix(&prefix).unwrap_or(clause));
-        capitalised(&prefix) + &bare.collect::<Vec<_>>().join("; ") + "."
+            .map(|clause| clause.strip_prefix(&prefix).unwrap_or(clause))
+            .collect();
+        capitalised(&prefix) + &clauses.join("; ") + "."
     }
 }
 
 impl<'a> FindingGroup<'a> {
     fn new(kinds: &GroupKinds, sentences: &'a [Sentence]) -> Self {
         let is_last = GROUPS.last().is_some_and(|last| last.title == kinds.title);
-        let is_known = |kind: &str| {
-            GROUPS
-                .iter()
-                .any(|group| group.kinds().any(|own| own == kind))
-        };
-        let known = kinds.kinds().flat_map(|kind| {
+        let listed = kinds.kinds().flat_map(|kind| {
             sentences
                 .iter()
                 .filter(move |sentence| sentence.kind == kind)
         });
-        let unknown = sentences
+        let unlisted = sentences
             .iter()
-            .filter(|sentence| is_last && !is_known(sentence.kind));
+            .filter(|sentence| is_last && !is_listed(sentence.kind));
         let mut findings: Vec<Finding<'a>> = Vec::new();
-        for sentence in known.chain(unknown) {
+        for sentence in listed.chain(unlisted) {
             match findings
                 .iter_mut()
                 .find(|finding| finding.is_about(sentence))
@@ -198,43 +204,49 @@ impl<'a> FindingGroup<'a> {
                 }),
             }
         }
-        let leading = || {
-            findings
-                .iter()
-                .enumerate()
-                .filter(|(_, finding)| kinds.leading.contains(&finding.sentences[0].kind))
-        };
-        let first = leading()
-            .find(|(_, finding)| finding.shown().tone.is_detected())
-            .or_else(|| leading().next())
-            .map(|(place, _)| place);
+        let leading: Vec<usize> = findings
+            .iter()
+            .enumerate()
+            .filter(|(_, finding)| kinds.leading.contains(&finding.kind()))
+            .map(|(index, _)| index)
+            .collect();
+        let detected = leading.iter().find(|index| findings[**index].is_detected());
         Self {
             title: kinds.title,
-            first,
+            first: detected.or(leading.first()).copied(),
             findings,
         }
     }
 
-    /// The sentences of all its findings.
+    /// The first detected finding of a leading kind, else the first one; `None` without a finding of a leading kind.
+    fn main_finding(&self) -> Option<&Finding<'a>> {
+        Some(&self.findings[self.first?])
+    }
+
+    /// Sentences of all findings in the group.
     pub(super) fn sentences(&self) -> impl Iterator<Item = &'a Sentence> {
         self.findings
             .iter()
             .flat_map(|finding| finding.sentences.iter().copied())
     }
 
-    /// The detected effects of the enhancers, or the statement that none was detected.
-    fn enhancers(&self) -> String {
-        let Some(first) = self.first.map(|first| &self.findings[first]) else {
+    /// Detected effects of the enhancers, or the statement that none was detected.
+    fn enhancer_effects(&self) -> String {
+        let Some(first) = self.main_finding() else {
             return String::new();
         };
-        let own = |finding: &&Finding<'_>| finding.sentences[0].kind == first.sentences[0].kind;
-        let findings = || self.findings.iter().filter(own);
-        let detected: Vec<String> = findings()
-            .filter(|finding| finding.shown().tone.is_detected())
-            .take(MAX_ENHANCERS)
-            .map(Finding::text)
+        let findings: Vec<&Finding<'_>> = self
+            .findings
+            .iter()
+            .filter(|finding| finding.kind() == first.kind())
             .collect();
-        match findings().count() {
+        let detected: Vec<String> = findings
+            .iter()
+            .filter(|finding| finding.is_detected())
+            .take(MAX_ENHANCERS)
+            .map(|finding| finding.text())
+            .collect();
+        match findings.len() {
             _ if !detected.is_empty() => detected.join("; "),
             1 => first.text(),
             count => format!("no effect of the {count} enhancers was detected"),
@@ -242,15 +254,32 @@ impl<'a> FindingGroup<'a> {
     }
 }
 
+/// True if a group lists a kind of sentence.
+fn is_listed(kind: &str) -> bool {
+    GROUPS
+        .iter()
+        .any(|group| group.kinds().any(|listed| listed == kind))
+}
+
 impl GroupKinds {
-    /// All kinds, the leading ones first.
+    /// All kinds of the group, the leading ones first.
     fn kinds(&self) -> impl Iterator<Item = &'static str> {
         self.leading.iter().chain(self.further).copied()
     }
 }
 
 impl<'a> Finding<'a> {
-    /// Whether a sentence belongs to this finding: it is about the same enhancer, or about the same effect in another light.
+    /// Kind of the finding's sentences.
+    fn kind(&self) -> &'static str {
+        self.sentences[0].kind
+    }
+
+    /// True if any sentence reports a detected effect.
+    fn is_detected(&self) -> bool {
+        self.main_sentence().tone.is_detected()
+    }
+
+    /// True if a sentence belongs to this finding: it is about the same enhancer, or about the same effect in another variant.
     fn is_about(&self, sentence: &Sentence) -> bool {
         let own = self.sentences[0];
         let is_one_of_several = sentence.scope.subject.is_some() || sentence.scope.light.is_some();
@@ -259,23 +288,24 @@ impl<'a> Finding<'a> {
             && own.scope.subject == sentence.scope.subject
     }
 
-    /// The sentence with the sign and the interval of the finding: the first detected one, else the first.
-    pub(super) fn shown(&self) -> &'a Sentence {
-        let mut sentences = self.sentences.iter().copied();
-        sentences
+    /// Sentence whose sign and interval stand for the finding: the first with a detected effect, else the first.
+    pub(super) fn main_sentence(&self) -> &'a Sentence {
+        self.sentences
+            .iter()
+            .copied()
             .find(|sentence| sentence.tone.is_detected())
             .unwrap_or(self.sentences[0])
     }
 
-    /// The detected effect in the light of [`Self::shown`], without a full stop.
+    /// Text of the detected effects in the variant of [`Self::main_sentence`], without a full stop.
     pub(super) fn text(&self) -> String {
-        let shown = self.shown();
+        let main = self.main_sentence();
         let mut texts: Vec<&str> = self
             .sentences
             .iter()
             .copied()
-            .filter(|sentence| sentence.scope.light == shown.scope.light)
-            .filter(|sentence| sentence.tone.is_detected() || *sentence == shown)
+            .filter(|sentence| sentence.scope.light == main.scope.light)
+            .filter(|sentence| sentence.tone.is_detected() || *sentence == main)
             .map(Sentence::claim)
             .collect();
         let more = texts.len().saturating_sub(MAX_CLAUSES);
@@ -284,41 +314,40 @@ impl<'a> Finding<'a> {
         if more > 0 {
             let _ = write!(text, "; {more} more");
         }
-        text + &shown.scope.training
+        text + &main.scope.training
     }
 
-    /// The intervals in words; empty of a finding without one.
-    pub(super) fn interval_words(&self) -> String {
-        let intervals = self.intervals();
-        let words: Vec<String> = intervals.iter().map(ToString::to_string).collect();
-        words.join("; ")
+    /// Text of the intervals; empty for a finding without one.
+    pub(super) fn intervals_text(&self) -> String {
+        let intervals: Vec<String> = self.intervals().iter().map(ToString::to_string).collect();
+        intervals.join("; ")
     }
 
-    /// The interval of the finding, and those in other lights.
+    /// Interval of the main sentence, then one for each other variant.
     pub(super) fn intervals(&self) -> Vec<FindingInterval> {
-        let shown = self.shown();
-        let mut of_lights = vec![shown];
+        let main = self.main_sentence();
+        let mut by_light = vec![main];
         for sentence in &self.sentences {
             let light = &sentence.scope.light;
-            let known = of_lights
+            let known = by_light
                 .iter_mut()
                 .find(|known| known.scope.light == *light);
             match known {
-                None => of_lights.push(sentence),
-                // The detected one stands for a light.
+                None => by_light.push(sentence),
+                // Prefer a detected effect in each variant.
                 Some(known) if !known.tone.is_detected() && sentence.tone.is_detected() => {
                     *known = sentence;
                 }
                 Some(_) => {}
             }
         }
-        of_lights
+        by_light
             .into_iter()
             .filter_map(|sentence| {
                 let light = sentence.scope.light.clone();
                 Some(FindingInterval {
-                    effect: Effect::from_sentence(sentence)?.words(),
-                    light: light.filter(|_| sentence.scope.light != shown.scope.light),
+                    effect: Effect::from_sentence(sentence)?.text(),
+                    light: light.filter(|_| sentence.scope.light != main.scope.light),
                     at: sentence.scope.at.clone(),
                 })
             })
@@ -340,19 +369,18 @@ impl fmt::Display for FindingInterval {
 }
 
 impl Effect {
-    /// The difference or the share that a sentence names; `None` if it names none.
+    /// Difference or share among the values of a sentence; `None` without both.
     pub(super) fn from_sentence(sentence: &Sentence) -> Option<Self> {
-        let numbers = |names: [&str; 3]| {
-            let [value, low, high] = names.map(|name| sentence.values.get(name).copied());
-            Some([value?, low?, high?])
-        };
-        numbers(["difference", "low", "high"])
-            .map(Self::Difference)
-            .or_else(|| numbers(["share", "low", "high"]).map(Self::Share))
+        let [difference, share, low, high] =
+            ["difference", "share", "low", "high"].map(|name| sentence.values.get(name).copied());
+        let (low, high) = (low?, high?);
+        difference
+            .map(|value| Self::Difference([value, low, high]))
+            .or_else(|| share.map(|value| Self::Share([value, low, high])))
     }
 
-    /// The effect as `−4.8 [−8.5, −1.0]` or `90.0 % [80.1, 95.3]`.
-    pub(super) fn words(self) -> String {
+    /// Formats the effect, as in `−4.8 [−8.5, −1.0]` or `90.0 % [80.1, 95.3]`.
+    pub(super) fn text(self) -> String {
         match self {
             Self::Difference(numbers) => {
                 let [value, low, high] = numbers.map(|number| points(number / 100.0));
@@ -384,14 +412,14 @@ mod tests {
         }
     }
 
-    fn about(subject: &str) -> Scope {
+    fn scope_of_subject(subject: &str) -> Scope {
         Scope {
             subject: Some(subject.to_owned()),
             ..Scope::default()
         }
     }
 
-    fn under(light: &str, level: &str) -> Scope {
+    fn scope_of_light(light: &str, level: &str) -> Scope {
         Scope {
             light: Some(light.to_owned()),
             at: Some(level.to_owned()),
@@ -400,17 +428,22 @@ mod tests {
     }
 
     #[test]
-    fn a_detected_finding_stands_for_its_group() {
+    fn a_detected_finding_is_the_main_finding() {
         let sentences = [
-            sentence("enhancer", Tone::NotShown, "a does nothing", about("a")),
-            sentence("enhancer", Tone::Worse, "b harms", about("b")),
+            sentence(
+                "enhancer",
+                Tone::NotShown,
+                "a does nothing",
+                scope_of_subject("a"),
+            ),
+            sentence("enhancer", Tone::Worse, "b harms", scope_of_subject("b")),
             sentence("fidelity", Tone::Better, "psnr", Scope::default()),
             sentence("darkness", Tone::NotShown, "no loss", Scope::default()),
             sentence("best", Tone::Better, "m sees best", Scope::default()),
         ];
         let groups = FindingGroups::new(&sentences);
         let first: Vec<(&str, String)> = groups
-            .first()
+            .main_findings()
             .into_iter()
             .map(|(title, finding)| (title, finding.text()))
             .collect();
@@ -424,15 +457,28 @@ mod tests {
     }
 
     #[test]
-    fn all_that_an_enhancer_does_is_one_finding() {
+    fn all_effects_of_an_enhancer_are_one_finding() {
         let sentences = [
-            sentence("enhancer", Tone::Worse, "a harms at L1", about("a")),
-            sentence("enhancer", Tone::Better, "a helps at L4", about("a")),
-            sentence("enhancer", Tone::NotShown, "a at L2", about("a")),
+            sentence(
+                "enhancer",
+                Tone::Worse,
+                "a harms at L1",
+                scope_of_subject("a"),
+            ),
+            sentence(
+                "enhancer",
+                Tone::Better,
+                "a helps at L4",
+                scope_of_subject("a"),
+            ),
+            sentence("enhancer", Tone::NotShown, "a at L2", scope_of_subject("a")),
         ];
         let groups = FindingGroups::new(&sentences);
         assert_eq!(groups.count(), 1);
-        assert_eq!(groups.first()[0].1.text(), "a harms at L1; a helps at L4");
+        assert_eq!(
+            groups.main_findings()[0].1.text(),
+            "a harms at L1; a helps at L4"
+        );
     }
 
     #[test]
@@ -442,12 +488,17 @@ mod tests {
                 "darkness",
                 Tone::NotShown,
                 "paper: no loss",
-                under("paper", "L3"),
+                scope_of_light("paper", "L3"),
             ),
-            sentence("darkness", Tone::Worse, "eld: costs", under("eld", "L5")),
+            sentence(
+                "darkness",
+                Tone::Worse,
+                "eld: costs",
+                scope_of_light("eld", "L5"),
+            ),
         ];
         let groups = FindingGroups::new(&sentences);
-        let first = groups.first();
+        let first = groups.main_findings();
         assert_eq!(first[0].1.text(), "eld: costs");
         let intervals = first[0].1.intervals();
         let texts: Vec<String> = intervals.iter().map(ToString::to_string).collect();
@@ -477,6 +528,6 @@ mod tests {
         let sentences = [sentence("novel", Tone::Note, "new", Scope::default())];
         let groups = FindingGroups::new(&sentences);
         assert_eq!((groups.all()[0].title, groups.count()), ("Sample", 1));
-        assert!(groups.first().is_empty());
+        assert!(groups.main_findings().is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! The estimated tokens, costs and time of a run before it starts: [`Forecast`].
+//! Estimated tokens, costs and time of a run before it starts: [`Forecast`].
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -13,20 +13,20 @@ use crate::text::terminal;
 use crate::text::words::counted;
 use crate::types::ReadingName;
 
-/// Estimate of the requests that are left for one model.
+/// Estimate for the remaining requests of one model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct CostLine {
-    /// The model, with a remark if it is asked without images.
+    /// Name of the model, with a remark if it is asked without images.
     pub model: String,
-    /// The addresses at which it would be asked, without secrets.
+    /// Addresses of its endpoints, without secrets.
     pub endpoints: Vec<String>,
     /// Number of requests left.
     pub requests: usize,
     /// Text tokens of all prompts.
     pub text_tokens: f64,
-    /// Tokens of all images; `None` if it is not known how the model counts them.
+    /// Tokens of all images; `None` if the model's image tokens are unknown.
     pub image_tokens: Option<f64>,
-    /// Tokens of all replies if each is short: a letter, a mark, a sentence.
+    /// Tokens of all replies if each is short, such as a letter, a mark or a sentence.
     pub reply_tokens: f64,
     /// Tokens of all replies if each is as long as `--max-tokens` allows; `None` without a limit.
     pub longest_reply_tokens: Option<f64>,
@@ -34,17 +34,17 @@ pub(crate) struct CostLine {
     pub dollars: Option<f64>,
     /// Cost in dollars if each reply is as long as `--max-tokens` allows.
     pub most_dollars: Option<f64>,
-    /// Tokens of one image, as the replies so far were charged; `None` if there are too few of them.
+    /// Tokens of one image as charged for the replies so far; `None` if there are too few replies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charged_image_tokens: Option<f64>,
-    /// The same requests by the noise profile of what is shown.
+    /// The same requests by the noise profile of their images.
     pub readings: Vec<ReadingCost>,
 }
 
-/// Requests of one noise profile.
+/// Remaining requests with images of one noise profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct ReadingCost {
-    /// The noise profile; `None` for what all readings share: L0, images without noise, and no image at all.
+    /// Noise profile; `None` for requests that all profiles share: L0, images without noise, and no image at all.
     pub reading: Option<ReadingName>,
     /// Number of requests left.
     pub requests: usize,
@@ -57,7 +57,7 @@ pub(crate) struct ReadingCost {
 pub(crate) struct Forecast {
     /// Requests left, by model.
     pub lines: Vec<CostLine>,
-    /// The built-in models, which are asked at no endpoint, with the trials left of each; controls are among them.
+    /// Built-in models, which need no endpoint, and the observer's controls; each with its number of remaining trials.
     pub built_in: Vec<(String, usize)>,
     /// Number of all trials.
     pub trials: usize,
@@ -65,70 +65,70 @@ pub(crate) struct Forecast {
     pub answered: usize,
     /// Cost of the replies so far in dollars; `None` if no price is known.
     pub spent: Option<f64>,
-    /// Number of images to be made.
+    /// Number of images to make.
     pub images: usize,
-    /// Number of images in all requests: an image counts once for each request about it.
+    /// Number of images in all requests; an image counts once for each of its requests.
     pub images_sent: usize,
-    /// Number of bytes to be sent, with images as base64.
+    /// Number of bytes to send, with images as base64.
     pub bytes: f64,
     /// Size of the largest sampled image file in bytes.
     pub largest_image: usize,
     /// Number of images that were made as a sample.
     pub sampled: usize,
-    /// Why the endpoint does not accept the largest image; `None` if it does.
+    /// Reason why the endpoint would refuse the largest image; `None` if it accepts it.
     pub too_large: Option<String>,
     /// Time to make all images on this machine, in seconds.
     pub making_seconds: f64,
     /// Time of waiting for all replies, in seconds.
     pub asking_seconds: f64,
-    /// Basis of the waiting time, in words.
+    /// Text for the assumptions behind the waiting time.
     pub pace: String,
     /// Date and source of the prices.
     pub prices: String,
     /// Charge of the Batch API as a share of the price.
     pub batch: f64,
-    /// Length of the shortest reply that is assumed, in words.
+    /// Text for the length of the shortest assumed reply.
     pub reply: &'static str,
-    /// The frames or walks, if intervals and tests need more of them.
+    /// Number of frames or walks, if intervals and tests need more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub few_sources: Option<FewSources>,
-    /// The effect that the whole run can detect; `None` for a shard, and for questions without choices or answers.
+    /// Smallest effect that the whole run can detect; `None` for a shard, and for questions without choices or answers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub power: Option<PowerForecast>,
-    /// Size of the largest request in bytes, as sampled images suggest, if requests hold many images.
+    /// Size of the largest request in bytes, estimated from sampled images; only if requests have many images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub largest_request: Option<f64>,
-    /// The images that an image store saves the next model; `None` without one.
+    /// Share of images that the image store can reuse; `None` without an image store.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub image_store: Option<StoreForecast>,
 }
 
-/// Frames or walks that are too few.
+/// Number of frames or walks that is too small for reliable intervals and tests.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct FewSources {
-    /// How many there are.
+    /// Number in the run.
     pub number: usize,
-    /// How many intervals and tests need.
+    /// Number that intervals and tests need.
     pub needed: usize,
-    /// The counted thing, in the singular.
+    /// Name of the sources in the singular, such as "frame".
     pub of: &'static str,
 }
 
-/// The images that an image store saves another model that is asked about the same images.
+/// Reuse of stored images by another model that is asked about the same images.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct StoreForecast {
-    /// Which images it keeps, in words.
+    /// Text for the kind of images that are stored.
     pub kept: &'static str,
-    /// Number of bytes of all of them.
+    /// Size of all images in bytes.
     pub bytes: f64,
-    /// Number of bytes that it has room for.
+    /// Capacity of the store in bytes.
     pub room: f64,
-    /// Share of them that it can give, from 0 to 1.
+    /// Share of the images that the store can return, from 0 to 1.
     pub hits: f64,
 }
 
 impl StoreForecast {
-    /// The forecast for images of this many bytes and a store with this room.
+    /// Forecast for images of a total size and a store of a capacity, both in bytes.
     pub(crate) fn new(kept: &'static str, bytes: f64, room: f64) -> Self {
         let hits = if bytes > room { room / bytes } else { 1.0 };
         Self {
@@ -139,7 +139,7 @@ impl StoreForecast {
         }
     }
 
-    /// One line of text.
+    /// Formats the forecast as one line.
     fn line(&self) -> String {
         let (kept, set, room) = (self.kept, bytes(self.bytes), bytes(self.room));
         let percent = 100.0 * self.hits;
@@ -149,14 +149,14 @@ impl StoreForecast {
     }
 }
 
-/// The forecast as JSON.
+/// Serializes the forecast as JSON.
 pub(crate) fn json(forecast: &Forecast) -> Result<String> {
-    let text = serde_json::to_string_pretty(forecast);
-    text.map(|text| text + "\n")
+    serde_json::to_string_pretty(forecast)
+        .map(|text| text + "\n")
         .map_err(|e| Error::data("the estimate", e))
 }
 
-/// The forecast as text for the terminal.
+/// Formats the forecast for the terminal.
 #[must_use]
 pub(crate) fn render(forecast: &Forecast) -> String {
     let table = TableBuilder::new("estimate", &forecast.lines)
@@ -171,10 +171,10 @@ pub(crate) fn render(forecast: &Forecast) -> String {
             line.image_tokens.map_or("unknown".to_owned(), count)
         })
         .column(Count, "terminal reply tokens", |line| {
-            between(Some(line.reply_tokens), line.longest_reply_tokens, &count)
+            range_text(Some(line.reply_tokens), line.longest_reply_tokens, count)
         })
         .column(Count, "terminal dollars", |line| {
-            between(line.dollars, line.most_dollars, &money)
+            range_text(line.dollars, line.most_dollars, money)
         })
         .build();
     let table = terminal::table(&[table]);
@@ -194,8 +194,11 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     if let (Some(spent), true) = (forecast.spent, *answered > 0) {
         let _ = write!(text, "; the {answered} answered ones cost {}", money(spent));
     }
-    let store = forecast.image_store.as_ref();
-    let mut last = store.map(StoreForecast::line).unwrap_or_default();
+    let mut last = forecast
+        .image_store
+        .as_ref()
+        .map(StoreForecast::line)
+        .unwrap_or_default();
     if let Some(power) = &forecast.power {
         let _ = writeln!(last, "{}", power.line());
     }
@@ -256,7 +259,7 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     text
 }
 
-/// The built-in models with their trials; empty without any.
+/// Line with the built-in models and their trials; empty without any.
 fn built_in_line(models: &[(String, usize)]) -> String {
     let models: Vec<String> = models
         .iter()
@@ -268,18 +271,19 @@ fn built_in_line(models: &[(String, usize)]) -> String {
     }
 }
 
-/// Where the models would be asked: a line for each address, with its models if there are several addresses.
+/// One line for each endpoint address, with its models if there are several addresses.
 fn by_endpoint(lines: &[CostLine]) -> String {
-    let mut at: Vec<(String, Vec<&str>)> = Vec::new();
+    let mut groups: Vec<(String, Vec<&str>)> = Vec::new();
     for line in lines {
         let endpoints = line.endpoints.join(", ");
-        match at.iter_mut().find(|(other, _)| *other == endpoints) {
+        match groups.iter_mut().find(|(other, _)| *other == endpoints) {
             Some((_, models)) => models.push(&line.model),
-            None => at.push((endpoints, vec![&line.model])),
+            None => groups.push((endpoints, vec![&line.model])),
         }
     }
-    let several = at.len() > 1;
-    at.into_iter()
+    let several = groups.len() > 1;
+    groups
+        .into_iter()
         .map(|(endpoints, models)| {
             if several {
                 format!("asked at {endpoints}: {}\n", models.join(", "))
@@ -290,7 +294,7 @@ fn by_endpoint(lines: &[CostLine]) -> String {
         .collect()
 }
 
-/// The requests of all models by noise profile; empty with fewer than two readings.
+/// Line with the requests of all models by noise profile; empty with fewer than two profiles.
 fn by_reading(lines: &[CostLine]) -> String {
     let mut sums = BTreeMap::<Option<&ReadingName>, (usize, Option<f64>)>::new();
     for cost in lines.iter().flat_map(|line| &line.readings) {
@@ -315,7 +319,7 @@ fn by_reading(lines: &[CostLine]) -> String {
     format!("requests by reading: {}\n", parts.join(", "))
 }
 
-/// A number rounded to an integer, with digits in groups of three.
+/// Formats a number rounded to an integer, with digits in groups of three.
 fn count(number: f64) -> String {
     let digits = format!("{number:.0}");
     let mut grouped = String::new();
@@ -328,18 +332,18 @@ fn count(number: f64) -> String {
     grouped
 }
 
-/// A range of values as text; one value if both are shown alike.
-fn between(low: Option<f64>, high: Option<f64>, show: &dyn Fn(f64) -> String) -> String {
+/// Formats a range of values, or a single value if both look the same.
+fn range_text(low: Option<f64>, high: Option<f64>, format: fn(f64) -> String) -> String {
     match (low, high) {
         (None, _) => "unknown".to_owned(),
-        (Some(low), Some(high)) if show(low) != show(high) => {
-            format!("{} – {}", show(low), show(high))
+        (Some(low), Some(high)) if format(low) != format(high) => {
+            format!("{} – {}", format(low), format(high))
         }
-        (Some(low), _) => show(low),
+        (Some(low), _) => format(low),
     }
 }
 
-/// An amount in dollars: two digits, or four below one dollar.
+/// Formats an amount in dollars with two decimals, or four below one dollar.
 #[must_use]
 pub(crate) fn money(dollars: f64) -> String {
     if dollars > 0.0 && dollars < 0.995 {
@@ -356,7 +360,7 @@ fn bytes(bytes: f64) -> String {
     }
 }
 
-/// A time as `2.0 h`, `6 min` or `40 s`.
+/// Formats a time, as in `2.0 h`, `6 min` or `40 s`.
 pub(crate) fn hours(seconds: f64) -> String {
     match seconds {
         s if s >= 3600.0 => format!("{:.1} h", s / 3600.0),
@@ -370,24 +374,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_store_gives_the_images_that_find_room() {
-        let of = |bytes| StoreForecast::new("enhanced images", bytes, 20e9);
-        assert!((of(80e9).hits - 0.25).abs() < 1e-12);
-        assert!((of(20e9).hits - 1.0).abs() < 1e-12);
+    fn hits_are_limited_by_the_store_capacity() {
+        let [too_large, fitting] =
+            [80e9, 20e9].map(|bytes| StoreForecast::new("enhanced images", bytes, 20e9));
+        assert!((too_large.hits - 0.25).abs() < 1e-12);
+        assert!((fitting.hits - 1.0).abs() < 1e-12);
         assert_eq!(
-            of(80e9).line(),
+            too_large.line(),
             "image store: enhanced images 80.0 GB, room 20.0 GB: the next model finds about 25 % of them\n"
         );
     }
 
-    #[test]
-    fn several_readings_are_counted_apart() {
-        let cost = |reading: Option<&str>, requests, dollars| ReadingCost {
+    fn cost(reading: Option<&str>, requests: usize, dollars: Option<f64>) -> ReadingCost {
+        ReadingCost {
             reading: reading.map(|name| ReadingName::new(name).unwrap()),
             requests,
             dollars,
-        };
-        let line = |readings| CostLine {
+        }
+    }
+
+    fn line(readings: Vec<ReadingCost>) -> CostLine {
+        CostLine {
             model: "m".to_owned(),
             endpoints: Vec::new(),
             requests: 0,
@@ -399,7 +406,11 @@ mod tests {
             most_dollars: None,
             charged_image_tokens: None,
             readings,
-        };
+        }
+    }
+
+    #[test]
+    fn requests_are_counted_by_noise_profile() {
         let shared = cost(None, 6, Some(0.5));
         let one = line(vec![shared.clone(), cost(Some("paper"), 5, Some(0.25))]);
         assert_eq!(by_reading(std::slice::from_ref(&one)), "");
@@ -419,8 +430,8 @@ mod tests {
     fn numbers_are_easy_to_read() {
         assert_eq!(count(1_234_567.4), "1,234,567");
         assert_eq!(count(999.0), "999");
-        assert_eq!(between(Some(0.5), Some(12.0), &money), "$0.5000 – $12.00");
-        assert_eq!(between(Some(3.0), None, &money), "$3.00");
+        assert_eq!(range_text(Some(0.5), Some(12.0), money), "$0.5000 – $12.00");
+        assert_eq!(range_text(Some(3.0), None, money), "$3.00");
         assert_eq!(hours(7200.0), "2.0 h");
     }
 }

@@ -1,4 +1,4 @@
-//! A report as Markdown, for an issue or a README: [`MarkdownReport`], with the findings and the table by level.
+//! Report as Markdown, for an issue or a README: [`MarkdownReport`].
 
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -15,10 +15,10 @@ use crate::text::readable::readable;
 use crate::text::table::{Column, ColumnKind, Table, TableFormat};
 use crate::text::words::{counted, ends, interval, words};
 
-/// Name of the table by level of accuracies and scores.
+/// Name of the table of accuracies or scores by level.
 const LEVELS: &str = "levels";
 
-/// The content of a Markdown report.
+/// Content of a Markdown report.
 pub(crate) struct MarkdownReport<'a> {
     /// Names of the runs.
     names: Vec<String>,
@@ -26,15 +26,15 @@ pub(crate) struct MarkdownReport<'a> {
     head: Vec<String>,
     alerts: &'a [Alert],
     groups: FindingGroups<'a>,
-    /// The line below the findings.
+    /// Line below the findings.
     how_to_read: Cow<'static, str>,
-    /// Whether all findings stand open, and not folded below the first of each group.
+    /// True if the list of all findings is open; false if it is folded below the main findings.
     is_open: bool,
     tables: Vec<&'a Table>,
 }
 
 impl<'a> MarkdownReport<'a> {
-    /// The report of questions with choices.
+    /// Report on multiple-choice questions.
     pub(crate) fn for_choices(
         report: &'a ChoiceReport<'a>,
         names: Vec<String>,
@@ -42,7 +42,7 @@ impl<'a> MarkdownReport<'a> {
     ) -> Self {
         let mut tables = tables(&report.tables, LEVELS, length);
         if length == ReportLength::Summary && report.findings.common.is_some() && tables.len() > 1 {
-            // Models that were asked different questions are compared on those that they share.
+            // Models that were asked different questions are compared on the questions that they share.
             tables.retain(|table| table.caption.contains("all models"));
         }
         Self {
@@ -56,7 +56,7 @@ impl<'a> MarkdownReport<'a> {
         }
     }
 
-    /// The report of questions without true answers.
+    /// Report on questions without true answers.
     pub(crate) fn for_own_answers(
         report: &'a AgreementReport<'a>,
         names: Vec<String>,
@@ -74,7 +74,7 @@ impl<'a> MarkdownReport<'a> {
         }
     }
 
-    /// The report of open questions, with its tables.
+    /// Report on open questions, with all its tables.
     pub(crate) fn for_open(
         report: &'a OpenReport<'_>,
         all: &'a [Table],
@@ -97,16 +97,16 @@ impl<'a> MarkdownReport<'a> {
         }
     }
 
-    /// The summary, the first finding of each group, and all findings; empty without findings.
+    /// Summary, main finding of each group, and all findings; empty without findings.
     fn findings(&self) -> String {
         if self.groups.count() == 0 {
             return String::new();
         }
         let mut text = format!("**{}**\n\n", inline(&self.groups.summary()));
         if !self.is_open {
-            for (group, first) in self.groups.first() {
-                let sign = first.shown().tone.sign();
-                text += &finding(sign, group, &(first.text() + "."), &first.interval_words());
+            for (group, first) in self.groups.main_findings() {
+                let sign = first.main_sentence().tone.sign();
+                text += &list_item(sign, group, &(first.text() + "."), &first.intervals_text());
             }
             let count = counted(self.groups.count(), "finding");
             let _ = writeln!(text, "\n<details><summary>All {count}</summary>\n");
@@ -114,7 +114,7 @@ impl<'a> MarkdownReport<'a> {
         for group in self.groups.all() {
             let _ = writeln!(text, "#### {}\n", group.title);
             for sentence in group.sentences() {
-                text += &finding(sentence.tone.sign(), "", &sentence.text, &sentence.detail);
+                text += &list_item(sentence.tone.sign(), "", &sentence.text, &sentence.detail);
             }
             text.push('\n');
         }
@@ -125,7 +125,7 @@ impl<'a> MarkdownReport<'a> {
         text
     }
 
-    /// The text.
+    /// Writes the report.
     pub(crate) fn text(&self) -> String {
         let names: Vec<String> = self.names.iter().map(|name| inline(name)).collect();
         let mut text = format!("### Seeing in the dark: {}\n\n", names.join(", "));
@@ -141,8 +141,8 @@ impl<'a> MarkdownReport<'a> {
     }
 }
 
-/// A finding of a list, with its sign, its group or nothing, and a line below it.
-fn finding(sign: char, group: &str, text: &str, detail: &str) -> String {
+/// List item of a finding: sign, title of its group (may be empty), text, and a line of details (may be empty).
+fn list_item(sign: char, group: &str, text: &str, detail: &str) -> String {
     let sign = block(&sign.to_string());
     let [group, text, detail] = [group, text, detail].map(inline);
     let line = match &*group {
@@ -155,7 +155,7 @@ fn finding(sign: char, group: &str, text: &str, detail: &str) -> String {
     }
 }
 
-/// The tables of a name that have a row; all that the page shows in a full report, none with the findings alone.
+/// Selects non-empty tables: those with a name in a summary, all tables of the page in a full report, none with only the findings.
 fn tables<'a>(tables: &'a [Table], name: &str, length: ReportLength) -> Vec<&'a Table> {
     tables
         .iter()
@@ -168,32 +168,37 @@ fn tables<'a>(tables: &'a [Table], name: &str, length: ReportLength) -> Vec<&'a 
         .collect()
 }
 
-/// A table with the columns and rows of the page. An interval stands behind its number.
+/// Table with the columns and rows of the page. Each number is followed by its interval.
 fn markdown_table(table: &Table) -> String {
     let columns: Vec<&Column> = table
         .columns
         .iter()
-        .filter(|column| is_shown(column))
+        .filter(|column| is_on_page(column))
         .collect();
     let heads = columns
         .iter()
-        .filter_map(|column| column.heads.page.as_deref());
-    let mut text = format!("{}\n\n", block(&table.caption));
-    text += &row(heads.map(inline));
-    text += &row(columns.iter().map(|column| {
+        .filter_map(|column| column.heads.page.as_deref())
+        .map(inline);
+    let alignments = columns.iter().map(|column| {
         let is_text = matches!(column.kind, ColumnKind::Text | ColumnKind::Significance);
         if is_text { "---" } else { "---:" }.to_owned()
-    }));
+    });
+    let mut text = format!("{}\n\n", block(&table.caption));
+    text += &row(heads);
+    text += &row(alignments);
     for (heading, cells) in table.headed_rows_in(TableFormat::Page) {
         if let Some(heading) = heading.filter(|heading| !heading.is_empty()) {
             let empty = columns.iter().skip(1).map(|_| String::new());
             text += &row(std::iter::once(format!("**{}**", inline(heading))).chain(empty));
         }
-        let cells = table.cells(cells).filter(|(column, _)| is_shown(column));
-        text += &row(cells.map(|(column, cell)| {
-            let ends = interval(column.kind, cell).map(|share| format!(" ({})", ends(share)));
-            inline(&words(column.kind, cell)) + &ends.unwrap_or_default()
-        }));
+        let cells = table
+            .cells(cells)
+            .filter(|(column, _)| is_on_page(column))
+            .map(|(column, cell)| {
+                let ends = interval(column.kind, cell).map(|share| format!(" ({})", ends(share)));
+                inline(&words(column.kind, cell)) + &ends.unwrap_or_default()
+            });
+        text += &row(cells);
     }
     text.push('\n');
     if let Some(foot) = &table.foot {
@@ -202,7 +207,7 @@ fn markdown_table(table: &Table) -> String {
     text
 }
 
-fn is_shown(column: &Column) -> bool {
+fn is_on_page(column: &Column) -> bool {
     column.heads.page.is_some()
 }
 
@@ -211,21 +216,20 @@ fn row(cells: impl Iterator<Item = String>) -> String {
     format!("| {} |\n", cells.join(" | "))
 }
 
-/// A text within a line or a cell of a table: nothing in it is markup, HTML, a link, a mention of a user or a line break.
+/// Escapes a text for use within a line or a table cell: without markup, HTML, links, mentions of users or line breaks.
 pub(crate) fn inline(text: &str) -> String {
-    let line = text.split(['\n', '\r', '\t']).collect::<Vec<_>>().join(" ");
-    let line = readable(&line);
+    let line = readable(&text.replace(['\n', '\r', '\t'], " "));
     let mut escaped = String::with_capacity(line.len());
     let mut before = None;
     for c in line.chars() {
-        let is_address = c == '/' && before.is_some_and(|before| before == ':' || before == '/');
-        let ends_www = c == '.' && escaped.to_ascii_lowercase().ends_with("www");
-        if is_address || ends_www || "\\`*_{}[]<>#|~!&$\"".contains(c) {
+        let is_url_slash = c == '/' && matches!(before, Some(':' | '/'));
+        let is_www_dot = c == '.' && escaped.to_ascii_lowercase().ends_with("www");
+        if is_url_slash || is_www_dot || "\\`*_{}[]<>#|~!&$\"".contains(c) {
             escaped.push('\\');
         }
         escaped.push(c);
         if matches!(c, '@' | '#') {
-            // Nothing joins it with what follows: GitHub tells no user, and links no issue.
+            // A zero-width space keeps GitHub from notifying a user or linking an issue.
             escaped.push_str("&#8203;");
         }
         before = Some(c);
@@ -233,7 +237,7 @@ pub(crate) fn inline(text: &str) -> String {
     escaped
 }
 
-/// A text that begins a line: nothing at its start makes a list, a heading or a rule of it.
+/// Escapes a text for use at the start of a line, where it could also become a list, a heading or a rule.
 fn block(text: &str) -> String {
     let text = inline(text);
     let digits = text.chars().take_while(char::is_ascii_digit).count();
@@ -254,7 +258,7 @@ mod tests {
     use darkqa_score::estimate::Estimate;
 
     #[test]
-    fn nothing_in_a_name_is_markup() {
+    fn names_are_escaped() {
         let names = [
             ("a|b", "a\\|b"),
             ("`x`", "\\`x\\`"),
@@ -270,7 +274,7 @@ mod tests {
         for (name, expected) in names {
             assert_eq!(inline(name), expected);
         }
-        // What is no markup stays as it is.
+        // Plain text is unchanged.
         assert_eq!(
             inline("gpt-4o (max-side 512), 5 %"),
             "gpt-4o (max-side 512), 5 %"
@@ -281,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn every_row_of_a_table_has_the_same_number_of_cells() {
+    fn table_rows_have_equal_cell_counts() {
         let share = Estimate {
             value: 0.5,
             low: 0.25,

@@ -1,4 +1,4 @@
-//! Reports from the records alone: the text for the terminal, the page, the files, and one file for each kind of report.
+//! Reports, made from stored records: text for the terminal, HTML pages and files.
 
 pub(crate) mod calibration;
 pub(crate) mod choice_report;

@@ -1,4 +1,4 @@
-//! The effect that a run can detect, in words, before anything is asked: [`PowerForecast`].
+//! Power analysis of a run before it starts: [`PowerForecast`].
 
 use serde::Serialize;
 
@@ -8,31 +8,31 @@ use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
 use darkqa_score::tested_sentences::RunContents;
 
-/// The difference between two conditions that a run detects, and the frames that 5 points need.
+/// Smallest difference between two conditions that a run can detect, and the number of clusters needed to detect 5 points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct PowerForecast {
     /// Number of questions.
     pub questions: usize,
-    /// Number of clusters, and what they are: scene, frame or question.
     pub clusters: usize,
+    /// Name of a cluster: scene, frame or question.
     pub unit: String,
     /// Number of models whose mean is tested.
     pub models: usize,
-    /// Level of the test, after the report's correction.
+    /// Significance level of the test, after the report's correction.
     pub level: f64,
     #[serde(flatten)]
     pub detectable: Detectable,
 }
 
 impl PowerForecast {
-    /// The forecast for questions in these clusters, each given by its cluster's index; `None` without questions.
+    /// Computes the forecast. `question_clusters` has the cluster index of each question; `None` without questions.
     pub(crate) fn new(
         clusters: &Clusters,
-        of_questions: &[u32],
-        asked: RunContents,
+        question_clusters: &[u32],
+        contents: RunContents,
     ) -> Option<Self> {
         let mut questions = vec![0; clusters.count()];
-        for cluster in of_questions {
+        for cluster in question_clusters {
             questions[*cluster as usize] += 1;
         }
         questions.retain(|count| *count > 0);
@@ -41,11 +41,11 @@ impl PowerForecast {
         }
         let sample = PlannedSample {
             questions,
-            models: asked.models.max(1),
-            level: asked.first_significance_level(),
+            models: contents.models.max(1),
+            level: contents.first_significance_level(),
         };
         Some(Self {
-            questions: of_questions.len(),
+            questions: question_clusters.len(),
             clusters: sample.questions.len(),
             unit: clusters.unit().to_string(),
             models: sample.models,
@@ -54,7 +54,7 @@ impl PowerForecast {
         })
     }
 
-    /// One line of text, without a line break.
+    /// Formats the forecast as one line, without a line break.
     pub(crate) fn line(&self) -> String {
         let among = if self.unit == ClusterUnit::Question.to_string() {
             counted(self.questions, "question")
@@ -105,21 +105,21 @@ mod tests {
             .collect();
         let pairs = questions.iter().map(|(question, frame)| (question, frame));
         let clusters = Clusters::new(pairs, &FrameTies::default());
-        let of_questions: Vec<u32> = questions
+        let question_clusters: Vec<u32> = questions
             .iter()
             .map(|(question, frame)| clusters.get(frame, question).unwrap())
             .collect();
-        let asked = RunContents {
+        let contents = RunContents {
             models,
             enhancers: 1,
             lights: 1,
             has_noise: true,
         };
-        PowerForecast::new(&clusters, &of_questions, asked).unwrap()
+        PowerForecast::new(&clusters, &question_clusters, contents).unwrap()
     }
 
     #[test]
-    fn the_line_names_sample_difference_and_assumptions() {
+    fn the_line_states_difference_and_assumptions() {
         let line = forecast(42, 1).line();
         assert!(
             line.starts_with("power: 168 questions in 42 frames detects ")

@@ -1,8 +1,8 @@
-//! All files of a report: [`products`].
+//! Files of a report: [`products`].
 
 use crate::drawing::chart;
 use crate::drawing::chart::Figure;
-use crate::drawing::figures::{Names, drawings};
+use crate::drawing::figures::{Names, figure_specs};
 use crate::drawing::paper::figure;
 use crate::drawing::samples::{self, samples};
 use crate::drawing::views;
@@ -22,16 +22,16 @@ pub fn products<'a>(
     report: &'a ChoiceReport<'a>,
     inputs: &PageInputs<'a>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures: Vec<Figure> = drawings(report.findings, &Names::default())
+    let figures: Vec<Figure> = figure_specs(report.findings, &Names::default())
         .into_iter()
-        .chain(views::drawings(report.findings))
-        .map(|drawing| figure(drawing.name, &drawing.caption, &drawing.chart))
+        .chain(views::figure_specs(report.findings))
+        .map(|spec| figure(spec.name, &spec.caption, &spec.chart))
         .collect::<Result<_>>()?;
     let page = page(report, &figures, inputs)?;
     files(&report.tables, &report.sentences, figures, page, inputs)
 }
 
-/// The files of a report with its figures, samples and page.
+/// Files of tables, figures, sample images and the page.
 pub(super) fn files(
     tables: &[Table],
     sentences: &[Sentence],
@@ -40,7 +40,7 @@ pub(super) fn files(
     inputs: &PageInputs<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = table_files(tables, sentences, "Findings and tables")?;
-    files.extend(chart::files(figures));
+    files.extend(chart::svg_files(figures));
     for samples in samples(inputs.thumbnails) {
         let name = format!("figures/{}.svg", samples.name);
         files.push((name, samples::figure(&samples).into_bytes()));
@@ -49,7 +49,7 @@ pub(super) fn files(
     Ok(files)
 }
 
-/// The tables as CSV files, and one LaTeX file that begins with the findings; `head` names both there.
+/// Tables as CSV files, and as one LaTeX file that starts with the findings; `head` is the title of the LaTeX file.
 pub(super) fn table_files(
     tables: &[Table],
     sentences: &[Sentence],

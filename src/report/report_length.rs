@@ -1,11 +1,11 @@
-//! How much of a report is printed: [`ReportLength`].
+//! Length of a report: [`ReportLength`].
 
-/// How much of a report is printed.
+/// Parts of a report that are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ReportLength {
-    /// The summary, the first finding of each group, and the table by level.
+    /// Summary, main finding of each group, and table by level.
     Summary,
-    /// The summary and all findings.
+    /// Summary and all findings.
     Findings,
     /// All findings and every table.
     Full,

@@ -2,15 +2,15 @@
 
 pub(super) mod findings;
 mod foot;
-mod marked;
 mod name_column;
+mod styled_lines;
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
 use self::foot::BELOW;
-use self::name_column::{LEVEL, NameColumn};
+use self::name_column::{LEVEL_WIDTH, NameColumn};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::FindingGroups;
 use crate::report::report_length::ReportLength;
@@ -57,7 +57,7 @@ pub(crate) fn text(
     );
     match length {
         ReportLength::Findings => return text,
-        ReportLength::Summary => text += &marked::table(&accuracy_table(report)),
+        ReportLength::Summary => text += &styled_lines::table(&accuracy_table(report)),
         ReportLength::Full => text += &render(&report.tables),
     }
     text += &open_question(report);
@@ -96,8 +96,9 @@ pub(super) fn who_is_judged(grid: &Grid<'_>) -> String {
 
 /// Name of the only model or number of models, then the names of people, separated by commas.
 fn models_and_people(grid: &Grid<'_>, models: Vec<&str>) -> String {
-    let is_people = |model: &&str| grid.listing.is_people(model);
-    let (people, models): (Vec<&str>, Vec<&str>) = models.into_iter().partition(is_people);
+    let (people, models): (Vec<&str>, Vec<&str>) = models
+        .into_iter()
+        .partition(|model| grid.listing.is_people(model));
     let model = match &models[..] {
         [] => String::new(),
         [one] => (*one).to_owned(),
@@ -165,6 +166,16 @@ struct AccuracyRow<'a> {
     cells: &'a SeriesByLevel<'a, AccuracyCell>,
 }
 
+impl AccuracyRow<'_> {
+    /// Axis of the row's levels.
+    fn axis(&self) -> Axis {
+        self.cells
+            .keys()
+            .find_map(|level| level.axis())
+            .unwrap_or(Axis::LIGHT)
+    }
+}
+
 /// Table of accuracies by level. With several models, it has one block per light condition and one row per model; with a single model,
 /// one block and one row per light condition.
 fn accuracy_table(report: &ChoiceReport<'_>) -> String {
@@ -211,7 +222,7 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
         .max()
         .unwrap_or_default();
     let room = WIDTH
-        .saturating_sub(1 + most_levels.min(MAX_LEVELS) * LEVEL + INTERVAL_WIDTH)
+        .saturating_sub(1 + most_levels.min(MAX_LEVELS) * LEVEL_WIDTH + INTERVAL_WIDTH)
         .max(12);
     let name_width = longest_name
         .max(longest_title)
@@ -238,14 +249,11 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     );
     for block in rows.chunk_by(|a, b| a.block == b.block) {
         for axis in Axis::ALL {
-            let is_on_axis = |row: &&AccuracyRow<'_>| {
-                row.cells
-                    .keys()
-                    .find_map(|level| level.axis())
-                    .unwrap_or(Axis::LIGHT)
-                    == axis
-            };
-            let block: Vec<AccuracyRow<'_>> = block.iter().filter(is_on_axis).cloned().collect();
+            let block: Vec<AccuracyRow<'_>> = block
+                .iter()
+                .filter(|row| row.axis() == axis)
+                .cloned()
+                .collect();
             let levels: Vec<AxisLevel> = levels
                 .iter()
                 .copied()
@@ -273,8 +281,11 @@ fn block_lines(
     let mut text = String::new();
     let mut last_group = None;
     for row in block {
-        let cells = || levels.iter().map(|level| row.cells.get(level).copied());
-        if cells().all(|cell| cell.is_none()) {
+        let cells: Vec<Option<&AccuracyCell>> = levels
+            .iter()
+            .map(|level| row.cells.get(level).copied())
+            .collect();
+        if cells.iter().all(Option::is_none) {
             continue;
         }
         if text.is_empty() {
@@ -285,10 +296,10 @@ fn block_lines(
             last_group = row.group;
             let _ = writeln!(text, " — {}", last_group.unwrap_or_default());
         }
-        let reach = reach_of(cells().flatten().filter_map(|cell| cell.accuracy));
+        let reach = reach_of(cells.iter().flatten().filter_map(|cell| cell.accuracy));
         text += &names.line(
             &row.name,
-            cells().map(|cell| accuracy_text(report, cell)),
+            cells.iter().map(|cell| accuracy_text(report, *cell)),
             &reach,
         );
     }

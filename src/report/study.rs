@@ -1,4 +1,4 @@
-//! The page on which people answer the questions of the models: [`page`].
+//! HTML page on which people answer the same questions as the models: [`page`].
 
 use serde::Serialize;
 
@@ -6,17 +6,16 @@ use crate::error::Result;
 use crate::text::script::embedded;
 use crate::types::Digest;
 
-/// The template of the page.
+/// Template of the page.
 const PAGE: &str = include_str!("study.html");
-/// The text in the template that the questions replace.
+/// Text in the template that the questions replace.
 const PLACEHOLDER: &str = "/*STUDY*/null";
 
-/// A question as the page asks it, without the true choice.
+/// Question on the page, without its true choice.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct StudyQuestion {
-    /// Id of the question.
     pub id: String,
-    /// Number of its frame or walk.
+    /// Number of the frame or walk.
     pub frame: usize,
     /// Text of the question.
     pub text: String,
@@ -26,41 +25,40 @@ pub(crate) struct StudyQuestion {
     pub shots: Vec<StudyImage>,
 }
 
-/// A frame or walk in one condition.
+/// Images of a frame or walk in one condition.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct StudyImage {
-    /// The condition. The page writes it to the file of answers, but does not show it.
+    /// Name of the condition. The page writes it to the file of answers, but does not show it.
     pub condition: String,
     /// Paths of the images relative to the page: one for a frame, all for a walk.
     pub images: Vec<String>,
 }
 
-/// The data of the page.
+/// Data of the page's script.
 #[derive(Serialize)]
 struct StudyPage<'a> {
-    /// Digest of ids and image paths. The browser stores answers under it until they are saved.
+    /// Digest of question ids and image paths. The browser keeps answers under it until they are saved.
     set: Digest,
     items: &'a [StudyQuestion],
 }
 
-/// The page as one HTML file.
+/// Renders the page as one HTML file.
 ///
-/// Each person has a number and sees each frame or walk in one condition. The condition moves on by one from person to person,
-/// so that n people see every image once if there are n conditions. Choices are taken from the keyboard and saved as lines of
+/// Each person has a number and sees each frame or walk in one condition. The condition moves on by one from person to person, so that n
+/// people together see every image once if there are n conditions. People choose answers with the keyboard. Choices are saved as lines of
 /// JSON; open answers are saved as an array for `openeqa --answers`.
 ///
 /// # Errors
-/// If the questions cannot be written.
+/// If the questions cannot be serialized.
 pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
-    let names = items.iter().flat_map(|item| {
-        let shots = item
+    let set = Digest::from_parts(items.iter().flat_map(|item| {
+        let images = item
             .shots
             .iter()
             .flat_map(|shot| &shot.images)
             .map(String::as_bytes);
-        std::iter::once(item.id.as_bytes()).chain(shots)
-    });
-    let set = Digest::from_parts(names);
+        std::iter::once(item.id.as_bytes()).chain(images)
+    }));
     Ok(PAGE.replacen(PLACEHOLDER, &embedded(&StudyPage { set, items })?, 1))
 }
 

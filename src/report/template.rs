@@ -1,4 +1,4 @@
-//! HTML pages from templates: [`filled`].
+//! Rendering of HTML pages from templates: [`render`].
 
 use minijinja::value::Serde;
 use minijinja::{AutoEscape, Environment};
@@ -7,20 +7,19 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::types::text::shown;
 
-/// Parts that several pages share, each with its placeholder in the templates.
+/// Parts that several pages share: placeholder in a template, and its text.
 const PARTS: [(&str, &str); 3] = [
     ("<!-- figures -->", include_str!("page/figures.html")),
     ("<!-- tables -->", include_str!("page/tables.html")),
-    // The rows of a table, which stand in that part.
+    // The part of tables contains this placeholder, so it must come later.
     ("<!-- rows -->", include_str!("page/rows.html")),
 ];
 
-/// The HTML of a template with its values, which are escaped, and without hidden characters.
+/// Renders a template as HTML. Values are escaped, and hidden characters are made visible.
 ///
 /// # Errors
-/// If the template cannot be filled.
-pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
-    let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
+/// If the template cannot be rendered.
+pub(super) fn render(template: &str, values: impl Serialize) -> Result<String> {
     let whole = PARTS
         .iter()
         .fold(template.to_owned(), |text, (placeholder, part)| {
@@ -28,10 +27,8 @@ pub(super) fn filled(template: &str, values: impl Serialize) -> Result<String> {
         });
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    environment
-        .add_template("page", &whole)
-        .map_err(|e| failed(&e))?;
-    let template = environment.get_template("page").map_err(|e| failed(&e))?;
-    let page = template.render(Serde(values)).map_err(|e| failed(&e))?;
+    let page = environment
+        .render_named_str("page", &whole, Serde(values))
+        .map_err(|e| Error::data("report.html", e))?;
     Ok(shown(&page).into_owned())
 }

@@ -1,4 +1,4 @@
-//! The table of the agreement of models in each condition.
+//! Table of the agreement between models in each condition.
 
 use crate::text::table::ColumnKind::{Count, Ratio, Share, Text};
 use crate::text::table::{Table, TableBuilder};

@@ -1,4 +1,4 @@
-//! Tables of the answers: false positives and negatives, collapse, and answers given against true answers.
+//! Tables of answers: false positives and negatives, collapse to one answer, and a confusion matrix.
 
 use crate::text::table::ColumnKind::{Count, Number, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder};
@@ -31,15 +31,15 @@ fn hallucination(rates: &[Hallucination]) -> Table {
         .build()
 }
 
-/// A row for each answer that is given most often, with its share: the first columns of a table.
+/// Starts a table of the answer that each model gives most often, with its share. The caller adds further columns.
 pub(crate) fn commonest_answers<'a>(
     name: &'static str,
     caption: &str,
     confusions: &'a [Confusion],
 ) -> TableBuilder<(&'a Confusion, &'a Collapse)> {
-    let collapses = confusions.iter();
-    let collapses =
-        collapses.filter_map(|confusion| Some((confusion, confusion.collapse.as_ref()?)));
+    let collapses = confusions
+        .iter()
+        .filter_map(|confusion| Some((confusion, confusion.collapse.as_ref()?)));
     TableBuilder::new(name, collapses)
         .page("answers", caption)
         .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
@@ -74,41 +74,52 @@ fn collapse(confusions: &[Confusion]) -> Table {
         .build()
 }
 
-/// A row for each true answer and each answer given to it. The answer given is empty if none could be read.
+/// Confusion matrix of the answers, with a row for each true answer and each answer given to it.
 fn confusion(confusions: &[Confusion]) -> Table {
     counted_answers("confusion", "csv truth", confusions)
 }
 
-/// A row for each answer that was due (`due` heads its column) and each answer given instead, with their number. The answer given is
-/// empty if none could be read.
+/// Non-zero cell of a confusion matrix.
+struct ConfusionCell<'a> {
+    confusion: &'a Confusion,
+    /// Index of the expected answer's label.
+    expected: usize,
+    /// Index of the given answer's label; out of range if no answer could be parsed.
+    given: usize,
+    count: usize,
+}
+
+/// Confusion matrix as a table: the number of replies for each expected answer and each answer given to it. The answer given is empty if
+/// none could be parsed. `expected_head` is the head of the column of expected answers.
 pub(crate) fn counted_answers(
     name: &'static str,
-    due: &'static str,
+    expected_head: &'static str,
     confusions: &[Confusion],
 ) -> Table {
-    let non_empty = confusions
-        .iter()
-        .flat_map(|confusion| {
-            confusion
-                .counts
-                .iter()
-                .enumerate()
-                .flat_map(|(truth, row)| {
-                    let answer = row.iter().enumerate();
-                    answer.map(move |(answer, count)| (truth, answer, *count))
-                })
-                .map(move |cell| (confusion, cell))
+    let mut cells = Vec::new();
+    for confusion in confusions {
+        for (expected, row) in confusion.counts.iter().enumerate() {
+            for (given, &count) in row.iter().enumerate() {
+                if count > 0 {
+                    cells.push(ConfusionCell {
+                        confusion,
+                        expected,
+                        given,
+                        count,
+                    });
+                }
+            }
+        }
+    }
+    TableBuilder::new(name, cells)
+        .subject(|cell| &cell.confusion.subject, ToString::to_string)
+        .family(|cell| Some(&cell.confusion.family))
+        .column(Text, expected_head, |cell| {
+            cell.confusion.labels[cell.expected].clone()
         })
-        .filter(|(_, (_, _, count))| *count > 0);
-    TableBuilder::new(name, non_empty)
-        .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
-        .family(|(confusion, _)| Some(&confusion.family))
-        .column(Text, due, |(confusion, (truth, _, _))| {
-            confusion.labels[*truth].clone()
+        .column(Text, "csv given", |cell| {
+            cell.confusion.labels.get(cell.given).cloned()
         })
-        .column(Text, "csv given", |(confusion, (_, answer, _))| {
-            confusion.labels.get(*answer).cloned()
-        })
-        .column(Count, "csv count", |(_, (_, _, count))| *count)
+        .column(Count, "csv count", |cell| cell.count)
         .build()
 }

@@ -1,4 +1,4 @@
-//! The table of new runs against an old one, with a row for each model and condition.
+//! Table of new runs compared with an old run, with a row for each model and condition.
 
 use crate::text::latex::escaped;
 use crate::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
@@ -6,10 +6,10 @@ use crate::text::table::{Table, TableBuilder, TableCell};
 use darkqa_score::comparisons::{BaselineRow, BaselineSide, MIN_PAIRS};
 use darkqa_score::significance::Significance;
 
-/// Name of the table, and id of its section of the page.
+/// Name of the table, and id of its section on the page.
 pub(crate) const BASELINE: &str = "baseline";
 
-/// The table of these rows; `old` is the name of the run that is the baseline.
+/// Builds the table of paired differences; `old` is the name of the baseline run.
 #[must_use]
 pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
     let difference = "csv difference low high | terminal new less old, 95 % interval | page new less old [95 %] \
@@ -49,7 +49,7 @@ pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
             "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)",
             |row| row.holm,
         );
-    let mut table = sides(builder)
+    let mut table = reply_columns(builder)
         .column(
             ColumnKind::Significance,
             "csv verdict | terminal | page | latex",
@@ -78,12 +78,14 @@ pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
     table
 }
 
-/// Adds replies that could not be read, failures and costs, old and new.
-fn sides(builder: TableBuilder<&BaselineRow>) -> TableBuilder<&BaselineRow> {
-    let both = |row: &BaselineRow, count: fn(&BaselineSide) -> usize| {
-        let [new, old] = row.sides.each_ref().map(count);
-        format!("{old} → {new}")
-    };
+/// An old and a new count, as in `3 → 5`.
+fn old_and_new(row: &BaselineRow, count: fn(&BaselineSide) -> usize) -> String {
+    let [new, old] = row.sides.each_ref().map(count);
+    format!("{old} → {new}")
+}
+
+/// Adds columns of unreadable replies, failures and costs in the old and the new run.
+fn reply_columns(builder: TableBuilder<&BaselineRow>) -> TableBuilder<&BaselineRow> {
     builder
         .column(Count, "csv unread_old", |row| row.sides[1].unread)
         .column(Count, "csv unread_new", |row| row.sides[0].unread)
@@ -91,11 +93,11 @@ fn sides(builder: TableBuilder<&BaselineRow>) -> TableBuilder<&BaselineRow> {
         .column(Count, "csv failed_new", |row| row.sides[0].failed)
         .column(Number, "csv cost_old", |row| row.sides[1].cost)
         .column(Number, "csv cost_new", |row| row.sides[0].cost)
-        .column(Count, "terminal unread | page unread", move |row| {
-            both(row, |side| side.unread)
+        .column(Count, "terminal unread | page unread", |row| {
+            old_and_new(row, |side| side.unread)
         })
-        .column(Count, "terminal failed | page failed", move |row| {
-            both(row, |side| side.failed)
+        .column(Count, "terminal failed | page failed", |row| {
+            old_and_new(row, |side| side.failed)
         })
         .column(Number, "terminal cost in $ | page cost in $", |row| {
             let [new, old] = row.sides.map(|side| side.cost);

@@ -1,4 +1,4 @@
-//! The table of the models by mean accuracy in the dark: each less each other, with its test.
+//! Table of pairwise differences between models in mean accuracy in the dark, with tests.
 
 use crate::sentences::dark_levels;
 use crate::text::table::ColumnKind::{Number, P, Percent, Points, Significance, Text};
@@ -7,12 +7,39 @@ use crate::text::words::{light, points};
 use darkqa_score::comparisons::{BestInTheDark, DarkAccuracy, DarkPair};
 use darkqa_score::findings::Findings;
 
-/// Empty if there are fewer than two models.
+/// Two models with the comparison that they belong to.
+struct PairRow<'b> {
+    best: &'b BestInTheDark,
+    pair: &'b DarkPair,
+}
+
+impl<'b> PairRow<'b> {
+    /// Accuracy of the first model over the dark levels.
+    fn first(&self) -> Option<&'b DarkAccuracy> {
+        self.accuracy(&self.pair.first)
+    }
+
+    /// Accuracy of the second model over the dark levels.
+    fn second(&self) -> Option<&'b DarkAccuracy> {
+        self.accuracy(&self.pair.second)
+    }
+
+    fn accuracy(&self, model: &str) -> Option<&'b DarkAccuracy> {
+        self.best.models.iter().find(|row| row.model == model)
+    }
+}
+
+/// Difference of a model from its accuracy at L0; `None` if that is not above chance.
+fn loss(accuracy: Option<&DarkAccuracy>) -> Option<String> {
+    Some(points(accuracy?.loss?.value))
+}
+
+/// Builds the table; it has no rows if there are fewer than two models.
 pub(super) fn best(findings: &Findings<'_>) -> Table {
     let pairs = findings
         .best
         .iter()
-        .flat_map(|best| best.pairs.iter().map(move |pair| (best, pair)));
+        .flat_map(|best| best.pairs.iter().map(move |pair| PairRow { best, pair }));
     let variant = findings
         .best
         .as_ref()
@@ -25,42 +52,41 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
     );
     let mut table = TableBuilder::new("best", pairs)
         .page("thresholds", &caption)
-        .column(Text, "csv model | page model", |(_, pair)| {
-            pair.first.clone()
+        .column(Text, "csv model | page model", |row| row.pair.first.clone())
+        .column(Text, "csv against_model | page against", |row| {
+            row.pair.second.clone()
         })
-        .column(Text, "csv against_model | page against", |(_, pair)| {
-            pair.second.clone()
-        })
-        .column(Text, "csv variant", |(best, _)| best.variant.to_string())
+        .column(Text, "csv variant", |row| row.best.variant.to_string())
         .column(Number, "csv first", |row| {
-            accuracy(row, first).map(|model| model.mean.value)
+            row.first().map(|model| model.mean.value)
         })
         .column(Number, "csv second", |row| {
-            accuracy(row, second).map(|model| model.mean.value)
+            row.second().map(|model| model.mean.value)
         })
         .column(Percent, "page first", |row| {
-            accuracy(row, first).map(|model| model.mean.value)
+            row.first().map(|model| model.mean.value)
         })
         .column(Percent, "page second", |row| {
-            accuracy(row, second).map(|model| model.mean.value)
+            row.second().map(|model| model.mean.value)
         })
-        .column(Text, "page first less L0", |row| loss(row, first))
-        .column(Text, "page second less L0", |row| loss(row, second))
+        .column(Text, "page first less L0", |row| loss(row.first()))
+        .column(Text, "page second less L0", |row| loss(row.second()))
         .column(
             Points,
             "csv difference low high n | page difference [95 %]",
-            |(_, pair)| pair.difference,
+            |row| row.pair.difference,
         )
-        .column(P, "csv p | page p", |(_, pair)| pair.p)
-        .column(Text, "csv p_by", |(_, pair)| pair.p_by.to_string())
-        .column(P, "csv p_holm | page p (Holm)", |(_, pair)| pair.holm)
-        .column(Significance, "page", |(_, pair)| pair.significance)
-        .column(Text, "csv verdict", |(_, pair)| pair.significance.word())
-        .column(Text, "csv shown", |(_, pair)| {
-            pair.significance.is_shown().to_string()
+        .column(P, "csv p | page p", |row| row.pair.p)
+        .column(Text, "csv p_by", |row| row.pair.p_by.to_string())
+        .column(P, "csv p_holm | page p (Holm)", |row| row.pair.holm)
+        .column(Significance, "page", |row| row.pair.significance)
+        .column(Text, "csv verdict", |row| row.pair.significance.word())
+        .column(Text, "csv shown", |row| {
+            row.pair.significance.is_shown().to_string()
         })
-        .column(Text, "csv levels", |(best, _)| {
-            best.levels
+        .column(Text, "csv levels", |row| {
+            row.best
+                .levels
                 .iter()
                 .map(ToString::to_string)
                 .collect::<Vec<_>>()
@@ -69,25 +95,4 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
         .build();
     table.is_folded = true;
     table
-}
-
-fn first(pair: &DarkPair) -> &str {
-    &pair.first
-}
-
-fn second(pair: &DarkPair) -> &str {
-    &pair.second
-}
-
-fn accuracy<'b>(
-    (best, pair): &(&'b BestInTheDark, &DarkPair),
-    side: fn(&DarkPair) -> &str,
-) -> Option<&'b DarkAccuracy> {
-    best.models.iter().find(|model| model.model == side(pair))
-}
-
-/// The mean less the accuracy at L0; empty if that is not above chance.
-fn loss(row: &(&BestInTheDark, &DarkPair), side: fn(&DarkPair) -> &str) -> Option<String> {
-    let loss = accuracy(row, side)?.loss?;
-    Some(points(loss.value))
 }

@@ -1,4 +1,4 @@
-//! Table of the findings about noise under each noise profile.
+//! Tables of the findings about noise under each noise profile. Files and code call a noise profile a "reading".
 
 use std::collections::BTreeSet;
 
@@ -9,28 +9,26 @@ use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, ReadingName};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::comparisons::{
-    EffectInReading, FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,
+    FindingByReading, NoiseHypothesis, Robustness, Support, TestedEffect,
 };
 use darkqa_score::findings::Findings;
 
-/// One row a claim and reading in the file; one row a claim, with a column a reading, for people. Empty with one reading.
+/// Two tables: the file has a row for each finding and profile; the report has a row for each finding and a column for each profile.
+/// Empty unless several noise profiles were tested.
 pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
     let found = &findings.by_reading;
     let Some(first) = found.first() else {
         return Vec::new();
     };
     let readings: Vec<&ReadingName> = first.effects.iter().map(|effect| &effect.reading).collect();
-    vec![file(found), shown(findings, &readings)]
+    vec![file_table(found), report_table(findings, &readings)]
 }
 
-/// A row of the file.
-type FileRow<'f> = (&'f FindingByReading, &'f EffectInReading);
-
-fn file(found: &[FindingByReading]) -> Table {
+/// Table for the file.
+fn file_table(found: &[FindingByReading]) -> Table {
     let rows = found
         .iter()
         .flat_map(|finding| finding.effects.iter().map(move |effect| (finding, effect)));
-    let tested = |(_, effect): &FileRow<'_>| effect.effect;
     TableBuilder::new("readings", rows)
         .column(Text, "csv model", |(finding, _)| subject(finding))
         .column(Text, "csv finding", |(finding, _)| finding.claim.name())
@@ -47,20 +45,26 @@ fn file(found: &[FindingByReading]) -> Table {
         .column(Text, "csv reading", |(_, effect)| {
             effect.reading.to_string()
         })
-        .column(Number, "csv effect low high n", |row| {
-            tested(row).map(|effect| effect.difference)
+        .column(Number, "csv effect low high n", |(_, reading)| {
+            reading.effect.map(|effect| effect.difference)
         })
-        .column(P, "csv p", |row| tested(row).map(|effect| effect.p))
-        .column(P, "csv p_holm", |row| tested(row).map(|effect| effect.holm))
-        .column(Text, "csv verdict", |row| {
-            tested(row).map_or("not asked", |effect| effect.support.word())
+        .column(P, "csv p", |(_, reading)| {
+            reading.effect.map(|effect| effect.p)
+        })
+        .column(P, "csv p_holm", |(_, reading)| {
+            reading.effect.map(|effect| effect.holm)
+        })
+        .column(Text, "csv verdict", |(_, reading)| {
+            reading
+                .effect
+                .map_or("not asked", |effect| effect.support.word())
         })
         .column(Text, "csv holds", |(finding, _)| finding.robustness.word())
         .column(Count, "csv dropped", |(finding, _)| finding.dropped)
         .build()
 }
 
-/// A row of the table that is shown: a finding, or the thresholds of a model.
+/// Row of the report's table: a finding, or the thresholds of a finding's model.
 enum Row<'f> {
     Finding(&'f FindingByReading),
     Thresholds(&'f FindingByReading, Vec<&'f Curve>),
@@ -74,14 +78,14 @@ impl Row<'_> {
     }
 }
 
-fn shown(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
+/// Table for the terminal and the page: the findings of each model, then its thresholds.
+fn report_table(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
     let mut rows = Vec::new();
     let found = &findings.by_reading;
-    let is_same =
-        |a: &FindingByReading, b: &FindingByReading| (&a.model, &a.group) == (&b.model, &b.group);
-    for block in found.chunk_by(is_same) {
-        rows.extend(block.iter().map(Row::Finding));
-        rows.push(Row::Thresholds(&block[0], thresholds(findings, &block[0])));
+    for same_model in found.chunk_by(|a, b| (&a.model, &a.group) == (&b.model, &b.group)) {
+        rows.extend(same_model.iter().map(Row::Finding));
+        let curves = noise_curves(findings, &same_model[0]);
+        rows.push(Row::Thresholds(&same_model[0], curves));
     }
     let mut table = TableBuilder::new("readings", &rows)
         .page(
@@ -129,8 +133,8 @@ fn shown(findings: &Findings<'_>, readings: &[&ReadingName]) -> Table {
     table
 }
 
-/// The raw curves of a finding's model with noise, all families together.
-fn thresholds<'f>(findings: &'f Findings<'_>, finding: &FindingByReading) -> Vec<&'f Curve> {
+/// Curves of a finding's model with noise, without enhancement, over all families.
+fn noise_curves<'f>(findings: &'f Findings<'_>, finding: &FindingByReading) -> Vec<&'f Curve> {
     findings
         .curves
         .iter()
@@ -144,6 +148,7 @@ fn thresholds<'f>(findings: &'f Findings<'_>, finding: &FindingByReading) -> Vec
         .collect()
 }
 
+/// Threshold with its interval under one noise profile, in words.
 fn threshold(curves: &[&Curve], reading: &ReadingName) -> String {
     let Some(curve) = curves
         .iter()
@@ -164,12 +169,13 @@ fn threshold(curves: &[&Curve], reading: &ReadingName) -> String {
     )
 }
 
+/// Model of a finding, with its run group.
 fn subject(finding: &FindingByReading) -> String {
     let group = finding.group.as_ref().map(ToString::to_string);
     finding.model.clone() + &group.unwrap_or_default()
 }
 
-/// The effect with its interval and what it says, as `+12.3 [8.1, 16.2] holds`.
+/// Effect with its interval and its support for the finding, as in `+12.3 [8.1, 16.2] holds`.
 fn effect(effect: Option<&TestedEffect>) -> String {
     effect.map_or_else(
         || "not asked".to_owned(),
@@ -181,6 +187,7 @@ fn effect(effect: Option<&TestedEffect>) -> String {
     )
 }
 
+/// Number of items that the effects are computed on.
 fn items(finding: &FindingByReading) -> usize {
     finding
         .effects
@@ -189,20 +196,20 @@ fn items(finding: &FindingByReading) -> usize {
         .unwrap_or(0)
 }
 
-fn level_names(levels: &[AxisLevel], by: &str) -> String {
+fn level_names(levels: &[AxisLevel], separator: &str) -> String {
     let names: Vec<String> = levels.iter().map(ToString::to_string).collect();
-    names.join(by)
+    names.join(separator)
 }
 
-/// The levels as `L1–L5`, or one by one if some are missing.
-fn span(levels: &[AxisLevel], whole: usize) -> String {
+/// Levels as `L1–L5` if all `complete` of them were tested, else one by one.
+fn span(levels: &[AxisLevel], complete: usize) -> String {
     match levels {
-        [first, .., last] if levels.len() == whole => format!("{first}–{last}"),
+        [first, .., last] if levels.len() == complete => format!("{first}–{last}"),
         _ => level_names(levels, ", "),
     }
 }
 
-/// A claim in words, with its levels.
+/// Hypothesis with its levels, for the table.
 fn title(finding: &FindingByReading) -> String {
     let levels = &finding.levels;
     match &finding.claim {
@@ -237,7 +244,7 @@ fn title(finding: &FindingByReading) -> String {
     }
 }
 
-/// A claim as the beginning of a sentence.
+/// Hypothesis as the beginning of a sentence.
 fn clause(finding: &FindingByReading) -> String {
     let levels = &finding.levels;
     match &finding.claim {
@@ -255,46 +262,53 @@ fn clause(finding: &FindingByReading) -> String {
     }
 }
 
-/// The findings by reading, as `Noise compounds the drop under paper, eld; open under physical (−1.2 to 5.0 points).`
-fn sentence(finding: &FindingByReading) -> String {
-    let of = |support: Support| -> Vec<String> {
-        finding
-            .effects
-            .iter()
-            .filter_map(|one| Some((&one.reading, one.effect.as_ref()?)))
-            .filter(|(_, effect)| effect.support == support)
-            .map(|(reading, effect)| match support {
-                Support::Holds => reading.to_string(),
-                Support::Opposite | Support::Open => {
-                    format!(
-                        "{reading} ({} points)",
-                        ends_in_points(effect.difference).replace(", ", " to ")
-                    )
-                }
-            })
-            .collect()
-    };
-    let unasked: Vec<String> = finding
+/// Noise profiles under which a finding has some support. Each but [`Support::Holds`] has its interval.
+fn profiles_with_support(finding: &FindingByReading, support: Support) -> Vec<String> {
+    finding
         .effects
         .iter()
-        .filter(|one| one.effect.is_none())
-        .map(|one| one.reading.to_string())
-        .collect();
-    let parts = [
-        ("holds under", of(Support::Holds)),
-        ("the opposite under", of(Support::Opposite)),
-        ("open under", of(Support::Open)),
-        ("not asked under", unasked),
-    ];
-    let parts: Vec<String> = parts
+        .filter_map(|in_reading| Some((&in_reading.reading, in_reading.effect.as_ref()?)))
+        .filter(|(_, effect)| effect.support == support)
+        .map(|(reading, effect)| match support {
+            Support::Holds => reading.to_string(),
+            Support::Opposite | Support::Open => {
+                format!(
+                    "{reading} ({} points)",
+                    ends_in_points(effect.difference).replace(", ", " to ")
+                )
+            }
+        })
+        .collect()
+}
+
+/// Finding under each noise profile, as in `Noise compounds the drop: holds under paper, eld; open under physical (−1.2 to +5.0 points).`
+fn sentence(finding: &FindingByReading) -> String {
+    let not_asked: Vec<String> = finding
+        .effects
         .iter()
-        .filter(|(_, readings)| !readings.is_empty())
-        .map(|(words, readings)| format!("{words} {}", readings.join(", ")))
+        .filter(|in_reading| in_reading.effect.is_none())
+        .map(|in_reading| in_reading.reading.to_string())
         .collect();
+    let parts: Vec<String> = [
+        (
+            "holds under",
+            profiles_with_support(finding, Support::Holds),
+        ),
+        (
+            "the opposite under",
+            profiles_with_support(finding, Support::Opposite),
+        ),
+        ("open under", profiles_with_support(finding, Support::Open)),
+        ("not asked under", not_asked),
+    ]
+    .iter()
+    .filter(|(_, readings)| !readings.is_empty())
+    .map(|(words, readings)| format!("{words} {}", readings.join(", ")))
+    .collect();
     format!("{}: {}.", clause(finding), parts.join("; "))
 }
 
-/// A sentence for each finding that some reading decides, and the omissions.
+/// One sentence for each finding that some noise profile decides, and a note on items left out.
 fn notes(found: &[FindingByReading]) -> Vec<String> {
     let models: BTreeSet<String> = found.iter().map(subject).collect();
     let mut notes: Vec<String> = found
@@ -325,30 +339,28 @@ fn notes(found: &[FindingByReading]) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::types::Severity;
+    use darkqa_score::comparisons::EffectInReading;
     use darkqa_score::estimate::Estimate;
 
-    fn effect_of(reading: &str, low: f64, high: f64, support: Support) -> EffectInReading {
-        let value = f64::midpoint(low, high);
-        let difference = Estimate {
-            value,
-            low,
-            high,
-            n: 9,
-        };
-        let (p, holm) = (0.01, 0.02);
+    fn effect_in(reading: &str, low: f64, high: f64, support: Support) -> EffectInReading {
         EffectInReading {
             reading: ReadingName::new(reading).unwrap(),
             effect: Some(TestedEffect {
-                difference,
+                difference: Estimate {
+                    value: f64::midpoint(low, high),
+                    low,
+                    high,
+                    n: 9,
+                },
                 support,
-                p,
-                holm,
+                p: 0.01,
+                holm: 0.02,
             }),
         }
     }
 
     #[test]
-    fn a_sentence_names_each_reading_and_its_interval_where_it_does_not_hold() {
+    fn sentences_state_intervals_of_unsupported_findings() {
         let level = AxisLevel::new(Kind::Sensor, Severity::L5);
         let mut finding = FindingByReading {
             model: "m".to_owned(),
@@ -357,9 +369,9 @@ mod tests {
             levels: vec![level],
             blind: None,
             effects: vec![
-                effect_of("paper", 0.1, 0.3, Support::Holds),
-                effect_of("eld", 0.2, 0.4, Support::Holds),
-                effect_of("physical", -0.012, 0.05, Support::Open),
+                effect_in("paper", 0.1, 0.3, Support::Holds),
+                effect_in("eld", 0.2, 0.4, Support::Holds),
+                effect_in("physical", -0.012, 0.05, Support::Open),
             ],
             robustness: Robustness::Some,
             dropped: 0,
@@ -372,7 +384,7 @@ mod tests {
             effect(finding.effects[2].effect.as_ref()),
             "+1.9 [−1.2, +5.0] open"
         );
-        finding.effects[1] = effect_of("eld", -0.4, -0.2, Support::Opposite);
+        finding.effects[1] = effect_in("eld", -0.4, -0.2, Support::Opposite);
         finding.effects[2].effect = None;
         finding.claim =
             NoiseHypothesis::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());

@@ -1,4 +1,4 @@
-//! The tables of confidence against accuracy, and of probabilities by the place of a choice.
+//! Tables of the calibration of confidence, and of probabilities by the position of a choice.
 
 use crate::text::table::ColumnKind::{Count, Number, Percent, Points, Ratio, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
@@ -10,10 +10,10 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::ModelInCondition;
 
-/// Id of the section of the page.
+/// Id of the section on the page.
 pub(super) const CONFIDENCE: &str = "confidence";
 
-/// The tables; none if no probabilities of choices are known.
+/// Builds the tables; none if no probabilities of choices are known.
 pub(super) fn calibration(findings: &Findings<'_>) -> Vec<Table> {
     let all = &findings.calibrations;
     if all.is_empty() {
@@ -22,8 +22,8 @@ pub(super) fn calibration(findings: &Findings<'_>) -> Vec<Table> {
     vec![confidence(findings, all), reliability(all), positions(all)]
 }
 
-/// A number of a row.
-type NumberOf = fn(&Calibration) -> Option<Estimate>;
+/// Reads the value of a column from a row.
+type ColumnValue = fn(&Calibration) -> Option<Estimate>;
 
 fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
     let mut table = TableBuilder::new("calibration", all)
@@ -49,7 +49,7 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
             "csv overconfidence overconfidence_low overconfidence_high | terminal overconfidence, interval | page overconfidence [95 %]",
             |row| row.overconfidence.estimate,
         );
-    let numbers: [(&str, NumberOf); 6] = [
+    let ratio_columns: [(&str, ColumnValue); 6] = [
         (
             "csv ece ece_low ece_high | terminal calibration error | page calibration error [95 %]",
             |row| row.error,
@@ -74,8 +74,8 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
             |row| row.blind_shift,
         ),
     ];
-    for (heads, number) in numbers {
-        table = table.column(Ratio, heads, move |row| number(row));
+    for (heads, value) in ratio_columns {
+        table = table.column(Ratio, heads, move |row| value(row));
     }
     let mut table = table
         .column(Percent, "csv risk_100 | page risk in %", |row| {
@@ -99,7 +99,7 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
     table
 }
 
-/// A condition in the words of tables.
+/// Condition as the terminal names it.
 fn condition(subject: &ModelInCondition) -> String {
     match subject.level {
         None => "without images".to_owned(),
@@ -110,27 +110,34 @@ fn condition(subject: &ModelInCondition) -> String {
     }
 }
 
-/// The bins of the reliability diagram.
+/// Bin of the reliability diagram of one subject.
+struct BinRow<'a> {
+    subject: &'a ModelInCondition,
+    /// Number of the bin, from 1.
+    number: usize,
+    bin: ReliabilityBin,
+}
+
+/// Table of the bins of the reliability diagram.
 fn reliability(all: &[Calibration]) -> Table {
     let rows = all.iter().flat_map(|row| {
-        row.bins
-            .iter()
-            .enumerate()
-            .map(|(number, bin)| (&row.subject, number + 1, *bin))
+        row.bins.iter().zip(1..).map(|(bin, number)| BinRow {
+            subject: &row.subject,
+            number,
+            bin: *bin,
+        })
     });
     TableBuilder::new("reliability", rows)
-        .subject(
-            |row: &(&ModelInCondition, usize, ReliabilityBin)| row.0,
-            ToString::to_string,
-        )
-        .column(Count, "csv bin", |row| row.1)
-        .column(Number, "csv confidence", |row| row.2.confidence)
+        .subject(|row: &BinRow<'_>| row.subject, ToString::to_string)
+        .column(Count, "csv bin", |row| row.number)
+        .column(Number, "csv confidence", |row| row.bin.confidence)
         .column(Share, "csv accuracy accuracy_low accuracy_high n", |row| {
-            row.2.accuracy
+            row.bin.accuracy
         })
         .build()
 }
 
+/// Table of probabilities by the position of a choice.
 fn positions(all: &[Calibration]) -> Table {
     let rows = all
         .iter()

@@ -28,8 +28,8 @@ pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
     tables
 }
 
-/// Tables of the differences in another measure than accuracy. The file's last column is the name of the measure.
-pub(crate) fn comparisons_of(
+/// Tables of the differences in agreement with the answers at L0. The file's last column is the name of the measure.
+pub(crate) fn agreement_comparisons(
     comparisons: &[Comparison],
     unit: ClusterUnit,
     measure: &'static str,
@@ -199,9 +199,10 @@ fn hide_rows_in_terminal(table: &mut Table, kind: ComparisonKind, comparisons: &
     if kind == ComparisonKind::Blind {
         // The terminal compares blind models with raw images only. The file also has the enhanced images.
         shown.retain(|index| comparisons[*index].first.enhancer.is_none());
-        let is_better =
-            |index: &usize| comparisons[*index].strict.significance == Significance::Better;
-        if !shown.is_empty() && shown.iter().all(is_better) {
+        let all_are_better = shown
+            .iter()
+            .all(|index| comparisons[*index].strict.significance == Significance::Better);
+        if !shown.is_empty() && all_are_better {
             let line = format!("better in all {} conditions", shown.len());
             table.notes.push(line);
             shown.clear();

@@ -1,28 +1,33 @@
-//! The table of how each enhancer made its images.
+//! Table of the use of each enhancer: preprocessing, resizing, and the brightness of its images.
 
 use super::sections::ENHANCERS;
 use crate::text::table::ColumnKind::Text;
 use crate::text::table::{Table, TableBuilder};
 
-/// How an enhancer of a run made its images, in words.
+/// Use of an enhancer in a run, as texts.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct EnhancerRow {
-    /// Name of the enhancer; with that of the run if there are several.
+    /// Name of the enhancer, with the name of its run if there are several.
     pub(crate) name: String,
-    /// How it was fed and read, and what was done because of sizes.
+    /// Input and output conventions of the model, and changes of image size.
     pub(crate) how: String,
-    /// The look of the probe's and the run's images.
+    /// Appearance of its images of the probe and of the run's dark frames.
     pub(crate) looks: String,
 }
 
+/// Builds the table; `None` without an enhancer.
 pub(crate) fn enhancers(rows: &[EnhancerRow]) -> Option<Table> {
-    let row = "csv enhancer | terminal enhancer | page enhancer";
+    if rows.is_empty() {
+        return None;
+    }
+    let name = "csv enhancer | terminal enhancer | page enhancer";
     let how = "csv how | terminal fed and read | page fed and read";
     let looks = "csv dark_images | terminal dark images | page its images of dark frames";
-    let builder = TableBuilder::new("enhancer_use", rows)
+    let table = TableBuilder::new("enhancer_use", rows)
         .page(ENHANCERS, "How each enhancer was used")
-        .column(Text, row, |row| row.name.clone())
+        .column(Text, name, |row| row.name.clone())
         .column(Text, how, |row| row.how.clone())
-        .column(Text, looks, |row| row.looks.clone());
-    (!rows.is_empty()).then(|| builder.build())
+        .column(Text, looks, |row| row.looks.clone())
+        .build();
+    Some(table)
 }

@@ -1,5 +1,6 @@
-//! The tables of what fails first in the dark: [`fails_first`], question families and frames, under each noise profile.
+//! Tables of the question families and the frames that fail first in the dark, under each noise profile: [`fails_first`].
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
 use crate::text::table::ColumnKind::{Count, Percent, Text};
@@ -11,32 +12,46 @@ use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 
-/// Most frames of a variant; chosen.
+/// Maximum number of frames for each variant (chosen).
 const MAX_FRAMES: usize = 5;
 
-/// Fewest questions answered rightly at L0, over all models, of a frame in the table; chosen.
+/// Minimum number of right answers at L0, over all models, that a frame needs to be in the table (chosen).
 const MIN_RIGHT: usize = 3;
 
-/// The families by the level at which a loss is first detected, and the frames that lose most.
+/// Families by the level at which a loss is first detected, and the frames that lose most.
 pub(super) fn fails_first(findings: &Findings<'_>) -> [Table; 2] {
     [families(findings), frames(findings)]
 }
 
-/// A row for each family and a column for each variant. No loss detected comes last.
+/// Orders losses by level, then from the largest.
+fn compare_losses(one: &PooledFinding, other: &PooledFinding) -> Ordering {
+    let [one_value, other_value] = [one, other].map(|loss| loss.strict.difference.value);
+    one.level
+        .cmp(&other.level)
+        .then(one_value.total_cmp(&other_value))
+}
+
+/// A row for each family and a column for each variant. Families without a detected loss come last.
 fn families(findings: &Findings<'_>) -> Table {
     let variants: Vec<&Variant> = findings.grid.variants().into_iter().collect();
-    let mut families: Vec<&Family> = findings.grid.groups().into_iter().flatten().collect();
-    let order = |family: &Family| {
-        variants
-            .iter()
-            .filter_map(|variant| first_loss(findings, family, variant))
-            .map(|loss| (loss.level, loss.strict.difference.value))
-            .min_by(|one, other| one.0.cmp(&other.0).then(one.1.total_cmp(&other.1)))
-    };
-    families.sort_by(|one, other| match (order(one), order(other)) {
-        (Some(one), Some(other)) => one.0.cmp(&other.0).then(one.1.total_cmp(&other.1)),
+    let mut families: Vec<(&Family, Option<&PooledFinding>)> = findings
+        .grid
+        .groups()
+        .into_iter()
+        .flatten()
+        .map(|family| {
+            let loss = variants
+                .iter()
+                .filter_map(|variant| first_loss(findings, family, variant))
+                .min_by(|one, other| compare_losses(one, other));
+            (family, loss)
+        })
+        .collect();
+    families.sort_by(|(_, one), (_, other)| match (one, other) {
+        (Some(one), Some(other)) => compare_losses(one, other),
         (one, other) => other.is_some().cmp(&one.is_some()),
     });
+    let mut families: Vec<&Family> = families.into_iter().map(|(family, _)| family).collect();
     if families.len() < 2 {
         families.clear();
     }
@@ -72,7 +87,7 @@ fn families(findings: &Findings<'_>) -> Table {
     table
 }
 
-/// The loss of a family at the first level where it is detected.
+/// Loss of a family at the first level where a loss is detected.
 fn first_loss<'f>(
     findings: &'f Findings<'_>,
     family: &Family,
@@ -90,24 +105,24 @@ fn first_loss<'f>(
         .min_by_key(|finding| finding.level)
 }
 
-/// The answers of the pooled models to the questions of one frame in one variant.
+/// Answers of the pooled models to the questions about one frame in one variant.
 #[derive(Default)]
 struct FrameAnswers {
-    /// Right answers at L0.
+    /// Number of right answers at L0.
     right: usize,
-    /// Of these, the answers that are still right, by level.
+    /// Number of right answers at L0 that are still right at each dark level.
     kept: BTreeMap<AxisLevel, usize>,
 }
 
 impl FrameAnswers {
-    /// The mean share of right answers that are kept over the levels.
+    /// Share of right answers that are still right, as mean over the dark levels.
     fn kept_share(&self) -> f64 {
         let kept: usize = self.kept.values().sum();
         kept as f64 / (self.right * self.kept.len().max(1)) as f64
     }
 
-    /// The first level at which at most half of the right answers are kept.
-    fn half(&self) -> Option<AxisLevel> {
+    /// First level at which at most half of the right answers are still right.
+    fn half_lost_level(&self) -> Option<AxisLevel> {
         self.kept
             .iter()
             .find(|(_, kept)| 2 * **kept <= self.right)
@@ -122,10 +137,11 @@ struct FrameRow<'f> {
     answers: FrameAnswers,
 }
 
-/// The frames that keep the fewest right answers in each variant of raw images, first the worst. It is a description, no test.
+/// Frames that keep the fewest right answers in each variant of raw images, the worst first. This is descriptive, without a test.
 fn frames(findings: &Findings<'_>) -> Table {
-    let variants = findings.grid.variants();
-    let rows = variants
+    let rows = findings
+        .grid
+        .variants()
         .into_iter()
         .flat_map(|variant| frame_rows(findings, variant));
     let mut table = TableBuilder::new("frames_first", rows)
@@ -146,7 +162,7 @@ fn frames(findings: &Findings<'_>) -> Table {
             |row| row.answers.kept_share(),
         )
         .column(Text, "terminal half lost at | page half lost at", |row| {
-            row.answers.half().map(|level| level.to_string())
+            row.answers.half_lost_level().map(|level| level.to_string())
         })
         .build();
     if !table.rows.is_empty() {
@@ -157,11 +173,11 @@ fn frames(findings: &Findings<'_>) -> Table {
     table
 }
 
-/// The frames that keep the fewest right answers in a variant, first the worst.
+/// Frames that keep the fewest right answers in a variant, the worst first.
 fn frame_rows<'f>(findings: &'f Findings<'_>, variant: &'f Variant) -> Vec<FrameRow<'f>> {
     let mut rows: Vec<FrameRow<'_>> = answers(findings, variant)
         .into_iter()
-        .filter(|(_, answers)| answers.right >= MIN_RIGHT && answers.half().is_some())
+        .filter(|(_, answers)| answers.right >= MIN_RIGHT && answers.half_lost_level().is_some())
         .map(|(frame, answers)| FrameRow {
             variant,
             frame,
@@ -169,21 +185,24 @@ fn frame_rows<'f>(findings: &'f Findings<'_>, variant: &'f Variant) -> Vec<Frame
         })
         .collect();
     rows.sort_by(|one, other| {
-        let share = |row: &FrameRow<'_>| row.answers.kept_share();
-        share(one).total_cmp(&share(other))
+        let (one, other) = (one.answers.kept_share(), other.answers.kept_share());
+        one.total_cmp(&other)
     });
     rows.truncate(MAX_FRAMES);
     rows
 }
 
-/// What fails first, a line for each variant: the families that lose at the lowest level, and the frame that loses most. Variants in
-/// which the same fails first share a line.
+/// One line for each variant: the families that lose at the lowest level, and the frame that loses most. Variants with the same result
+/// share a line.
 pub(crate) fn first_to_fail(findings: &Findings<'_>) -> Vec<String> {
     let findings = findings.shown();
     let mut lines: Vec<(Vec<String>, String)> = Vec::new();
     for variant in findings.grid.variants() {
-        let families = findings.grid.groups().into_iter().flatten();
-        let losses: Vec<(&Family, &PooledFinding)> = families
+        let losses: Vec<(&Family, &PooledFinding)> = findings
+            .grid
+            .groups()
+            .into_iter()
+            .flatten()
             .filter_map(|family| Some((family, first_loss(findings, family, variant)?)))
             .collect();
         let lowest = losses.iter().map(|(_, loss)| loss.level).min();
@@ -209,7 +228,7 @@ pub(crate) fn first_to_fail(findings: &Findings<'_>) -> Vec<String> {
         .collect()
 }
 
-/// The answers to each frame by the models over which findings are pooled.
+/// Counts the answers of the pooled models for each frame.
 fn answers<'f>(
     findings: &'f Findings<'_>,
     variant: &Variant,
@@ -217,19 +236,23 @@ fn answers<'f>(
     let grid = &findings.grid;
     let models = findings.models_of(variant);
     let mut by_frame: BTreeMap<&FrameId, FrameAnswers> = BTreeMap::new();
-    let curves = findings.first_failures.iter().map(|failure| &failure.curve);
-    for curve in curves.filter(|curve| {
-        curve.variant == *variant && curve.enhancer.is_none() && models.contains(&&*curve.model)
-    }) {
-        let [(_, light), dark @ ..] = &curve.subjects[..] else {
+    for failure in &findings.first_failures {
+        let curve = &failure.curve;
+        let is_pooled = curve.variant == *variant
+            && curve.enhancer.is_none()
+            && models.contains(&&*curve.model);
+        let [(_, clean), dark @ ..] = &curve.subjects[..] else {
             continue;
         };
+        if !is_pooled {
+            continue;
+        }
         for (index, item) in grid.items.iter().enumerate() {
             let is_right = |subject: usize| {
-                let reading = grid.result(subject, index).reading(ReadingMode::Strict);
-                reading.is_some_and(|chosen| item.is_right(chosen))
+                let answer = grid.result(subject, index).reading(ReadingMode::Strict);
+                answer.is_some_and(|choice| item.is_right(choice))
             };
-            if is_right(*light) {
+            if is_right(*clean) {
                 let answers = by_frame.entry(&*item.asked.frame).or_default();
                 answers.right += 1;
                 for (level, subject) in dark {

@@ -1,5 +1,5 @@
-//! The table of accuracy by family, with a row for each subject. Numbers that are shown to be below those of a model without images
-//! are marked.
+//! Table of accuracy by family, with a row for each model in a condition. An accuracy is marked if it is detected to be below that of a
+//! model without images.
 
 use crate::text::latex::escaped;
 use crate::text::table::ColumnKind::{Percent, Text};
@@ -30,7 +30,9 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
             latex: family.map(|_| escaped(name)),
             ..ColumnHeads::default()
         };
-        builder = builder.column(Percent, names, |subject| share(findings, *subject, family));
+        builder = builder.column(Percent, names, |subject| {
+            accuracy_cell(findings, *subject, family)
+        });
     }
     let mut table = builder.build();
     table.latex = Some(
@@ -40,17 +42,19 @@ pub(super) fn families(findings: &Findings<'_>) -> Table {
     table
 }
 
-/// The cell of a subject and a family; `None` is chance.
-fn share(
+/// Accuracy of a subject on a family. No subject stands for chance, no family for all families.
+fn accuracy_cell(
     findings: &Findings<'_>,
     subject: Option<&ModelInCondition>,
     family: Option<&Family>,
 ) -> TableCell {
-    let mut cells = findings.summary.family_cells(family, ReadingMode::Strict);
-    let cell = cells.find(|cell| match subject {
-        Some(subject) => cell.subject == *subject,
-        None => cell.subject.view.is_none(),
-    });
+    let cell = findings
+        .summary
+        .family_cells(family, ReadingMode::Strict)
+        .find(|cell| match subject {
+            Some(subject) => cell.subject == *subject,
+            None => cell.subject.view.is_none(),
+        });
     let below = subject.is_some_and(|subject| !findings.below_blind(subject, family).is_empty());
     match cell.and_then(|cell| cell.accuracy) {
         None => TableCell::Missing,

@@ -1,14 +1,14 @@
-//! The table of the similarity of images to their clean frames, and of how well it predicts right answers.
+//! Table of the similarity of images to their clean frames, and of how well it predicts right answers.
 
 use crate::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Significance, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::View;
 use darkqa_score::auc::Auc;
-use darkqa_score::photographs::{ConditionFidelity, FidelityFindings, Prediction};
+use darkqa_score::photographs::{ConditionFidelity, FidelityFindings};
 use darkqa_score::subject::ModelInCondition;
 
-/// The measures in the order of [`ConditionFidelity::means`]: name in CSV files, and in text.
+/// Measures in the order of [`ConditionFidelity::means`]: name in CSV files, and in texts.
 const MEASURES: [(&str, &str); 2] = [("psnr", "PSNR"), ("ssim", "SSIM")];
 
 pub(super) fn fidelity(findings: Option<&FidelityFindings>) -> Option<Table> {
@@ -45,25 +45,27 @@ pub(super) fn fidelity(findings: Option<&FidelityFindings>) -> Option<Table> {
         )
         .column(Count, "page n", |row| row.replies);
     for (index, (csv, name)) in MEASURES.into_iter().enumerate() {
-        let auc = move |row: &&ConditionFidelity| row.predicts[index].map(|found| found.auc);
-        let of = move |number: fn(Prediction) -> f64| {
-            move |row: &&ConditionFidelity| row.predicts[index].map(number)
-        };
         let heads = format!(
             "csv {csv}_auc {csv}_auc_low {csv}_auc_high | terminal AUC of {name} | page AUC of {name} [95 %]"
         );
         table = table
-            .column(Ratio, &*heads, move |row| auc(row).map(|auc| auc.estimate))
-            .column(P, &*format!("csv {csv}_p"), of(|found| found.auc.p))
+            .column(Ratio, &*heads, move |row| {
+                row.predicts[index].map(|prediction| prediction.auc.estimate)
+            })
+            .column(P, &*format!("csv {csv}_p"), move |row| {
+                row.predicts[index].map(|prediction| prediction.auc.p)
+            })
             .column(
                 P,
                 &*format!("csv {csv}_p_holm | page p (Holm)"),
-                of(|found| found.holm),
+                move |row| row.predicts[index].map(|prediction| prediction.holm),
             )
             .column(
                 Significance,
                 &*format!("csv {csv}_verdict | page verdict"),
-                move |row| TableCell::from(row.predicts[index].map(|found| found.significance)),
+                move |row| {
+                    TableCell::from(row.predicts[index].map(|prediction| prediction.significance))
+                },
             );
     }
     let mut table = table.build();
@@ -84,11 +86,11 @@ fn condition(row: &ConditionFidelity) -> String {
     subject.condition()
 }
 
-/// Notes below the table: the AUC over all conditions, and the correlation between conditions.
+/// Notes below the table: AUC within conditions, and rank correlation between conditions.
 pub(crate) fn notes(findings: &FidelityFindings) -> Vec<String> {
     let mut notes = Vec::new();
     for (index, (_, name)) in MEASURES.into_iter().enumerate() {
-        notes.push(within(name, findings.within[index]));
+        notes.push(within_note(name, findings.within[index]));
         if let Some(correlation) = findings.between[index] {
             let correlation = format!("{correlation:+.2}").replace('-', "−");
             notes.push(format!(
@@ -100,7 +102,8 @@ pub(crate) fn notes(findings: &FidelityFindings) -> Vec<String> {
     notes
 }
 
-fn within(name: &str, auc: Option<Auc>) -> String {
+/// Note on the AUC of a measure within conditions.
+fn within_note(name: &str, auc: Option<Auc>) -> String {
     let Some(Auc { estimate, .. }) = auc else {
         return format!(
             "within conditions, too few right or wrong answers or clusters to know whether {name} tells them apart"

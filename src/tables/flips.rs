@@ -1,5 +1,4 @@
-//! The file of first failing levels, with a row for each item and curve: [`write_flips`]. It has as many rows as a run has items and
-//! curves, so it is made row by row.
+//! File of first failing levels, with a row for each item and curve: [`write_flips`]. The table can be large, so it is written in parts.
 
 use std::io::Write;
 use std::ops::Range;
@@ -11,26 +10,27 @@ use crate::text::table::{Table, TableBuilder};
 use darkqa_score::accuracies::FirstFailure;
 use darkqa_score::findings::Findings;
 
-/// The name of the file.
+/// Name of the file.
 pub(crate) const FLIPS: &str = "flips.csv";
 
-/// The rows that are made at once. Chosen: few enough to need no memory, and many enough to take no time.
-const ROWS: usize = 4096;
+/// Number of rows in a part (chosen): small enough for memory, large enough for speed.
+const PART_ROWS: usize = 4096;
 
 /// Writes the first failing levels. The level is empty if the item never fails or if an earlier level has no reply.
 ///
 /// # Errors
-/// If they cannot be written.
+/// If the output cannot be written.
 pub(crate) fn write_flips(findings: &Findings<'_>, out: &mut dyn Write) -> Result<()> {
     let items = findings.grid.items.len();
     let parts = findings.first_failures.iter().flat_map(|failure| {
-        let starts = (0..items).step_by(ROWS);
-        starts.map(move |start| part(findings, failure, start..items.min(start + ROWS)))
+        (0..items)
+            .step_by(PART_ROWS)
+            .map(move |start| part(findings, failure, start..items.min(start + PART_ROWS)))
     });
     csv::write(out, parts)
 }
 
-/// The rows of some items.
+/// Part of the file: the rows of one curve for some items.
 fn part(findings: &Findings<'_>, failure: &FirstFailure, items: Range<usize>) -> Table {
     let grid = &findings.grid;
     let rows = items.map(|item| (grid.items[item].asked, failure.first(grid, item)));
@@ -42,7 +42,7 @@ fn part(findings: &Findings<'_>, failure: &FirstFailure, items: Range<usize>) ->
         .column(Text, "csv frame", |(asked, _)| asked.frame.to_string())
         .family(|(asked, _)| Some(&*asked.family))
         .column(Count, "csv repeat", |(asked, _)| asked.repeat as usize)
-        .line(|_| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
+        .curve(|_| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
         .column(Text, "csv first_failing", |(_, first)| {
             first.map(|level| level.to_string())
         })

@@ -1,4 +1,4 @@
-//! The table of replies, unreadable replies and failures of each subject.
+//! Table of replies, unreadable replies and failures for each model in a condition.
 
 use crate::text::table::ColumnKind::{Count, Failures};
 use crate::text::table::{Table, TableBuilder};
@@ -41,6 +41,7 @@ const OTHER: [UnreadReason; 5] = [
     UnreadReason::CannotTell,
 ];
 
+/// Builds the table of parse health.
 pub(crate) fn health(health: &[Health]) -> Table {
     let mut builder = TableBuilder::new("health", health)
         .page("health", "Replies and failures by subject")
@@ -48,9 +49,11 @@ pub(crate) fn health(health: &[Health]) -> Table {
         .column(Count, "csv replies | page replies", |health| health.replies)
         .column(Count, "csv read", |health| health.read)
         .column(Count, "csv lenient_only", |health| health.lenient_only)
-        .column(Count, "page read", |health| share(health, health.read))
+        .column(Count, "page read", |health| {
+            count_with_share(health, health.read)
+        })
         .column(Count, "page lenient alone", |health| {
-            share(health, health.lenient_only)
+            count_with_share(health, health.lenient_only)
         })
         .column(Count, "page other form", |health| {
             // An imported record may have both a choice and a reason.
@@ -79,7 +82,8 @@ pub(crate) fn health(health: &[Health]) -> Table {
     builder.build()
 }
 
-fn share(health: &Health, count: usize) -> String {
-    let of = health.replies.max(1) as f64;
-    format!("{count} ({} %)", percent(count as f64 / of))
+/// Count with its share of all replies, as in `3 (12.5 %)`.
+fn count_with_share(health: &Health, count: usize) -> String {
+    let replies = health.replies.max(1) as f64;
+    format!("{count} ({} %)", percent(count as f64 / replies))
 }

@@ -1,4 +1,4 @@
-//! The table of accuracy by level, with a row for each model, variant and enhancer.
+//! Table of accuracy by level, with a row for each model, variant and enhancer.
 
 use crate::text::ladder::{Ladder, LadderRow};
 use crate::text::table::ColumnKind::Count;
@@ -11,31 +11,31 @@ use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::findings::Findings;
 
-/// The tables of all items and, if the models were not asked the same ones, those of the items that they share.
+/// Tables over all items and, if the models were asked different items, also over the items that they share.
 pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = summary_tables(findings, &findings.summary, "");
     if let Some(common) = &findings.common {
-        let what = format!(
+        let items = format!(
             " on the {} questions that all models with images answered",
             common.shared_questions
         );
-        for mut table in summary_tables(findings, &common.summary, &what) {
-            table.latex = Some(format!("Accuracy in \\%{what}."));
+        for mut table in summary_tables(findings, &common.summary, &items) {
+            table.latex = Some(format!("Accuracy in \\%{items}."));
             tables.push(table);
         }
     }
     tables
 }
 
-/// The table of each axis; `what` states on which items, if not on all.
-fn summary_tables(findings: &Findings<'_>, summary: &AccuracySummary, what: &str) -> Vec<Table> {
+/// One table for each axis. `items` is a caption text about the items; empty for all items.
+fn summary_tables(findings: &Findings<'_>, summary: &AccuracySummary, items: &str) -> Vec<Table> {
     let strict = summary.family_cells(None, ReadingMode::Strict);
     let ladder = Ladder::new(strict.map(|cell| (&cell.subject, cell))).in_light_of(findings);
     let notes = notes(summary, &ladder);
     let mut tables: Vec<Table> = ladder
         .by_axis()
         .into_iter()
-        .map(|(axis, ladder)| axis_table(findings, summary, what, axis, &ladder))
+        .map(|(axis, ladder)| axis_table(findings, summary, items, axis, &ladder))
         .collect();
     if let Some(last) = tables.last_mut() {
         last.notes = notes;
@@ -46,44 +46,44 @@ fn summary_tables(findings: &Findings<'_>, summary: &AccuracySummary, what: &str
 fn axis_table(
     findings: &Findings<'_>,
     summary: &AccuracySummary,
-    what: &str,
+    items: &str,
     axis: Axis,
     ladder: &Ladder<'_, AccuracyCell>,
 ) -> Table {
-    let caption = match (what, axis == Axis::LIGHT) {
+    let caption = match (items, axis == Axis::LIGHT) {
         ("", true) => "Accuracy in % by level, with 95 % intervals".to_owned(),
-        (_, true) => format!("Accuracy in % by level{what}"),
-        (_, false) => format!("Accuracy in % by {} of {}{what}", axis.title, axis.cause),
+        (_, true) => format!("Accuracy in % by level{items}"),
+        (_, false) => format!("Accuracy in % by {} of {}{items}", axis.title, axis.cause),
     };
     let mut table = ladder
         .table("levels", &findings.grid.listing, |cell| {
-            cell.map_or(TableCell::Blank, |cell| accuracy(summary, cell))
+            cell.map_or(TableCell::Blank, |cell| accuracy_cell(summary, cell))
         })
         .page("accuracy", &caption)
         .column(Count, "terminal n", |line| replies(line))
         .column(Count, "terminal unparsed", |line| {
             let strict = line.sum(|cell| cell.unparsed).to_string();
-            let lenient =
-                |cell: &AccuracyCell| lenient(summary, cell).map_or(0, |cell| cell.unparsed);
-            let lenient = line.sum(lenient).to_string();
+            let lenient = line
+                .sum(|cell| lenient_cell(summary, cell).map_or(0, |cell| cell.unparsed))
+                .to_string();
             format!("{strict}{}", differing(&strict, &lenient))
         })
         .column(Count, "terminal failed", |line| {
             line.sum(|cell| cell.failed)
         })
         .build();
-    add_always(&mut table, ladder);
+    add_always_right_rows(&mut table, ladder);
     let of = if axis == Axis::LIGHT {
         String::new()
     } else {
         format!(" by {} of {}", axis.title, axis.cause)
     };
-    table.heading = Some(if what.is_empty() {
+    table.heading = Some(if items.is_empty() {
         format!(
             "Accuracy in %{of}: strict (lenient where it differs); n replies at each level; 95 %: how far the widest interval reaches down and up"
         )
     } else {
-        format!("Accuracy in %{of}{what}")
+        format!("Accuracy in %{of}{items}")
     });
     table.latex = Some(format!(
         "Accuracy in \\%{of} (strict parsing) with 95\\,\\% intervals by {}; {} items.",
@@ -93,7 +93,11 @@ fn axis_table(
     table
 }
 
-fn lenient<'a>(summary: &'a AccuracySummary, strict: &AccuracyCell) -> Option<&'a AccuracyCell> {
+/// Result of lenient parsing for the subject and family of a strict result.
+fn lenient_cell<'a>(
+    summary: &'a AccuracySummary,
+    strict: &AccuracyCell,
+) -> Option<&'a AccuracyCell> {
     summary.cell(
         &strict.subject,
         strict.family.as_ref(),
@@ -101,14 +105,15 @@ fn lenient<'a>(summary: &'a AccuracySummary, strict: &AccuracyCell) -> Option<&'
     )
 }
 
-fn accuracy(summary: &AccuracySummary, cell: &AccuracyCell) -> TableCell {
+/// Table cell of an accuracy by strict parsing, with lenient parsing where it was computed.
+fn accuracy_cell(summary: &AccuracySummary, cell: &AccuracyCell) -> TableCell {
     let Some(strict) = cell.accuracy else {
         return TableCell::Missing;
     };
     if cell.subject.view.is_none() {
         return TableCell::Guess(strict);
     }
-    match lenient(summary, cell).and_then(|cell| cell.accuracy) {
+    match lenient_cell(summary, cell).and_then(|cell| cell.accuracy) {
         Some(lenient) => TableCell::Strict(strict, lenient.value),
         None => TableCell::Estimate(strict),
     }
@@ -123,14 +128,14 @@ fn replies(line: &LadderRow<'_, AccuracyCell>) -> String {
     }
 }
 
-/// Share in percent of questions that were answered correctly every time.
-fn always(cell: &AccuracyCell) -> Option<String> {
+/// Percentage of questions that were answered correctly every time; `None` if each was asked only once.
+fn always_right(cell: &AccuracyCell) -> Option<String> {
     Some(percent(cell.always?.value))
 }
 
-/// Adds a row below each series whose questions were asked more than once, for the terminal only: the share that was right
-/// every time.
-fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
+/// Adds a row below each series whose questions were asked more than once: the share that was right every time. Only the terminal has
+/// these rows.
+fn add_always_right_rows(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
     for (index, row) in ladder.rows().iter().enumerate().rev() {
         let LadderRow::Series(_, cells) = row else {
             continue;
@@ -139,7 +144,7 @@ fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
             continue;
         }
         let shares = ladder.levels.iter().map(|level| {
-            match cells.get(level).and_then(|cell| always(cell)) {
+            match cells.get(level).and_then(|cell| always_right(cell)) {
                 Some(share) => TableCell::Text(share),
                 None => TableCell::Blank,
             }
@@ -160,11 +165,13 @@ fn add_always(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
     }
 }
 
-/// The notes below the table: models without images, chance, and reasons for unreadable replies.
+/// Notes below the table: models without images, chance, and reasons for unreadable replies.
 fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<String> {
-    let without_level = ladder.without_level.iter().map(|(_, cell)| *cell);
-    let (chance, blind): (Vec<&AccuracyCell>, Vec<&AccuracyCell>) =
-        without_level.partition(|cell| cell.subject.view.is_none());
+    let (chance, blind): (Vec<&AccuracyCell>, Vec<&AccuracyCell>) = ladder
+        .without_level
+        .iter()
+        .map(|(_, cell)| *cell)
+        .partition(|cell| cell.subject.view.is_none());
     let mut notes: Vec<String> = blind
         .into_iter()
         .map(|cell| note_without_images(summary, cell))
@@ -187,18 +194,18 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
             once.n
         )
     }));
-    notes.extend(unread(summary));
+    notes.extend(unread_note(summary));
     notes
 }
 
 fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String {
-    let text = texts(ColumnKind::Accuracy, &accuracy(summary, cell)).concat();
+    let text = texts(ColumnKind::Accuracy, &accuracy_cell(summary, cell)).concat();
     let interval = cell.accuracy.map(|share| format!(" [{}]", ends(share)));
     let accuracy = text + &interval.unwrap_or_default();
-    let always = always(cell).map(|share| format!(", right every time {share}"));
+    let always = always_right(cell).map(|share| format!(", right every time {share}"));
     let unparsed = cell.unparsed.to_string();
-    let lenient = lenient(summary, cell).map(|cell| cell.unparsed.to_string());
-    let lenient = lenient.map(|lenient| differing(&unparsed, &lenient));
+    let lenient =
+        lenient_cell(summary, cell).map(|cell| differing(&unparsed, &cell.unparsed.to_string()));
     format!(
         "{} without images: {accuracy}, n {}{}, unparsed {unparsed}{}, failed {}",
         cell.subject.model,
@@ -209,8 +216,8 @@ fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String
     )
 }
 
-/// Counts of unreadable replies by reason, for reasons that do not concern the form of the answer.
-pub(crate) fn unread(summary: &AccuracySummary) -> Option<String> {
+/// Note with the number of unreadable replies by reason, for reasons that do not concern the form of the answer.
+pub(crate) fn unread_note(summary: &AccuracySummary) -> Option<String> {
     let reasons = [
         (
             UnreadReason::Truncated,

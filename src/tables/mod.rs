@@ -1,4 +1,4 @@
-//! Tables of an evaluation, with one file for each topic: [`tables`].
+//! Tables of an evaluation, one module for each topic: [`tables`].
 
 mod agreement;
 mod answers;
@@ -34,34 +34,34 @@ use darkqa_score::subject::ModelInCondition;
 pub(crate) use answers::{commonest_answers, counted_answers};
 pub(crate) use baseline::BASELINE;
 pub(crate) use baseline::baseline;
-pub(crate) use comparisons::comparisons_of;
+pub(crate) use comparisons::agreement_comparisons;
 pub(crate) use enhancers::EnhancerRow;
 pub(crate) use enhancers::enhancers;
 pub(crate) use fails_first::first_to_fail;
 pub(crate) use flips::{FLIPS, write_flips};
 pub(crate) use health::health;
-pub(crate) use levels::unread;
-pub(crate) use observer::{notes as observer_notes, what_it_is};
+pub(crate) use levels::unread_note;
+pub(crate) use observer::{control_text, notes as observer_notes};
 pub(crate) use sections::{ENHANCERS, SECTIONS, Section};
 pub(crate) use strict_groups::strict_groups;
 pub(crate) use summary::{reading, summary as summary_rows};
-pub(crate) use thresholds::why as level_words;
+pub(crate) use thresholds::missing_threshold_reason;
 pub(crate) use training::with_training;
 
-/// All tables of an evaluation; the first is the summary. What is not shown is in the files alone.
+/// All tables of an evaluation; the first is the summary. A hidden observer is only in the files.
 #[must_use]
 pub(crate) fn tables(findings: &Findings<'_>) -> Vec<Table> {
     let Some(shown) = &findings.without_observer else {
-        return all(findings);
+        return all_tables(findings);
     };
-    all(findings)
+    all_tables(findings)
         .into_iter()
         .map(Table::in_files_only)
-        .chain(all(shown).into_iter().map(Table::without_file))
+        .chain(all_tables(shown).into_iter().map(Table::without_file))
         .collect()
 }
 
-fn all(findings: &Findings<'_>) -> Vec<Table> {
+fn all_tables(findings: &Findings<'_>) -> Vec<Table> {
     [
         vec![summary::summary(&findings.summary, &findings.grid.listing)],
         levels::levels(findings),
@@ -89,42 +89,41 @@ fn all(findings: &Findings<'_>) -> Vec<Table> {
 }
 
 impl<T> TableBuilder<T> {
-    /// Adds the columns of the subject of a row.
+    /// Adds columns for the model and condition of a row.
     pub(crate) fn subject(
         self,
-        of: impl Fn(&T) -> &ModelInCondition,
+        subject: impl Fn(&T) -> &ModelInCondition,
         variant: impl Fn(&Variant) -> String,
     ) -> Self {
-        let cell = |text: Option<String>| TableCell::from(text);
-        self.column(Text, "csv model", |row| of(row).model.clone())
+        self.column(Text, "csv model", |row| subject(row).model.clone())
             .column(Text, "csv view", |row| {
-                cell(of(row).view.map(|view| view.to_string()))
+                TableCell::from(subject(row).view.map(|view| view.to_string()))
             })
             .column(Text, "csv level", |row| {
-                cell(of(row).level.map(|level| level.to_string()))
+                TableCell::from(subject(row).level.map(|level| level.to_string()))
             })
-            .column(Text, "csv variant", |row| variant(&of(row).variant))
+            .column(Text, "csv variant", |row| variant(&subject(row).variant))
             .column(Text, "csv enhancer", |row| {
-                cell(of(row).enhancer.as_ref().map(ToString::to_string))
+                TableCell::from(subject(row).enhancer.as_ref().map(ToString::to_string))
             })
-            .column(Text, "page subject", |row| name(of(row)))
+            .column(Text, "page subject", |row| name(subject(row)))
     }
 
-    /// Adds the column of the models' group in files, if any model has one, and the further columns of models.
+    /// Adds columns for the models' group, in files if any model has one, and for the facts that the user gave about models.
     pub(crate) fn model_facts(
         mut self,
         listing: &ModelListing,
-        of: impl Fn(&T) -> &ModelInCondition,
+        subject: impl Fn(&T) -> &ModelInCondition,
     ) -> Self {
         if listing.has_groups() {
             self = self.column(Text, "csv model_group", |row| {
-                TableCell::from(listing.group(&of(row).model).map(str::to_owned))
+                TableCell::from(listing.group(&subject(row).model).map(str::to_owned))
             });
         }
         for column in listing.columns() {
             let head = format!("csv {}", column.word());
             self = self.column(Text, &*head, |row| {
-                let fact = listing.fact(*column, &of(row).model);
+                let fact = listing.fact(*column, &subject(row).model);
                 TableCell::from(
                     Some(fact)
                         .filter(|fact| !fact.is_empty())
@@ -135,22 +134,26 @@ impl<T> TableBuilder<T> {
         self
     }
 
-    /// Adds the columns of the curve of a row: model, variant and enhancer.
-    fn line(self, of: impl Fn(&T) -> (&str, &Variant, Option<&EnhancerName>)) -> Self {
+    /// Adds columns for the model, variant and enhancer of a row's curve.
+    fn curve(self, curve: impl Fn(&T) -> (&str, &Variant, Option<&EnhancerName>)) -> Self {
         self.column(Text, "csv model | terminal model | page model", |row| {
-            of(row).0.to_owned()
+            curve(row).0.to_owned()
         })
-        .column(Text, "csv variant", |row| of(row).1.to_string())
+        .column(Text, "csv variant", |row| curve(row).1.to_string())
         .column(Text, "csv enhancer", |row| {
-            of(row).2.map(ToString::to_string)
+            curve(row).2.map(ToString::to_string)
         })
     }
 
-    /// Adds the columns of the family; `None` is all families together.
-    pub(crate) fn family(self, of: impl Fn(&T) -> Option<&Family>) -> Self {
+    /// Adds columns for the family of a row; no family stands for all families together.
+    pub(crate) fn family(self, row_family: impl Fn(&T) -> Option<&Family>) -> Self {
         self.column(Text, "csv family", |row| {
-            of(row).map_or(Family::TOTAL, Family::name).to_owned()
+            row_family(row)
+                .map_or(Family::TOTAL, Family::name)
+                .to_owned()
         })
-        .column(Text, "page family", |row| family(of(row)).to_owned())
+        .column(Text, "page family", |row| {
+            family(row_family(row)).to_owned()
+        })
     }
 }

@@ -1,4 +1,4 @@
-//! The tables of the observer: what could still be read in each condition, and its controls.
+//! Tables of the known-signal observer: its score in each condition, and its controls.
 
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableFormat};
@@ -8,13 +8,15 @@ use crate::types::replies::OBSERVER;
 use darkqa_score::findings::Findings;
 use darkqa_score::observed::{ObserverCell, ObserverSummary};
 
-/// The definition of the observer, above its table.
+/// Heading of the tables, which defines the observer.
 const HEADING: &str = "Known-signal observer (given the untouched frame; not a model)";
 
-/// Share of an image's variance that the untouched frame explains, from which on the image is still like it (chosen).
-const ALIKE: f64 = 0.5;
+/// Minimum share of an image's variance that the clean frame explains if the image still resembles it (chosen).
+const MIN_ALIKE: f64 = 0.5;
 
-const SHOWN: [TableFormat; 3] = [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex];
+/// Formats for readers, as opposed to CSV files.
+const READER_FORMATS: [TableFormat; 3] =
+    [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex];
 
 pub(super) fn observer(findings: &Findings<'_>) -> Vec<Table> {
     let observer = &findings.observer;
@@ -26,9 +28,10 @@ pub(super) fn observer(findings: &Findings<'_>) -> Vec<Table> {
         "{HEADING}: expected score in % with its 95 % interval, a guess among k choices counts 1/k"
     ));
     if !observer.is_hidden() && observer.is_asked() {
-        let controls = observer.standing_controls();
-        let control = controls.first();
-        let control = control.map(|control| format!(" Control: {}.", what_it_is(control)));
+        let control = observer
+            .standing_controls()
+            .first()
+            .map(|control| format!(" Control: {}.", control_text(control)));
         table.latex = Some(format!(
             "{HEADING}: expected score in \\% with its 95\\,\\% interval. A guess among $k$ choices counts $1/k$.{}",
             control.unwrap_or_default()
@@ -45,7 +48,7 @@ pub(super) fn observer(findings: &Findings<'_>) -> Vec<Table> {
 fn conditions(observer: &ObserverSummary) -> Table {
     let is_hidden = observer.is_hidden();
     let mut builder = TableBuilder::new("observer", &observer.cells);
-    for format in SHOWN {
+    for format in READER_FORMATS {
         builder = builder.hide(format, |cell| is_hidden || cell.is_control());
     }
     builder
@@ -56,7 +59,7 @@ fn conditions(observer: &ObserverSummary) -> Table {
             Text,
             "terminal condition | page condition | latex Condition",
             |cell| {
-                // Where several runs are compared, each may have an observer of its own.
+                // If several runs are compared, each may have its own observer.
                 let run = cell.subject.model.strip_prefix(OBSERVER).unwrap_or_default();
                 cell.subject.condition() + run
             },
@@ -123,7 +126,7 @@ fn controls(observer: &ObserverSummary) -> Table {
     table
 }
 
-/// Remarks for the reader: a control that is not at chance, a missing control, and images of changed geometry.
+/// Warnings: a control that is not at chance, a missing control, and images of changed geometry.
 pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
     if !observer.is_asked() {
         return Vec::new();
@@ -154,12 +157,12 @@ pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
         .iter()
         .filter(|cell| !cell.is_control())
         .filter(|cell| cell.seen <= 0.0)
-        .map(blank)
+        .map(nothing_seen_note)
         .collect()
 }
 
-/// The image of a standing control, to follow `shown …`.
-pub(crate) fn what_it_is(control: &ObserverCell) -> &'static str {
+/// Text that describes a standing control by the images it is shown.
+pub(crate) fn control_text(control: &ObserverCell) -> &'static str {
     if Control::from_model_name(&control.subject.model) == Some(Control::OtherRoom) {
         "the same observer, shown images of other rooms"
     } else {
@@ -167,10 +170,10 @@ pub(crate) fn what_it_is(control: &ObserverCell) -> &'static str {
     }
 }
 
-/// The note on a condition in which nothing is seen.
-fn blank(cell: &ObserverCell) -> String {
+/// Warning about a condition in which the observer sees nothing.
+fn nothing_seen_note(cell: &ObserverCell) -> String {
     let (condition, explained) = (cell.subject.condition(), percent(cell.explained));
-    if cell.explained >= ALIKE {
+    if cell.explained >= MIN_ALIKE {
         format!(
             "{condition}: nothing is seen, although the untouched frame explains {explained} % of the images: they may be shifted, \
              cropped or warped by a few pixels, which the observer takes for other images"

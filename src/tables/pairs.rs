@@ -1,4 +1,4 @@
-//! The tables on photographs in the dark: how dark they are, and how far answers agree between lights.
+//! Tables on photographs in the dark: how dark they are, and how often answers agree between two lights.
 
 use super::sections::REAL;
 use crate::text::table::ColumnKind::{Count, Number, Ratio, Share, Text};
@@ -6,7 +6,7 @@ use crate::text::table::{Table, TableBuilder};
 use darkqa_score::comparisons::Agreement;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
 
-/// How dark the photographs are beside their frames, by name.
+/// Exposure drop of the photographs relative to their frames, with a row for each named set.
 pub(super) fn darkness(pairs: &[PairDarkness]) -> Table {
     let mut table = TableBuilder::new("pairs", pairs)
         .page(
@@ -51,27 +51,31 @@ pub(super) fn darkness(pairs: &[PairDarkness]) -> Table {
 pub(super) fn light_agreement(agreements: &[Agreement]) -> Table {
     let mut table = TableBuilder::new("light_agreement", agreements)
         .page(REAL, "The same answers in two lights")
-        .column(Text, "csv model | terminal model | page model", |of| {
-            of.first.model.clone()
+        .column(Text, "csv model | terminal model | page model", |agreement| {
+            agreement.first.model.clone()
         })
-        .column(Text, "csv condition | terminal condition | page condition", |of| {
-            of.first.condition()
-        })
-        .column(Text, "csv against_condition | terminal and | page and", |of| {
-            of.second.condition()
-        })
-        .column(Count, "csv n | terminal n", |of| of.same.n)
+        .column(
+            Text,
+            "csv condition | terminal condition | page condition",
+            |agreement| agreement.first.condition(),
+        )
+        .column(
+            Text,
+            "csv against_condition | terminal and | page and",
+            |agreement| agreement.second.condition(),
+        )
+        .column(Count, "csv n | terminal n", |agreement| agreement.same.n)
         .column(
             Share,
             "csv same_answer same_low same_high | terminal same answer in % | page same answer in % [95 %]",
-            |of| of.same,
+            |agreement| agreement.same,
         )
         .column(
             Ratio,
             "csv kappa kappa_low kappa_high | terminal κ | page κ [95 %]",
-            |of| of.kappa,
+            |agreement| agreement.kappa,
         )
-        .column(Count, "page n", |of| of.same.n)
+        .column(Count, "page n", |agreement| agreement.same.n)
         .build();
     table.heading = (!agreements.is_empty())
         .then(|| "The same answers in two lights, with κ of being right".to_owned());

@@ -1,4 +1,4 @@
-//! Tables of the differences of all models together, and of the models by area.
+//! Tables of differences pooled over all models.
 
 use std::collections::BTreeSet;
 
@@ -12,41 +12,45 @@ use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::SwapMethod;
 
-/// All families together, then by family.
+/// Three tables: all families together, by family, and both with lenient parsing (in files only).
 pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
-    let (whole, by_family): (Vec<&PooledFinding>, Vec<&PooledFinding>) = findings
+    let (all_families, by_family): (Vec<&PooledFinding>, Vec<&PooledFinding>) = findings
         .pooled
         .iter()
         .partition(|finding| finding.family.is_none());
-    let numbers: BTreeSet<usize> = findings
+    let model_counts: BTreeSet<usize> = findings
         .pooled
         .iter()
         .map(|finding| finding.models.len())
         .collect();
-    let models = numbers.last().copied();
-    let of_models = if numbers.len() > 1 {
-        // The column of models states over how many each row is pooled.
+    let models = model_counts.last().copied();
+    let of_models = if model_counts.len() > 1 {
+        // A column states the number of models of each row.
         "all models".to_owned()
     } else {
         counted(models.unwrap_or(0), "model")
     };
-    let column = if numbers.len() > 1 {
+    let column = if model_counts.len() > 1 {
         "csv models | terminal models | page models"
     } else {
         "csv models"
     };
     let caption = format!("Pooled over {of_models}");
-    let all: Vec<&PooledFinding> = whole.iter().copied().chain(&findings.averaged).collect();
+    let all: Vec<&PooledFinding> = all_families
+        .iter()
+        .copied()
+        .chain(&findings.averaged)
+        .collect();
     let mut total = table(&caption, column, &all, ReadingMode::Strict);
     if models.is_some_and(|models| models > 1) {
         total.heading = Some(format!(
             "Pooled over {of_models}, paired by question, in percentage points"
         ));
     }
-    let left_out = left_out(findings).into_iter();
-    total.notes = left_out
+    total.notes = left_out(findings)
+        .into_iter()
         .map(|sentence| sentence.text.trim_end_matches('.').to_owned())
-        .chain(notes(&whole, &findings.unit.to_string()))
+        .chain(notes(&all_families, &findings.unit.to_string()))
         .collect();
     let mut by_family = table(
         &format!("Pooled over {of_models}, by family"),
@@ -74,7 +78,7 @@ fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: Reading
         .column(Text, "terminal | page difference", |finding| title(finding))
         .family(|finding| finding.family.as_ref())
         .column(Count, models, |finding| finding.models.len());
-    numbers(builder, mode)
+    number_columns(builder, mode)
         .column(ColumnKind::Significance, "terminal | page", |finding| {
             finding.parsed(mode).verdict
         })
@@ -90,7 +94,8 @@ fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: Reading
         .build()
 }
 
-fn numbers(
+/// Adds the columns of numbers.
+fn number_columns(
     builder: TableBuilder<&PooledFinding>,
     mode: ReadingMode,
 ) -> TableBuilder<&PooledFinding> {
@@ -125,7 +130,7 @@ fn numbers(
         .column(Number, "csv p_least", |finding| finding.least_p)
 }
 
-/// The level, or those of a mean, as `L4–L5`.
+/// Level of a finding, or range of levels of a mean, as in `L4–L5`.
 fn levels(finding: &PooledFinding) -> String {
     match &*finding.mean_over {
         [first, .., last] => format!("{first}–{last}"),
@@ -133,7 +138,7 @@ fn levels(finding: &PooledFinding) -> String {
     }
 }
 
-/// The two sides in words, as `L3, with noise less L0`.
+/// Both sides of the difference, as in `L3 with noise − L0`.
 fn title(finding: &PooledFinding) -> String {
     let first = light(&finding.variant, finding.enhancer.as_ref());
     let second = match finding.kind {
@@ -146,7 +151,7 @@ fn title(finding: &PooledFinding) -> String {
     format!("{} {first} − {second}", levels(finding))
 }
 
-/// The two sides of a finding about false answers, and what is counted.
+/// Both sides of a difference in false answers, and the answers that are counted.
 fn false_answers(finding: &PooledFinding, first: &str, answer: FalseAnswer) -> String {
     let to = match answer {
         FalseAnswer::No => "what is there",
@@ -159,7 +164,7 @@ fn false_answers(finding: &PooledFinding, first: &str, answer: FalseAnswer) -> S
     )
 }
 
-/// Lines below the table: the omissions, and what so few clusters can show.
+/// Notes below the table: items left out, p-values by random swaps, and too few clusters for a verdict.
 fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
     let mut notes = Vec::new();
     let most = findings.iter().max_by_key(|finding| finding.dropped);
@@ -170,7 +175,7 @@ fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
             counted(most.items + most.dropped, "item")
         ));
     }
-    notes.extend(not_counted(findings));
+    notes.extend(random_swaps_note(findings));
     let least = findings
         .iter()
         .map(|finding| (finding.least_holm, finding.clusters));
@@ -178,8 +183,8 @@ fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
     notes
 }
 
-/// How p was found where not all swaps were counted.
-fn not_counted(findings: &[&PooledFinding]) -> Option<String> {
+/// Note on the methods of p-values for which not all swaps were counted.
+fn random_swaps_note(findings: &[&PooledFinding]) -> Option<String> {
     let methods: BTreeSet<String> = findings
         .iter()
         .map(|finding| finding.strict.p_by)
@@ -195,14 +200,15 @@ fn not_counted(findings: &[&PooledFinding]) -> Option<String> {
     })
 }
 
-/// The line below a table of tests in which no verdict is possible. `least` holds, for each test, the smallest corrected p-value
-/// that its clusters allow, and their number.
+/// Note that too few clusters make a verdict impossible; `None` if every test can have one. `least` has, for each test, the smallest
+/// corrected p-value that its clusters allow, and their number.
 pub(super) fn too_few_clusters(
     least: impl Iterator<Item = (f64, usize)>,
     unit: &str,
 ) -> Option<String> {
-    let impossible = least.filter(|(least, _)| *least >= 0.05);
-    let (least, clusters) = impossible.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (least, clusters) = least
+        .filter(|(least, _)| *least >= 0.05)
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(format!(
         "no verdict if p cannot be below 0.05: with {}, p (Holm) is {} at least",
         counted(clusters, unit),

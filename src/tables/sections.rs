@@ -3,7 +3,7 @@
 use super::baseline::BASELINE;
 use super::calibration::CONFIDENCE;
 
-/// A section of the page: its id, its title, the text below the title, and the names of its figures.
+/// Section of the page: id, title, text below the title, and names of its figures.
 pub(crate) type Section = (
     &'static str,
     &'static str,
@@ -11,7 +11,7 @@ pub(crate) type Section = (
     &'static [&'static str],
 );
 
-/// The sections of the page in order.
+/// All sections of the page in order.
 pub(crate) const SECTIONS: [Section; 15] = [
     (
         BASELINE,
@@ -129,5 +129,5 @@ pub(crate) const SECTIONS: [Section; 15] = [
 /// Id of the section on photographs in the dark.
 pub(crate) const REAL: &str = "real";
 
-/// Id of the section that has thumbnails of the frames.
+/// Id of the section on enhancers, which also has the sample images.
 pub(crate) const ENHANCERS: &str = "enhancers";

@@ -1,4 +1,4 @@
-//! The table of the strict score: the share of groups of which all questions are right.
+//! Table of the strict score: the share of question groups with all questions right.
 
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
@@ -12,23 +12,24 @@ use darkqa_score::subject::{CHANCE, ModelInCondition};
 
 use super::summary::reading;
 
-/// A row: a cell, or chance.
+/// Row of the table.
 enum Line<'a> {
+    /// Score of a model in a condition.
     Cell(&'a GroupCell),
+    /// Score of guessing, with a subject that names it.
     Chance(&'a GroupChance, ModelInCondition),
 }
 
-/// All groups, then those of one family; empty if questions have no groups.
+/// Two tables: all families together, and by family. Empty if the questions have no groups.
 pub(crate) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
     let Some(score) = &findings.strict else {
         return Vec::new();
     };
-    let whole = |family: Option<&Family>| family.is_none();
     let mut all = table(
         findings,
         score,
         "All questions of a group right, in %",
-        whole,
+        |family| family.is_none(),
     );
     all.heading = Some(
         "All questions of a group right, in % of the complete groups, with 95 % intervals; accuracy of the same subject beside it"
@@ -45,7 +46,7 @@ pub(crate) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
     vec![all, by_family]
 }
 
-/// Remarks on the groups.
+/// Remarks on the groups, below the table.
 fn foot(score: &StrictScore) -> Option<String> {
     let most = score.cells.iter().map(|cell| cell.incomplete).max();
     let joined = score
@@ -84,12 +85,14 @@ fn table(
     let cells = score
         .cells
         .iter()
-        .filter(|cell| is_shown(cell.family.as_ref()));
-    let chance = score.chance.iter();
-    let chance = chance.filter(|chance| is_shown(chance.family.as_ref()));
-    let lines = cells
-        .map(Line::Cell)
-        .chain(chance.map(|chance| Line::Chance(chance, guess())));
+        .filter(|cell| is_shown(cell.family.as_ref()))
+        .map(Line::Cell);
+    let chance = score
+        .chance
+        .iter()
+        .filter(|chance| is_shown(chance.family.as_ref()))
+        .map(|chance| Line::Chance(chance, chance_subject()));
+    let lines = cells.chain(chance);
     let builder = TableBuilder::new("groups", lines)
         .page("groups", caption)
         .subject(Line::subject, |variant| variant.word().into_owned())
@@ -106,29 +109,28 @@ fn table(
             Line::Cell(cell) if cell.mode == ReadingMode::Lenient => "lenient",
             Line::Cell(_) | Line::Chance(..) => "strict",
         });
-    let builder = numbers(builder, findings, score)
+    let builder = number_columns(builder, findings, score)
         .column(Text, "csv reading", |line| reading(line.subject()))
         .model_facts(&findings.grid.listing, Line::subject);
     let has_light = score
         .cells
         .iter()
-        .any(|cell| light(&cell.subject).is_some());
-    let builder = if has_light {
-        builder.column(Text, "csv light", |line| light(line.subject()))
+        .any(|cell| run_group(&cell.subject).is_some());
+    let mut builder = if has_light {
+        builder.column(Text, "csv light", |line| run_group(line.subject()))
     } else {
         builder
     };
-    let formats = [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex];
-    let builder = formats.into_iter().fold(builder, |builder, format| {
-        builder.hide(
+    for format in [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex] {
+        builder = builder.hide(
             format,
             |line| matches!(line, Line::Cell(cell) if cell.mode == ReadingMode::Lenient),
-        )
-    });
+        );
+    }
     builder.build()
 }
 
-fn numbers<'a>(
+fn number_columns<'a>(
     builder: TableBuilder<Line<'a>>,
     findings: &Findings<'_>,
     score: &StrictScore,
@@ -171,21 +173,22 @@ fn numbers<'a>(
             Percent,
             "terminal accuracy | page accuracy | latex Accuracy",
             |line| {
-                let mode = ReadingMode::Strict;
-                let mut cells = findings.summary.family_cells(line.family(), mode);
-                let cell = cells.find(|cell| match line {
-                    Line::Cell(of) => cell.subject == of.subject,
-                    Line::Chance(..) => cell.subject.view.is_none(),
-                });
-                let accuracy = cell.and_then(|cell| cell.accuracy);
-                accuracy.map(|accuracy| accuracy.value)
+                let cell = findings
+                    .summary
+                    .family_cells(line.family(), ReadingMode::Strict)
+                    .find(|cell| match line {
+                        Line::Cell(group_cell) => cell.subject == group_cell.subject,
+                        Line::Chance(..) => cell.subject.view.is_none(),
+                    });
+                Some(cell?.accuracy?.value)
             },
         )
 }
 
-/// A count of a cell; nothing for chance.
-fn count(line: &Line<'_>, of: impl Fn(&GroupCell) -> usize) -> TableCell {
-    line.cell().map_or(TableCell::Blank, |cell| of(cell).into())
+/// Table cell with a count; blank for chance.
+fn count(line: &Line<'_>, count: impl Fn(&GroupCell) -> usize) -> TableCell {
+    line.cell()
+        .map_or(TableCell::Blank, |cell| count(cell).into())
 }
 
 impl Line<'_> {
@@ -218,8 +221,8 @@ impl Line<'_> {
     }
 }
 
-/// The name of the group of runs of a subject, if it has one.
-fn light(subject: &ModelInCondition) -> Option<String> {
+/// Name of a subject's run group; `None` if it has none.
+fn run_group(subject: &ModelInCondition) -> Option<String> {
     subject
         .variant
         .group
@@ -228,7 +231,8 @@ fn light(subject: &ModelInCondition) -> Option<String> {
         .map(str::to_owned)
 }
 
-fn guess() -> ModelInCondition {
+/// Subject that stands for guessing.
+fn chance_subject() -> ModelInCondition {
     ModelInCondition {
         model: CHANCE.to_owned(),
         view: None,

@@ -1,4 +1,4 @@
-//! The table of the accuracy of every subject, with intervals and counts.
+//! Table of the accuracy of each model in each condition, with intervals and counts.
 
 use crate::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};

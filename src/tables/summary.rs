@@ -1,4 +1,4 @@
-//! The table of all accuracies: `summary.csv` and the rows of `summary.json`.
+//! Table of all accuracies: `summary.csv`, and the rows of `summary.json`.
 
 use crate::text::table::ColumnKind::{Count, Share, Text};
 use crate::text::table::{SUMMARY, Table, TableBuilder, TableCell};
@@ -7,7 +7,7 @@ use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::subject::ModelInCondition;
 
-/// A row for each accuracy.
+/// Builds the table, with a row for each model in a condition, family and way of parsing.
 pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Table {
     let builder = TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
@@ -28,26 +28,27 @@ pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Tabl
     } else {
         builder
     };
-    let builder = builder.column(Text, "csv reading", |cell| reading(&cell.subject));
-    let builder = builder.model_facts(listing, |cell| &cell.subject);
-    if summary.cells.iter().any(|cell| group(cell).is_some()) {
-        // The run whose images these are, where runs show different ones under one name.
+    let builder = builder
+        .column(Text, "csv reading", |cell| reading(&cell.subject))
+        .model_facts(listing, |cell| &cell.subject);
+    if summary.cells.iter().any(|cell| run_group(cell).is_some()) {
+        // Runs have different images of the same condition, so each row states its run group.
         return builder
-            .column(Text, "csv light", |cell| group(cell))
+            .column(Text, "csv light", |cell| run_group(cell))
             .build();
     }
     builder.build()
 }
 
-/// The name of the group of runs of a cell, if it has one.
-fn group(cell: &AccuracyCell) -> Option<&str> {
+/// Name of a cell's run group; `None` if it has none.
+fn run_group(cell: &AccuracyCell) -> Option<&str> {
     cell.subject.variant.group.as_ref().map(RunGroup::name)
 }
 
-/// The noise profile of a subject, if it has one.
+/// Cell with the noise profile ("reading") of a subject, if it has one.
 pub(crate) fn reading(subject: &ModelInCondition) -> TableCell {
     let variant = &subject.variant;
-    let of_pair = variant.pair.as_ref().and_then(PairDark::reading);
-    let reading = variant.reading.as_ref().or(of_pair);
+    let pair_reading = variant.pair.as_ref().and_then(PairDark::reading);
+    let reading = variant.reading.as_ref().or(pair_reading);
     TableCell::from(reading.map(ToString::to_string))
 }

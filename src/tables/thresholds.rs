@@ -93,7 +93,7 @@ impl Titles {
 fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ReadingMode) -> Table {
     TableBuilder::new(titles.file, curves)
         .page("thresholds", caption)
-        .line(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
+        .curve(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
         .column(Text, "terminal light | page light", |curve| {
             light(&curve.variant, curve.enhancer.as_ref())
         })
@@ -105,7 +105,7 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ReadingMode) -
             let darkest = curve.parsed(mode).darkest.value();
             match &curve.parsed(mode).threshold {
                 Ok(threshold) => TableCell::Threshold(*threshold, darkest),
-                Err(reason) => TableCell::Unknown(why(reason)),
+                Err(reason) => TableCell::Unknown(missing_threshold_reason(reason)),
             }
         })
         .column(
@@ -121,8 +121,8 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ReadingMode) -
         .build()
 }
 
-/// Reason why a curve has no threshold.
-pub(crate) fn why(reason: &NoThreshold) -> String {
+/// Text for the reason why a curve has no threshold.
+pub(crate) fn missing_threshold_reason(reason: &NoThreshold) -> String {
     match reason {
         NoThreshold::NotAboveChance => "not clearly above chance at L0".to_owned(),
         NoThreshold::Thin(level) => thin_level_text(level),
@@ -148,7 +148,11 @@ fn csv_reason(summary: &CurveSummary) -> String {
         .left_out
         .iter()
         .map(|level| format!("left out: {}", thin_level_text(level)));
-    let unknown = summary.threshold.as_ref().err().map(why);
+    let unknown = summary
+        .threshold
+        .as_ref()
+        .err()
+        .map(missing_threshold_reason);
     let reasons: Vec<String> = unknown.into_iter().chain(left_out).collect();
     reasons.join("; ")
 }
@@ -242,13 +246,18 @@ mod tests {
     #[test]
     fn proposed_levels_surround_the_thresholds() {
         let ladder = [0.0, 2.0, 4.0, 6.0, 7.5, 9.0];
-        let propose = |intervals: &[[f64; 2]]| levels_between(intervals, &ladder);
-        assert_eq!(propose(&[[2.2, 3.9]]), Some(vec![2.5, 3.0, 3.5]));
+        assert_eq!(
+            levels_between(&[[2.2, 3.9]], &ladder),
+            Some(vec![2.5, 3.0, 3.5])
+        );
         // The intervals span two steps; the level between the steps already exists.
-        assert_eq!(propose(&[[2.2, 3.0], [5.0, 5.5]]), Some(vec![3.0, 5.0]));
+        assert_eq!(
+            levels_between(&[[2.2, 3.0], [5.0, 5.5]], &ladder),
+            Some(vec![3.0, 5.0])
+        );
         // No proposal: a threshold beyond the darkest level, no known threshold, and a step below the minimum.
-        assert_eq!(propose(&[[8.0, f64::INFINITY]]), None);
-        assert_eq!(propose(&[]), None);
+        assert_eq!(levels_between(&[[8.0, f64::INFINITY]], &ladder), None);
+        assert_eq!(levels_between(&[], &ladder), None);
         assert_eq!(levels_between(&[[1.1, 1.3]], &[0.0, 1.0, 1.5, 2.0]), None);
     }
 }

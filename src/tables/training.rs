@@ -1,10 +1,10 @@
-//! The line below tables about the training data of enhancers: [`with_training`].
+//! Notes below tables on the training data of enhancers: [`with_training`].
 
 use crate::text::table::{Table, TableCell};
 use crate::text::words::names_enhancer;
 use crate::types::ModelListing;
 
-/// The tables with a line below each one that has results of an enhancer whose training data are known.
+/// Adds a note on the training data of an enhancer, if known, to each table that has its results.
 pub(crate) fn with_training(mut tables: Vec<Table>, listing: &ModelListing) -> Vec<Table> {
     for (enhancer, training) in listing.trainings() {
         for table in tables
@@ -21,7 +21,7 @@ pub(crate) fn with_training(mut tables: Vec<Table>, listing: &ModelListing) -> V
     tables
 }
 
-/// Whether a row is about an enhancer.
+/// True if a row of the table is about an enhancer.
 fn has_results(table: &Table, enhancer: &str) -> bool {
     table.rows.iter().any(|row| {
         row.cells
@@ -41,14 +41,15 @@ mod tests {
     use crate::text::table::ColumnKind::Text;
     use crate::text::table::TableBuilder;
 
+    fn table(condition: &'static str) -> Table {
+        TableBuilder::new("levels", [condition])
+            .page("accuracy", "Accuracy")
+            .column(Text, "page condition", |row| (*row).to_owned())
+            .build()
+    }
+
     #[test]
-    fn training_data_stand_below_results_of_the_enhancer_alone() {
-        let table = |row: &'static str| {
-            TableBuilder::new("levels", [row])
-                .page("accuracy", "Accuracy")
-                .column(Text, "page condition", |row| (*row).to_owned())
-                .build()
-        };
+    fn only_tables_with_results_have_a_training_note() {
         let mut listing = ModelListing::default();
         listing.add_training("lift", "drawn rooms".to_owned());
         let tables = ["L3-noise+lift", "with noise + lift", "lift-2", "raw"].map(table);

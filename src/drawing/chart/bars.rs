@@ -1,4 +1,4 @@
-//! A figure of bars: shares that lie on no axis, as those of photographs in the dark, raw and enhanced ([`BarChart`]).
+//! Bar charts ([`BarChart`]), for shares that have no place on an axis of levels, such as those of photographs in the dark.
 
 use super::LineStyle;
 use darkqa_score::estimate::Estimate;
@@ -6,7 +6,7 @@ use darkqa_score::estimate::Estimate;
 /// One bar.
 #[derive(Debug, Clone)]
 pub(crate) struct Bar {
-    /// Name in the legend, and shortened below the bar.
+    /// Name below the bar, shortened to fit.
     pub name: String,
     pub style: LineStyle,
     pub share: Estimate,
@@ -17,14 +17,14 @@ pub(crate) struct Bar {
 pub(crate) struct BarPanel {
     pub title: String,
     pub bars: Vec<Bar>,
-    /// A share that is drawn as a broken line: chance.
-    pub line: Option<f64>,
+    /// Share that guessing would reach, drawn as a broken line.
+    pub chance: Option<f64>,
 }
 
-/// A figure of panels of bars, side by side.
+/// A figure with one row of bars for each model.
 #[derive(Debug, Clone)]
 pub(crate) struct BarChart {
     pub panels: Vec<BarPanel>,
-    /// Further text of the caption.
+    /// Text for the end of the caption.
     pub note: String,
 }

@@ -1,6 +1,6 @@
-//! A figure of counts by name: [`CountPanel`].
+//! Bar panels of counts by name: [`CountPanel`].
 
-/// Most bars of a panel.
+/// Maximum number of bars in a panel (chosen).
 const MAX_BARS: usize = 24;
 
 /// Counts by name, drawn as bars.
@@ -11,8 +11,8 @@ pub(crate) struct CountPanel {
 }
 
 impl CountPanel {
-    /// A panel with the largest counts first. If there are more than [`MAX_BARS`], the smallest share one bar.
-    pub(crate) fn ranked(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
+    /// Sorts the counts from the largest and leaves out zeros. If more than [`MAX_BARS`] remain, the smallest are added up in one bar.
+    pub(crate) fn from_counts(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
         let mut bars: Vec<(String, u64)> = counts.filter(|(_, count)| *count > 0).collect();
         bars.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
         if bars.len() > MAX_BARS {

@@ -1,15 +1,15 @@
-//! The data of a chart for the script of the page, which draws it again at the available width: [`ChartData`].
+//! Data of a line chart for the page's script, which redraws it at the available width: [`ChartData`].
 
 use serde::Serialize;
 
-use super::{Chart, LineItems, PanelContent, PlotLine};
+use super::{Chart, LineContent, LineItems, Panel, PlotLine};
 use crate::error::Result;
 use crate::text::script::embedded;
 use crate::text::words::{percent, with_interval};
 use crate::types::degradations::Axis;
 use darkqa_score::estimate::Estimate;
 
-/// A chart as data. Shares are between 0 and 1; texts are those of tables, so that the script rounds nothing.
+/// A line chart as data. Shares are between 0 and 1. Texts are formatted as in tables, so that the script rounds nothing.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct ChartData {
     measure: &'static str,
@@ -19,7 +19,7 @@ pub(crate) struct ChartData {
 #[derive(Debug, Clone, Serialize)]
 struct PanelData {
     title: String,
-    /// The model that all lines are about; `None` if there are several.
+    /// The model of all lines; `None` if there are several.
     model: Option<String>,
     /// Title of the horizontal axis.
     axis: String,
@@ -39,10 +39,10 @@ struct LevelData {
 #[derive(Debug, Clone, Serialize)]
 struct LineData {
     name: String,
-    /// Number of the style: colour, dash and mark.
+    /// Number of the line's style: colour, dash and mark.
     style: usize,
     model: Option<String>,
-    /// The items behind its points; a click on a point shows them.
+    /// Filter for the list of items, applied when a point is clicked.
     #[serde(skip_serializing_if = "Option::is_none")]
     items: Option<LineItems>,
     #[serde(flatten)]
@@ -56,79 +56,80 @@ enum ContentData {
     Curve { points: Vec<PointData> },
     /// One share at all levels.
     Flat { share: f64, text: String },
-    /// Points at a darkness that is no level.
+    /// Photographs in the dark, which are not at a level.
     Marks { points: Vec<PointData> },
 }
 
 #[derive(Debug, Clone, Serialize)]
 struct PointData {
-    /// The place on the horizontal axis, in its unit: lower end, middle and upper end.
+    /// Position on the horizontal axis, in its unit: lower end, middle and upper end.
     x: [f64; 3],
-    /// The share, and both ends of its interval.
+    /// Share, and both ends of its interval.
     y: [f64; 3],
-    /// The share with its interval, as in tables.
+    /// Share with its interval, as in tables.
     text: String,
 }
 
 impl ChartData {
-    /// The data of a chart as JSON for a script of a page.
+    /// Serializes a chart as JSON that can be embedded in a page's script.
     ///
     /// # Errors
-    /// None in practice: a chart has no value that JSON cannot hold.
+    /// None in practice: JSON can represent every value of a chart.
     pub(crate) fn json(chart: &Chart) -> Result<String> {
         embedded(&Self::new(chart))
     }
 
     fn new(chart: &Chart) -> Self {
-        let panels = chart.panels.iter().map(|panel| {
-            let levels = panel.levels();
-            let axis = levels.iter().find_map(|level| level.axis());
-            PanelData {
-                title: panel.title.clone(),
-                model: panel.model.clone(),
-                axis: panel.axis_title(),
-                unit: axis.unwrap_or(Axis::LIGHT).unit,
-                levels: levels
-                    .iter()
-                    .map(|level| LevelData {
-                        name: level.to_string(),
-                        value: level.value(),
-                    })
-                    .collect(),
-                end: panel.farthest(),
-                lines: panel.lines.iter().map(line).collect(),
-            }
-        });
         Self {
             measure: chart.measure,
-            panels: panels.collect(),
+            panels: chart.panels.iter().map(panel_data).collect(),
         }
     }
 }
 
-fn line(line: &PlotLine) -> LineData {
+fn panel_data(panel: &Panel) -> PanelData {
+    let levels = panel.levels();
+    let axis = levels.iter().find_map(|level| level.axis());
+    PanelData {
+        title: panel.title.clone(),
+        model: panel.model.clone(),
+        axis: panel.axis_title(),
+        unit: axis.unwrap_or(Axis::LIGHT).unit,
+        levels: levels
+            .iter()
+            .map(|level| LevelData {
+                name: level.to_string(),
+                value: level.value(),
+            })
+            .collect(),
+        end: panel.axis_end(),
+        lines: panel.lines.iter().map(line_data).collect(),
+    }
+}
+
+fn line_data(line: &PlotLine) -> LineData {
     let content = match &line.content {
-        PanelContent::Flat(share) => ContentData::Flat {
+        LineContent::Flat(share) => ContentData::Flat {
             share: *share,
             text: percent(*share),
         },
-        PanelContent::Curve(points) => ContentData::Curve {
+        LineContent::Curve(points) => ContentData::Curve {
             points: points
                 .iter()
                 .map(|(level, share)| PointData {
                     x: [level.value(); 3],
                     y: [share.value, share.low, share.high],
-                    text: text(*share),
+                    text: share_text(*share),
                 })
                 .collect(),
         },
-        PanelContent::Marks(marks) => ContentData::Marks {
+        LineContent::Marks(marks) => ContentData::Marks {
             points: marks
                 .iter()
                 .map(|mark| PointData {
                     x: mark.ev,
                     y: [mark.share.value, mark.share.low, mark.share.high],
-                    text: text(mark.share),
+                    text: share_text(mark.share),
                 })
                 .collect(),
         },
@@ -142,8 +143,8 @@ fn line(line: &PlotLine) -> LineData {
     }
 }
 
-/// A share as in tables; one that is known exactly has no interval.
-fn text(share: Estimate) -> String {
+/// Formats a share as in tables, without an interval if it is known exactly.
+fn share_text(share: Estimate) -> String {
     if share.high <= share.low {
         return percent(share.value);
     }

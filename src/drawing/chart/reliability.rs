@@ -1,4 +1,4 @@
-//! A figure of accuracy over confidence: [`ReliabilityChart`].
+//! Reliability diagrams, accuracy over confidence: [`ReliabilityChart`].
 
 use super::LineStyle;
 use darkqa_score::estimate::Estimate;
@@ -13,17 +13,17 @@ pub(crate) struct ReliabilityLine {
     pub bins: Vec<(f64, Estimate)>,
 }
 
-/// The lines of one model in one light.
+/// One panel: the lines of one model.
 #[derive(Debug, Clone)]
 pub(crate) struct ReliabilityPanel {
     pub title: String,
     pub lines: Vec<ReliabilityLine>,
 }
 
-/// A figure of panels with one legend. Accuracy equals confidence on the diagonal.
+/// A figure of panels with one legend. Accuracy equals confidence on the diagonal of each panel.
 #[derive(Debug, Clone)]
 pub(crate) struct ReliabilityChart {
     pub panels: Vec<ReliabilityPanel>,
-    /// Further text of the caption.
+    /// Text for the end of the caption.
     pub note: String,
 }

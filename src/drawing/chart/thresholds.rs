@@ -1,13 +1,13 @@
-//! A figure of thresholds, a row for each curve: [`ThresholdChart`].
+//! Charts of thresholds with one row for each curve: [`ThresholdChart`].
 
 use crate::types::degradations::Axis;
 use darkqa_score::threshold::Threshold;
 
-/// The scale of an axis: the exposure drops to L5, the darkest named level, or the exposure times of the ladder.
+/// Horizontal scale, from 0 to the end of a ladder of levels: 9 EV for light (L5), 140 ms for motion blur.
 #[derive(Debug, Clone)]
 pub(crate) struct Scale {
     pub end: f64,
-    /// Distance of two ticks.
+    /// Distance between two ticks.
     pub step: i32,
     /// Name of the threshold.
     pub title: &'static str,
@@ -15,7 +15,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    pub(crate) fn new(axis: Axis) -> Self {
+    pub(crate) fn for_axis(axis: Axis) -> Self {
         let (end, step, title) = if axis == Axis::MOTION {
             (140.0, 20, "threshold of motion blur")
         } else {
@@ -33,11 +33,11 @@ impl Scale {
 /// The threshold of one curve.
 #[derive(Debug, Clone)]
 pub(crate) struct ThresholdRow {
-    /// The model and its light.
+    /// Model and condition.
     pub name: String,
     pub threshold: Threshold,
-    /// The threshold with its interval, in words.
-    pub words: String,
+    /// Threshold with its interval, formatted.
+    pub text: String,
 }
 
 /// A figure of the thresholds on one axis.

@@ -1,26 +1,27 @@
-//! The figure of confidence against accuracy over the levels.
+//! Figure of mean confidence and accuracy by level.
 
-use super::Overview;
-use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
+use super::FigureBuilder;
+use crate::drawing::chart::{Chart, LineContent, LineStyle, Panel, PlotLine};
 use darkqa_score::calibration::Calibration;
 use darkqa_score::estimate::Estimate;
 
-/// A quantity of the figure.
+/// Reads the value of a line from a calibration result.
 type Quantity = fn(&Calibration) -> Estimate;
 
-/// The lines of each panel.
+/// Lines of each panel: name and value.
 const LINES: [(&str, Quantity); 2] = [
     ("confidence", |row| row.confidence),
     ("accuracy", |row| row.accuracy),
 ];
 
-impl Overview<'_> {
-    /// Confidence and accuracy of each model in each variant, raw: the gap between them is overconfidence.
+impl FigureBuilder<'_> {
+    /// Confidence and accuracy of each model in each variant, without enhancement. The gap between the two lines is overconfidence.
     pub(super) fn confidence(&self) -> Option<(String, Chart)> {
         let mut panels = Vec::new();
         for variant in self.tested_variants() {
             for model in &self.models {
-                let line = |(style, (name, quantity)): (usize, (&str, Quantity))| {
+                let mut lines = Vec::new();
+                for (style, (name, quantity)) in LINES.into_iter().enumerate() {
                     let points = self.points(model, &variant, None, |subject| {
                         self.findings
                             .calibrations
@@ -28,18 +29,19 @@ impl Overview<'_> {
                             .find(|row| row.subject == *subject)
                             .map(quantity)
                     });
-                    (!points.is_empty()).then(|| PlotLine {
-                        name: name.to_owned(),
-                        style: LineStyle(style),
-                        content: PanelContent::Curve(points),
-                        model: Some((*model).to_owned()),
-                        items: None,
-                    })
-                };
-                let lines: Vec<PlotLine> = LINES.into_iter().enumerate().filter_map(line).collect();
+                    if !points.is_empty() {
+                        lines.push(PlotLine {
+                            name: name.to_owned(),
+                            style: LineStyle(style),
+                            content: LineContent::Curve(points),
+                            model: Some((*model).to_owned()),
+                            items: None,
+                        });
+                    }
+                }
                 if !lines.is_empty() {
-                    let name = self.names.shown(model);
-                    let title = format!("{name}, {}", self.light(&variant, None));
+                    let name = self.names.display_name(model);
+                    let title = format!("{name}, {}", self.condition_text(&variant, None));
                     panels.push(Panel {
                         title,
                         lines,

@@ -1,4 +1,4 @@
-//! The names that a reader gives in figures, and their order: [`Names`].
+//! Display names and display order of models, enhancers and families in figures: [`Names`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,19 +6,20 @@ use crate::error::{Error, Result};
 use crate::text::words::family as family_name;
 use darkqa_score::findings::Findings;
 
-/// Names as a reader wants them in figures; by default as they are.
+/// Display names and order for figures. The default keeps the names and the order of the runs.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Names {
-    /// Old and new names.
+    /// Display name by recorded name.
     labels: BTreeMap<String, String>,
-    /// The models that have their short form, because no other name has it.
+    /// Recorded names of the models that are displayed in their short form.
     shortened: Vec<String>,
+    /// Recorded names that come first.
     order: Vec<String>,
-    /// The model that is drawn black.
+    /// Recorded name of the model that is drawn in black.
     pub(super) black: Option<String>,
 }
 
-/// The names that the runs have.
+/// Names that occur in the runs.
 #[derive(Debug, Clone)]
 pub(crate) struct KnownNames {
     models: BTreeSet<String>,
@@ -27,24 +28,31 @@ pub(crate) struct KnownNames {
 }
 
 impl KnownNames {
-    /// The names in these findings.
-    pub(crate) fn new(findings: &Findings<'_>) -> Self {
+    pub(crate) fn from_findings(findings: &Findings<'_>) -> Self {
         let subjects = &findings.grid.subjects;
-        let asked = subjects.iter().filter(|subject| subject.view.is_some());
-        let enhancers = subjects.iter().filter_map(|of| of.enhancer.as_ref());
-        let families = findings.grid.families().into_iter();
         Self {
-            models: asked.map(|subject| subject.model.clone()).collect(),
-            enhancers: enhancers.map(ToString::to_string).collect(),
-            families: families
+            models: subjects
+                .iter()
+                .filter(|subject| subject.view.is_some())
+                .map(|subject| subject.model.clone())
+                .collect(),
+            enhancers: subjects
+                .iter()
+                .filter_map(|subject| subject.enhancer.as_ref())
+                .map(ToString::to_string)
+                .collect(),
+            families: findings
+                .grid
+                .families()
+                .into_iter()
                 .map(|family| family_name(Some(family)).to_owned())
                 .collect(),
         }
     }
 }
 
-/// The short form of the name of a model: without "script:", folders and the ending of a file, as on the page.
-fn short(name: &str) -> &str {
+/// Short form of a model's name, as on the page: without "script:", folders and the file extension.
+fn short_form(name: &str) -> &str {
     let bare = name.strip_prefix("script:").unwrap_or(name);
     let bare = match bare.rsplit_once('/') {
         Some((_, last)) if !last.is_empty() => last,
@@ -58,8 +66,8 @@ fn short(name: &str) -> &str {
         .unwrap_or(bare)
 }
 
-/// Checks that one of these sets has a name.
-fn check(flag: &str, name: &str, sets: &[&BTreeSet<String>]) -> Result<()> {
+/// Checks that a name that was given by a flag occurs in one of the sets.
+fn check_known(flag: &str, name: &str, sets: &[&BTreeSet<String>]) -> Result<()> {
     if sets.iter().any(|set| set.contains(name)) {
         return Ok(());
     }
@@ -73,11 +81,11 @@ fn check(flag: &str, name: &str, sets: &[&BTreeSet<String>]) -> Result<()> {
 }
 
 impl Names {
-    /// Names by `labels`, each an old and a new one, with those of `order` first, and one model drawn black. The other models have their
-    /// short form where no other name has it.
+    /// Renames by `labels` (old and new name), puts the names of `order` first, and draws the model `black` in black. A model without a
+    /// label gets its short form unless another name has it.
     ///
     /// # Errors
-    /// If the runs do not have a name, if a name has two labels, or if two names would become one.
+    /// If the runs lack a given name, if a name has two labels, or if two names would become the same.
     pub(crate) fn new(
         labels: &[(String, String)],
         order: &[String],
@@ -91,7 +99,7 @@ impl Names {
             ..Self::default()
         };
         for (old, new) in labels {
-            check("--label", old, &all)?;
+            check_known("--label", old, &all)?;
             if names.labels.insert(old.clone(), new.clone()).is_some() {
                 let problem = format!("gives two names to {old:?}: leave one out");
                 return Err(Error::usage("--label", problem));
@@ -99,40 +107,39 @@ impl Names {
         }
         names.shorten(&known.models, &all);
         for set in all {
-            let mut shown = BTreeMap::new();
+            let mut recorded = BTreeMap::new();
             for name in set {
-                if let Some(other) = shown.insert(names.shown(name), name) {
+                if let Some(other) = recorded.insert(names.display_name(name), name) {
                     let problem = format!(
                         "{other:?} and {name:?} would both be called {:?}: give them different names",
-                        names.shown(name)
+                        names.display_name(name)
                     );
                     return Err(Error::usage("--label", problem));
                 }
             }
         }
         for name in order {
-            check("--order", name, &all[..2])?;
+            check_known("--order", name, &all[..2])?;
         }
         if let Some(model) = black {
-            check("--reference", model, &all[..1])?;
+            check_known("--reference", model, &all[..1])?;
         }
         Ok(names)
     }
 
-    /// Gives models without a label their short form, if that is the name of nothing else.
+    /// Gives models without a label their short form, if no other name has it.
     fn shorten(&mut self, models: &BTreeSet<String>, all: &[&BTreeSet<String>]) {
-        let names = all.iter().flat_map(|set| set.iter());
         let mut uses: BTreeMap<String, usize> = BTreeMap::new();
-        for name in names {
+        for name in all.iter().flat_map(|set| set.iter()) {
             let form = match self.labels.get(name) {
                 Some(label) => label,
-                None if models.contains(name) => short(name),
+                None if models.contains(name) => short_form(name),
                 None => name,
             };
             *uses.entry(form.to_owned()).or_default() += 1;
         }
         for model in models {
-            let form = short(model);
+            let form = short_form(model);
             if form != model && !self.labels.contains_key(model) && uses[form] == 1 {
                 self.labels.insert(model.clone(), form.to_owned());
                 self.shortened.push(model.clone());
@@ -140,12 +147,12 @@ impl Names {
         }
     }
 
-    /// A sentence that states which models have a short form; empty if none has.
-    pub(crate) fn said(&self) -> String {
+    /// Sentence that explains the short names of models; empty without any.
+    pub(crate) fn short_names_note(&self) -> String {
         let forms: Vec<String> = self
             .shortened
             .iter()
-            .map(|model| format!("{} is {model}", self.shown(model)))
+            .map(|model| format!("{} is {model}", self.display_name(model)))
             .collect();
         match &*forms {
             [] => String::new(),
@@ -153,25 +160,24 @@ impl Names {
         }
     }
 
-    /// The name that is shown.
-    pub(super) fn shown(&self, name: &str) -> String {
+    /// Display name for a recorded name.
+    pub(super) fn display_name(&self, name: &str) -> String {
         self.labels
             .get(name)
             .map_or(name, String::as_str)
             .to_owned()
     }
 
-    /// Puts those first that the reader named, in that order; the others follow as they are.
-    pub(super) fn order<'n, T: ?Sized + 'n>(
+    /// Sorts items by the order that was given; items without a place in it follow, their order unchanged.
+    pub(super) fn sort<'n, T: ?Sized + 'n>(
         &self,
         items: &mut [&'n T],
         name: impl Fn(&'n T) -> &'n str,
     ) {
-        let place = |item: &&'n T| {
+        items.sort_by_key(|item| {
             let place = self.order.iter().position(|known| known == name(item));
             place.unwrap_or(self.order.len())
-        };
-        items.sort_by_key(place);
+        });
     }
 }
 
@@ -179,9 +185,12 @@ impl Names {
 mod tests {
     use super::*;
 
+    fn set(names: &[&str]) -> BTreeSet<String> {
+        names.iter().map(ToString::to_string).collect()
+    }
+
     #[test]
-    fn models_have_short_names_where_these_are_not_ambiguous() {
-        let set = |names: &[&str]| names.iter().map(ToString::to_string).collect();
+    fn models_have_unambiguous_short_names() {
         let known = KnownNames {
             models: set(&[
                 "script:sim-A.jsonl",
@@ -195,19 +204,21 @@ mod tests {
             families: BTreeSet::new(),
         };
         let names = Names::new(&[], &[], None, &known).unwrap();
-        let shown = |name: &str| names.shown(name);
-        assert_eq!(shown("script:sim-A.jsonl"), "sim-A");
-        assert_eq!(shown("org/vlm-7b"), "vlm-7b");
+        assert_eq!(names.display_name("script:sim-A.jsonl"), "sim-A");
+        assert_eq!(names.display_name("org/vlm-7b"), "vlm-7b");
         for name in ["a/same", "b/same", "x/lift", "folder/"] {
-            assert_eq!(shown(name), name);
+            assert_eq!(names.display_name(name), name);
         }
         assert_eq!(
-            names.said(),
+            names.short_names_note(),
             "Short names: vlm-7b is org/vlm-7b, sim-A is script:sim-A.jsonl."
         );
         let labels = [("org/vlm-7b".to_owned(), "sim-A".to_owned())];
         let names = Names::new(&labels, &[], None, &known).unwrap();
-        assert_eq!(names.shown("script:sim-A.jsonl"), "script:sim-A.jsonl");
-        assert_eq!(Names::default().said(), "");
+        assert_eq!(
+            names.display_name("script:sim-A.jsonl"),
+            "script:sim-A.jsonl"
+        );
+        assert_eq!(Names::default().short_names_note(), "");
     }
 }

@@ -1,12 +1,12 @@
-//! [`split`]: divides panels with many curves into several.
+//! Division of panels with many curves into several panels: [`split`].
 
-use crate::drawing::chart::{Panel, PanelContent, PlotLine};
+use crate::drawing::chart::{LineContent, Panel, PlotLine};
 
-/// Maximum number of curves per panel (chosen): the number of colours that everybody can tell apart.
+/// Maximum number of curves per panel: the number of colours in the palette.
 const MAX_CURVES: usize = 6;
 
-/// Divides panels so that each has at most [`MAX_CURVES`] curves. A line that is no curve stays with the curves of its model; without
-/// such curves, it appears in every part.
+/// Divides panels so that each has at most [`MAX_CURVES`] curves. A line that is not a curve stays with the curves of its model; if its
+/// model has no curve, the line appears in every part.
 pub(crate) fn split(panels: Vec<Panel>) -> Vec<Panel> {
     panels.into_iter().flat_map(split_panel).collect()
 }
@@ -41,7 +41,7 @@ fn split_panel(panel: Panel) -> Vec<Panel> {
 }
 
 fn is_curve(line: &PlotLine) -> bool {
-    matches!(line.content, PanelContent::Curve(_))
+    matches!(line.content, LineContent::Curve(_))
 }
 
 /// True if a curve is about the same model as the line.
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
     use crate::drawing::chart::LineStyle;
 
-    fn line(name: &str, content: PanelContent, model: Option<&str>) -> PlotLine {
+    fn line(name: &str, content: LineContent, model: Option<&str>) -> PlotLine {
         PlotLine {
             name: name.to_owned(),
             style: LineStyle(0),
@@ -68,10 +68,10 @@ mod tests {
         let names: Vec<String> = (0..curves).map(|index| format!("m{index}")).collect();
         let curves = names
             .iter()
-            .map(|name| line(name, PanelContent::Curve(Vec::new()), Some(name)));
+            .map(|name| line(name, LineContent::Curve(Vec::new()), Some(name)));
         let others = [
-            line("m0 without images", PanelContent::Flat(0.4), Some("m0")),
-            line("chance", PanelContent::Flat(0.3), None),
+            line("m0 without images", LineContent::Flat(0.4), Some("m0")),
+            line("chance", LineContent::Flat(0.3), None),
         ];
         Panel {
             title: "t".to_owned(),
@@ -80,18 +80,19 @@ mod tests {
         }
     }
 
+    fn line_names(panel: &Panel) -> Vec<&str> {
+        panel.lines.iter().map(|line| line.name.as_str()).collect()
+    }
+
     #[test]
     fn no_panel_has_more_than_six_curves() {
         assert_eq!(split(vec![panel(6)]).len(), 1);
         let parts = split(vec![panel(7)]);
-        let names = |panel: &Panel| -> Vec<String> {
-            panel.lines.iter().map(|line| line.name.clone()).collect()
-        };
         assert_eq!(
-            names(&parts[0]),
+            line_names(&parts[0]),
             ["m0", "m1", "m2", "m3", "m0 without images", "chance"]
         );
-        assert_eq!(names(&parts[1]), ["m4", "m5", "m6", "chance"]);
+        assert_eq!(line_names(&parts[1]), ["m4", "m5", "m6", "chance"]);
         assert_eq!(parts[1].title, "t (2 of 2)");
     }
 }

@@ -1,53 +1,51 @@
-//! The curves of the picture that tells a run's story: [`story_curves`].
+//! Curves for the story image, which shows one item and the accuracy over all items: [`story_curves`].
 
-use super::{Names, Overview};
-use crate::drawing::chart::{LineItems, LineStyle, PanelContent, PlotLine};
+use super::{FigureBuilder, Names};
+use crate::drawing::chart::{LineContent, LineItems, LineStyle, PlotLine};
 use crate::text::words::light;
 use crate::types::{EnhancerName, Variant};
 use darkqa_score::findings::Findings;
 use darkqa_score::subject::CHANCE;
 
-/// Accuracy over the levels in one variant: each model raw, and each with each enhancer.
+/// Accuracy by level in one variant: each model raw and with each enhancer.
 #[derive(Debug, Clone)]
 pub(crate) struct StoryCurves {
-    /// The last kind that was asked, in its first noise profile.
+    /// Main variant of the run: sensor noise, if it was asked.
     pub variant: Variant,
-    /// The variant in words.
+    /// Text for the variant.
     pub light: String,
-    /// The enhancers of the run.
+    /// All enhancers of the run.
     pub enhancers: Vec<EnhancerName>,
-    /// Curves, models without images, and chance.
+    /// Curves of models with images, then horizontal lines of models without images and of chance.
     pub lines: Vec<PlotLine>,
     /// Number of items and kind of intervals.
     pub note: String,
 }
 
-/// The curves of a run; `None` if no model was shown a dark image.
+/// Curves of a run; `None` if no model was shown a dark image.
 pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
-    let overview = Overview::new(findings, &Names::default());
-    let variant = overview.main_variant()?;
+    let builder = FigureBuilder::new(findings, &Names::default());
+    let variant = builder.main_variant()?;
     let mut lines = Vec::new();
-    for model in &overview.models {
-        for enhancer in overview.raw_and_enhanced() {
-            let points = overview.points(model, &variant, enhancer, |subject| {
-                overview.accuracy_of(subject, None)
-            });
+    for model in &builder.models {
+        for enhancer in builder.raw_and_enhanced() {
+            let points = builder.accuracy_points(model, &variant, enhancer);
             let name =
                 enhancer.map_or_else(|| (*model).to_owned(), |name| format!("{model} + {name}"));
-            // One level is not a line.
+            // A single level makes no line.
             if points.len() > 1 {
                 lines.push(PlotLine {
                     name,
                     style: LineStyle(lines.len()),
-                    content: PanelContent::Curve(points),
+                    content: LineContent::Curve(points),
                     model: Some((*model).to_owned()),
                     items: LineItems::for_model(&[*model], &variant, enhancer),
                 });
             }
         }
     }
-    for line in overview.flat_lines(None) {
-        // A model without images has a curve in its own style above.
+    for line in builder.flat_lines(None) {
+        // The model's own style already belongs to its curve.
         let style = match line.name.as_str() {
             CHANCE => line.style,
             _ => LineStyle(lines.len()),
@@ -57,8 +55,8 @@ pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
     Some(StoryCurves {
         light: light(&variant, None),
         variant,
-        enhancers: overview.enhancers.iter().copied().cloned().collect(),
+        enhancers: builder.enhancers.iter().copied().cloned().collect(),
         lines,
-        note: overview.note(),
+        note: builder.note(),
     })
 }

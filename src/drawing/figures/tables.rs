@@ -1,8 +1,8 @@
-//! The tables of a paper: models in rows, levels or families in columns: [`paper_tables`].
+//! Tables for a paper, with models in rows and levels or families in columns: [`paper_tables`].
 
 use std::collections::BTreeMap;
 
-use super::{Names, Overview};
+use super::{FigureBuilder, Names};
 use crate::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
 use crate::text::words::family as family_name;
 use crate::types::degradations::{Axis, Kind};
@@ -11,30 +11,32 @@ use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::subject::ModelInCondition;
-
-/// The words about marks in captions.
+/// Caption sentence about the mark ↓.
 const BELOW: &str = "↓: shown to be below the answers without images.";
 
-/// The tables for which there are records: accuracy by level, accuracy by family at L0 and at the darkest level, and each enhancer.
+/// All tables that have data: accuracy by level, accuracy by family at L0 and at the darkest level, and a table for each enhancer.
 pub(crate) fn paper_tables(findings: &Findings<'_>, names: &Names) -> Vec<Table> {
-    let overview = Overview::new(findings, names);
-    let variants = overview.tested_variants();
+    let builder = FigureBuilder::new(findings, names);
+    let variants = builder.tested_variants();
     let mut tables: Vec<Table> = variants
         .iter()
-        .map(|variant| overview.by_level(variant))
+        .map(|variant| builder.by_level(variant))
         .collect();
-    tables.extend(overview.main_variant().map(|of| overview.by_family(&of)));
+    tables.extend(
+        builder
+            .main_variant()
+            .map(|variant| builder.by_family(&variant)),
+    );
     for variant in &variants {
-        for enhancer in &overview.enhancers {
-            tables.extend(overview.by_enhancer(variant, enhancer));
+        for enhancer in &builder.enhancers {
+            tables.extend(builder.by_enhancer(variant, enhancer));
         }
     }
     tables.retain(|table| !table.rows.is_empty());
     tables
 }
 
-/// A table with the names of its columns after the first one, which holds the names of its rows.
+/// Table whose first column has the row names; `heads` are the names of the other columns.
 fn table(caption: String, heads: impl IntoIterator<Item = String>, rows: Vec<TableRow>) -> Table {
     let names = Column {
         kind: ColumnKind::Text,
@@ -56,7 +58,7 @@ fn table(caption: String, heads: impl IntoIterator<Item = String>, rows: Vec<Tab
     }
 }
 
-/// A row with its name, below a heading.
+/// Table row below the heading of its group.
 fn row(
     name: String,
     group: Option<&str>,
@@ -69,17 +71,17 @@ fn row(
     }
 }
 
-/// An accuracy, marked if it is below that without images.
-fn accuracy(of: Estimate, is_below: bool) -> TableCell {
-    if is_below {
-        TableCell::Below(of)
+/// Cell with an accuracy, marked if it is below the accuracy without images.
+fn accuracy_cell(accuracy: Estimate, is_below_blind: bool) -> TableCell {
+    if is_below_blind {
+        TableCell::Below(accuracy)
     } else {
-        TableCell::Estimate(of)
+        TableCell::Estimate(accuracy)
     }
 }
 
-impl Overview<'_> {
-    /// The basis of all numbers of a table.
+impl FigureBuilder<'_> {
+    /// Caption sentence on parsing, intervals and number of items.
     fn basis(&self) -> String {
         let (grid, unit) = (&self.findings.grid, self.findings.unit);
         format!(
@@ -89,6 +91,7 @@ impl Overview<'_> {
         )
     }
 
+    /// Accuracy of each model by level in one variant.
     fn by_level(&self, variant: &Variant) -> Table {
         let axis = variant.kind.map_or(Axis::LIGHT, Kind::axis);
         let rows: Vec<(&str, BTreeMap<AxisLevel, TableCell>)> = self
@@ -102,9 +105,9 @@ impl Overview<'_> {
                     }
                     self.accuracy_of(subject, None)
                 });
-                let cells = points
-                    .into_iter()
-                    .map(|(level, of)| (level, accuracy(of, below.contains(&level))));
+                let cells = points.into_iter().map(|(level, accuracy)| {
+                    (level, accuracy_cell(accuracy, below.contains(&level)))
+                });
                 (*model, cells.collect())
             })
             .collect();
@@ -123,18 +126,18 @@ impl Overview<'_> {
                     .map(|level| cells.remove(level).unwrap_or(TableCell::Blank));
                 TableRow {
                     is_best: self.is_best(model, variant),
-                    ..row(self.names.shown(model), None, numbers)
+                    ..row(self.names.display_name(model), None, numbers)
                 }
             })
             .chain(self.without_images(levels.len()))
             .collect();
         let values: Vec<String> = levels
             .iter()
-            .map(|of| format!("{of} {}", of.value()))
+            .map(|level| format!("{level} {}", level.value()))
             .collect();
         let caption = format!(
             "Accuracy in % by level, {} ({} in {}: {}). {} {BELOW} Bold: shown to be better than every other model over the levels.",
-            self.light(variant, None),
+            self.condition_text(variant, None),
             axis.title,
             axis.unit,
             values.join(", "),
@@ -143,28 +146,27 @@ impl Overview<'_> {
         table(caption, levels.iter().map(ToString::to_string), rows)
     }
 
-    /// Models without images, and chance, in the first of `columns` cells.
+    /// Rows of models without images, and of chance: the accuracy in the first column, the other `columns` − 1 cells blank.
     fn without_images(&self, columns: usize) -> impl Iterator<Item = TableRow> {
-        let cells = self
-            .findings
+        self.findings
             .summary
-            .family_cells(None, ReadingMode::Strict);
-        cells
+            .family_cells(None, ReadingMode::Strict)
             .filter(|cell| cell.subject.view != Some(View::Image))
             .filter_map(move |cell| {
-                let of = cell.accuracy?;
+                let accuracy = cell.accuracy?;
                 let first = match cell.subject.view {
-                    // The expected share of guesses is known without an interval.
-                    None => TableCell::Guess(of),
-                    Some(_) => TableCell::Estimate(of),
+                    // The expected accuracy of guessing is exact and has no interval.
+                    None => TableCell::Guess(accuracy),
+                    Some(_) => TableCell::Estimate(accuracy),
                 };
                 let mut numbers = vec![TableCell::Blank; columns];
                 *numbers.first_mut()? = first;
-                let name = self.names.shown(&cell.subject.model);
+                let name = self.names.display_name(&cell.subject.model);
                 Some(row(name, Some("without images"), numbers))
             })
     }
 
+    /// True if the model is detected to be better than every other model in the variant.
     fn is_best(&self, model: &str, variant: &Variant) -> bool {
         self.findings.best.as_ref().is_some_and(|best| {
             best.variant == *variant
@@ -174,17 +176,14 @@ impl Overview<'_> {
         })
     }
 
+    /// Accuracy of each model by family, at L0 and at the darkest level of the variant.
     fn by_family(&self, variant: &Variant) -> Table {
         let families = self.findings.grid.families();
         let darkest = self
             .models
             .iter()
-            .flat_map(|model| {
-                let points = self.points(model, variant, None, |subject| {
-                    self.accuracy_of(subject, None)
-                });
-                points.into_iter().map(|(level, _)| level)
-            })
+            .flat_map(|model| self.accuracy_points(model, variant, None))
+            .map(|(level, _)| level)
             .max()
             .unwrap_or(AxisLevel::L0);
         let rows = [AxisLevel::L0, darkest]
@@ -193,47 +192,56 @@ impl Overview<'_> {
             .map(|(level, model)| {
                 let numbers = families
                     .iter()
-                    .map(|family| self.at(model, level, variant, family));
-                row(self.names.shown(model), Some(&level.to_string()), numbers)
+                    .map(|family| self.family_cell(model, level, variant, family));
+                row(
+                    self.names.display_name(model),
+                    Some(&level.to_string()),
+                    numbers,
+                )
             })
             .collect();
         let caption = format!(
             "Accuracy in % by family at L0 and at {darkest} ({} {}), {}. {} {BELOW}",
             darkest.value(),
             darkest.axis().unwrap_or(Axis::LIGHT).unit,
-            self.light(variant, None),
+            self.condition_text(variant, None),
             self.basis()
         );
         let heads = families
             .iter()
-            .map(|family| self.names.shown(family_name(Some(family))));
+            .map(|family| self.names.display_name(family_name(Some(family))));
         table(caption, heads, rows)
     }
 
-    /// The accuracy of a model on a family at a level.
-    fn at(&self, model: &str, level: AxisLevel, variant: &Variant, family: &Family) -> TableCell {
-        let grid = &self.findings.grid;
-        let place =
-            grid.find_up_to_group(&ModelInCondition::with_images(model, level, variant, None));
-        let subject = place.map(|place| &grid.subjects[place]);
-        let of = subject.and_then(|subject| {
-            let below = !self.findings.below_blind(subject, Some(family)).is_empty();
-            Some(accuracy(self.accuracy_of(subject, Some(family))?, below))
-        });
-        of.unwrap_or(TableCell::Blank)
+    /// Accuracy of a model on a family at a level.
+    fn family_cell(
+        &self,
+        model: &str,
+        level: AxisLevel,
+        variant: &Variant,
+        family: &Family,
+    ) -> TableCell {
+        let Some(subject) = self.subject(model, level, variant, None) else {
+            return TableCell::Blank;
+        };
+        let Some(accuracy) = self.accuracy_of(subject, Some(family)) else {
+            return TableCell::Blank;
+        };
+        let below = self.findings.below_blind(subject, Some(family));
+        accuracy_cell(accuracy, !below.is_empty())
     }
 
-    /// The effect of an enhancer over the models, then the accuracy of each model with it; `None` if it was not asked in the variant.
+    /// Effect of an enhancer over all models, then the accuracy of each model with it; `None` if it was not asked in the variant.
     fn by_enhancer(&self, variant: &Variant, enhancer: &EnhancerName) -> Option<Table> {
         let pooled: Vec<_> = self
             .findings
             .pooled
             .iter()
-            .filter(|of| {
-                of.kind == PooledKind::Enhancer
-                    && of.family.is_none()
-                    && of.variant == *variant
-                    && of.enhancer.as_ref() == Some(enhancer)
+            .filter(|finding| {
+                finding.kind == PooledKind::Enhancer
+                    && finding.family.is_none()
+                    && finding.variant == *variant
+                    && finding.enhancer.as_ref() == Some(enhancer)
             })
             .collect();
         let rows: Vec<(&str, Vec<(AxisLevel, Estimate)>)> = self
@@ -251,40 +259,41 @@ impl Overview<'_> {
             .iter()
             .flat_map(|(_, points)| points)
             .map(|(level, _)| *level)
-            .chain(pooled.iter().map(|of| of.level))
+            .chain(pooled.iter().map(|finding| finding.level))
             .collect();
         levels.sort_unstable();
         levels.dedup();
         if levels.is_empty() {
             return None;
         }
-        let models = pooled.first().map_or(0, |of| of.models.len());
-        let effect = levels.iter().map(|level| {
-            let of = pooled.iter().find(|of| of.level == *level);
-            of.map_or(TableCell::Blank, |of| {
-                TableCell::Effect(of.strict.difference, of.strict.verdict)
-            })
-        });
-        let name = match models {
+        let name = match pooled.first().map_or(0, |finding| finding.models.len()) {
             1 => "enhanced − raw".to_owned(),
             several => format!("{several} models, enhanced − raw"),
         };
-        let effect = row(name, None, effect);
-        let own = rows
-            .iter()
-            .filter(|(_, points)| !points.is_empty())
-            .map(|(model, points)| {
-                let numbers = levels.iter().map(|level| {
-                    let at = points.iter().find(|(at, _)| at == level);
-                    at.map_or(TableCell::Blank, |(_, of)| TableCell::Estimate(*of))
+        let effects = levels.iter().map(|level| {
+            let finding = pooled.iter().find(|finding| finding.level == *level);
+            finding.map_or(TableCell::Blank, |finding| {
+                TableCell::Effect(finding.strict.difference, finding.strict.verdict)
+            })
+        });
+        let effect_row = row(name, None, effects);
+        let model_rows =
+            rows.iter()
+                .filter(|(_, points)| !points.is_empty())
+                .map(|(model, points)| {
+                    let numbers = levels.iter().map(|level| {
+                        let point = points.iter().find(|(other, _)| other == level);
+                        point.map_or(TableCell::Blank, |(_, accuracy)| {
+                            TableCell::Estimate(*accuracy)
+                        })
+                    });
+                    row(self.names.display_name(model), Some(""), numbers)
                 });
-                row(self.names.shown(model), Some(""), numbers)
-            });
-        let rows = std::iter::once(effect).chain(own).collect();
+        let rows = std::iter::once(effect_row).chain(model_rows).collect();
         let caption = format!(
             "Effect of {} in points, and accuracy with it in %, {}. {} Bold: a difference that is shown (p < 0.05 after Holm's correction over the levels).",
-            self.names.shown(enhancer.as_str()),
-            self.light(variant, None),
+            self.names.display_name(enhancer.as_str()),
+            self.condition_text(variant, None),
             self.basis()
         );
         Some(table(caption, levels.iter().map(ToString::to_string), rows))

@@ -1,33 +1,34 @@
-//! The figures of the thresholds, one for each axis.
+//! Figures of thresholds: one of darkness thresholds, one of blur thresholds.
 
 use std::collections::BTreeSet;
 
-use super::{Drawing, Overview};
-use crate::drawing::chart::drawn::Drawn;
+use super::{FigureBuilder, FigureSpec};
+use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::chart::thresholds::{Scale, ThresholdChart, ThresholdRow};
-use crate::tables::level_words;
+use crate::tables::missing_threshold_reason;
 use crate::text::words::stops;
 use crate::types::degradations::Axis;
 use darkqa_score::accuracies::Curve;
 use darkqa_score::findings::Findings;
 
-/// The names of the figures.
+/// Name and axis of each figure.
 const NAMES: [(&str, Axis); 2] = [
     ("thresholds", Axis::LIGHT),
     ("blur_thresholds", Axis::MOTION),
 ];
 
-/// Why a figure cannot be drawn although its images were asked: the curves have no threshold. `None` if it is for another reason.
-pub(crate) fn without_threshold(findings: &Findings<'_>, figure: &str) -> Option<String> {
+/// Message that a threshold figure is missing because no curve has a threshold, with the reasons; `None` if that is not the cause.
+pub(crate) fn missing_threshold_message(findings: &Findings<'_>, figure: &str) -> Option<String> {
     let (_, axis) = NAMES.into_iter().find(|(name, _)| *name == figure)?;
-    let reasons =
-        curves_on(findings, axis).filter_map(|curve| curve.summary.threshold.as_ref().err());
-    let reasons: BTreeSet<String> = reasons.map(level_words).collect();
+    let reasons: BTreeSet<String> = curves_on(findings, axis)
+        .filter_map(|curve| curve.summary.threshold.as_ref().err())
+        .map(missing_threshold_reason)
+        .collect();
     let reasons: Vec<String> = reasons.into_iter().collect();
     (!reasons.is_empty()).then(|| format!("no curve has a threshold: {}", reasons.join("; ")))
 }
 
-/// The curves of all families together on an axis.
+/// Curves on an axis that are over all families together.
 fn curves_on<'f>(findings: &'f Findings<'_>, axis: Axis) -> impl Iterator<Item = &'f Curve> {
     findings
         .curves
@@ -35,26 +36,26 @@ fn curves_on<'f>(findings: &'f Findings<'_>, axis: Axis) -> impl Iterator<Item =
         .filter(move |curve| curve.family.is_none() && curve.axis() == axis)
 }
 
-impl Overview<'_> {
-    /// The figure of each axis on which a curve has a threshold.
-    pub(super) fn thresholds(&self) -> Vec<Drawing> {
+impl FigureBuilder<'_> {
+    /// One figure for each axis on which a curve has a threshold.
+    pub(super) fn thresholds(&self) -> Vec<FigureSpec> {
         Axis::ALL
             .into_iter()
             .filter_map(|axis| self.thresholds_on(axis))
             .collect()
     }
 
-    /// A row for each curve, with its threshold and interval on an axis. `None` if no curve has a threshold.
-    fn thresholds_on(&self, axis: Axis) -> Option<Drawing> {
+    /// One row for each curve on an axis, with its threshold and interval; `None` if no curve has a threshold.
+    fn thresholds_on(&self, axis: Axis) -> Option<FigureSpec> {
         let rows: Vec<ThresholdRow> = curves_on(self.findings, axis)
             .filter_map(|curve| {
                 let threshold = *curve.summary.threshold.as_ref().ok()?;
                 let darkest = curve.summary.darkest.value();
-                let light = self.light(&curve.variant, curve.enhancer.as_ref());
+                let light = self.condition_text(&curve.variant, curve.enhancer.as_ref());
                 Some(ThresholdRow {
-                    name: format!("{}, {light}", self.names.shown(&curve.model)),
+                    name: format!("{}, {light}", self.names.display_name(&curve.model)),
                     threshold,
-                    words: format!(
+                    text: format!(
                         "{} [{}, {}]",
                         stops(threshold.value, darkest),
                         stops(threshold.low, darkest),
@@ -79,12 +80,12 @@ impl Overview<'_> {
                  beyond the darkest level asked.",
             )
         };
-        Some(Drawing {
+        Some(FigureSpec {
             name,
             caption: caption.to_owned(),
-            chart: Drawn::Thresholds(ThresholdChart {
+            chart: FigureChart::Thresholds(ThresholdChart {
                 rows,
-                scale: Scale::new(axis),
+                scale: Scale::for_axis(axis),
                 unit: self.findings.unit.to_string(),
             }),
         })

@@ -1,29 +1,29 @@
-//! The font of figures for papers: [`Font`].
+//! Bundled font of the figures: [`Font`].
 //!
-//! Arimo 1.33 (Steve Matteson, SIL Open Font License 1.1), reduced to Latin, Greek, punctuation and a few signs. Its letters are as wide
-//! as those of Arial, Helvetica and Liberation Sans, so that an SVG has the same measures where one of them is installed.
+//! Arimo 1.33 (Steve Matteson, SIL Open Font License 1.1), reduced to Latin, Greek, punctuation and a few signs. Its glyphs have the same
+//! widths as Arial, Helvetica and Liberation Sans, so that an SVG looks the same with any of these fonts.
 
 use ttf_parser::{Face, GlyphId};
 
-/// The file of the font.
-pub(super) const FILE: &[u8] = include_bytes!("font/Arimo-figures.ttf");
+/// TrueType file of the font.
+pub(super) const FONT_FILE: &[u8] = include_bytes!("font/Arimo-figures.ttf");
 
-/// The families that a viewer of an SVG may take: all of them have the same measures.
+/// CSS font families for SVG. The named ones have the same glyph widths.
 pub(super) const FAMILIES: &str = "Arimo, 'Liberation Sans', Arial, Helvetica, sans-serif";
 
 /// The bundled font.
 pub(super) struct Font(Face<'static>);
 
-/// One letter of a text.
+/// Glyph of one character of a text.
 pub(super) struct Letter {
     pub glyph: GlyphId,
-    /// Width for letters of height 1.
+    /// Advance width in em.
     pub advance: f32,
 }
 
-/// Measures of the font, in thousandths of the letter height.
+/// Metrics of the font, in thousandths of an em.
 pub(super) struct Metrics {
-    /// Left, bottom, right and top of the box that holds every glyph.
+    /// Left, bottom, right and top of the bounding box of all glyphs.
     pub bounds: [f32; 4],
     pub ascent: f32,
     /// Negative below the baseline.
@@ -32,17 +32,17 @@ pub(super) struct Metrics {
 }
 
 impl Font {
-    /// The bundled font.
+    /// Parses the bundled font.
     pub(super) fn bundled() -> Self {
-        Self(Face::parse(FILE, 0).expect("the bundled font is a font: a test reads it"))
+        Self(Face::parse(FONT_FILE, 0).expect("the bundled font is a font: a test reads it"))
     }
 
-    /// Whether the font has a letter.
+    /// True if the font has a glyph for a character.
     pub(super) fn has(&self, letter: char) -> bool {
         self.0.glyph_index(letter).is_some()
     }
 
-    /// The letters of a text; of one that the font lacks, the sign for a missing letter.
+    /// Glyphs of a text. A character that the font lacks gets the glyph for missing characters.
     pub(super) fn letters(&self, text: &str) -> Vec<Letter> {
         let units = f32::from(self.0.units_per_em());
         text.chars()
@@ -57,19 +57,24 @@ impl Font {
             .collect()
     }
 
-    /// The measures of the font that a PDF file states.
+    /// Metrics that a PDF file needs.
     pub(super) fn metrics(&self) -> Metrics {
-        let thousandths = |units: i16| f32::from(units) * 1000.0 / f32::from(self.0.units_per_em());
         let bounds = self.0.global_bounding_box();
         Metrics {
-            bounds: [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max].map(thousandths),
-            ascent: thousandths(self.0.ascender()),
-            descent: thousandths(self.0.descender()),
-            capital_height: thousandths(self.0.capital_height().unwrap_or(self.0.ascender())),
+            bounds: [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max]
+                .map(|units| self.thousandths(units)),
+            ascent: self.thousandths(self.0.ascender()),
+            descent: self.thousandths(self.0.descender()),
+            capital_height: self.thousandths(self.0.capital_height().unwrap_or(self.0.ascender())),
         }
     }
 
-    /// Width in points of a text in letters of `size` points.
+    /// Converts a length from font units to thousandths of an em.
+    fn thousandths(&self, units: i16) -> f32 {
+        f32::from(units) * 1000.0 / f32::from(self.0.units_per_em())
+    }
+
+    /// Width in points of a text at a font size of `size` points.
     pub(super) fn width(&self, text: &str, size: f64) -> f64 {
         self.letters(text)
             .into_iter()
@@ -78,38 +83,39 @@ impl Font {
             * size
     }
 
-    /// The text, or its start and end with "…" between, so that it is no wider than `room` points.
-    pub(super) fn shortened(&self, text: &str, size: f64, room: f64) -> String {
-        if self.width(text, size) <= room {
+    /// Shortens a text to at most `width` points by replacing its middle with "…". A text that fits is returned unchanged.
+    pub(super) fn shortened(&self, text: &str, size: f64, width: f64) -> String {
+        if self.width(text, size) <= width {
             return text.to_owned();
         }
         let letters: Vec<char> = text.chars().collect();
-        let lengths = Lengths::new(&letters, &self.letters(text));
-        let rest = self.width("…", size);
-        // A name of a stranger may be very long: a text is made of those letters alone that nearly fit. Sums differ by their rounding.
-        let nearly = room * (1.0 + 1e-6) + 1e-6;
+        let affix_widths = AffixWidths::new(&letters, &self.letters(text));
+        let ellipsis = self.width("…", size);
+        // Names may be very long: estimate each width from the prefix sums, and build only a text that nearly fits. The tolerance covers
+        // rounding errors of the sums.
+        let tolerated = width * (1.0 + 1e-6) + 1e-6;
         for kept in (2..letters.len()).rev() {
             let (head, tail) = (kept.div_ceil(2), kept / 2);
-            if lengths.without_middle(head, tail) * size + rest > nearly {
+            if affix_widths.without_middle(head, tail) * size + ellipsis > tolerated {
                 continue;
             }
             let start: String = letters[..head].iter().collect();
             let end: String = letters[letters.len() - tail..].iter().collect();
             let short = format!("{}…{}", start.trim_end(), end.trim_start());
-            if self.width(&short, size) <= room {
+            if self.width(&short, size) <= width {
                 return short;
             }
         }
         "…".to_owned()
     }
 
-    /// The text in lines of at most `room` points, broken at spaces; a word that is wider is shortened.
-    pub(super) fn wrapped(&self, text: &str, size: f64, room: f64) -> Vec<String> {
+    /// Breaks a text at spaces into lines of at most `width` points. A word that is wider than a line is shortened.
+    pub(super) fn wrapped(&self, text: &str, size: f64, width: f64) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         for word in text.split_whitespace() {
-            let word = self.shortened(word, size, room);
+            let word = self.shortened(word, size, width);
             match lines.last_mut() {
-                Some(line) if self.width(&format!("{line} {word}"), size) <= room => {
+                Some(line) if self.width(&format!("{line} {word}"), size) <= width => {
                     line.push(' ');
                     *line += &word;
                 }
@@ -120,40 +126,39 @@ impl Font {
     }
 }
 
-/// The lengths of all starts and ends of a text, for letters of height 1.
-struct Lengths {
-    /// Of so many letters from the start, without spaces at their end.
-    trimmed_starts: Vec<f64>,
-    /// Of so many letters from the end, without spaces at their start.
-    trimmed_ends: Vec<f64>,
+/// Widths of all prefixes and suffixes of a text, in em, by number of characters. Spaces at the cut are not counted.
+struct AffixWidths {
+    prefixes: Vec<f64>,
+    suffixes: Vec<f64>,
 }
 
-impl Lengths {
-    fn new(letters: &[char], widths: &[Letter]) -> Self {
-        let (mut starts, mut trimmed_starts) = (vec![0.0], vec![0.0]);
-        let (mut ends, mut trimmed_ends) = (vec![0.0], vec![0.0]);
-        let all = || letters.iter().zip(widths);
-        let add =
-            |(letter, width): (&char, &Letter), sums: &mut Vec<f64>, trimmed: &mut Vec<f64>| {
-                let sum = sums[sums.len() - 1] + f64::from(width.advance);
-                let last = trimmed[trimmed.len() - 1];
-                sums.push(sum);
-                trimmed.push(if letter.is_whitespace() { last } else { sum });
-            };
-        all().for_each(|one| add(one, &mut starts, &mut trimmed_starts));
-        all()
-            .rev()
-            .for_each(|one| add(one, &mut ends, &mut trimmed_ends));
+impl AffixWidths {
+    fn new(characters: &[char], letters: &[Letter]) -> Self {
+        let letters = characters.iter().zip(letters);
         Self {
-            trimmed_starts,
-            trimmed_ends,
+            prefixes: trimmed_widths(letters.clone()),
+            suffixes: trimmed_widths(letters.rev()),
         }
     }
 
-    /// Of so many letters from the start and so many from the end, without the spaces between them.
+    /// Width of the first `head` and the last `tail` characters together.
     fn without_middle(&self, head: usize, tail: usize) -> f64 {
-        self.trimmed_starts[head] + self.trimmed_ends[tail]
+        self.prefixes[head] + self.suffixes[tail]
     }
+}
+
+/// Cumulative widths, from none of the characters to all. White space counts only if another character follows.
+fn trimmed_widths<'a>(letters: impl Iterator<Item = (&'a char, &'a Letter)>) -> Vec<f64> {
+    let (mut sum, mut trimmed) = (0.0, 0.0);
+    let mut widths = vec![0.0];
+    for (character, letter) in letters {
+        sum += f64::from(letter.advance);
+        if !character.is_whitespace() {
+            trimmed = sum;
+        }
+        widths.push(trimmed);
+    }
+    widths
 }
 
 #[cfg(test)]
@@ -161,15 +166,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_font_has_latin_greek_and_the_minus_sign_and_is_small() {
+    fn the_font_has_latin_greek_and_minus() {
         let font = Font::bundled();
         let letters = "AZaz09ÄéßŁñΑΩαωμ−–—…“”‘’±×≤≥°%";
         assert!(letters.chars().all(|letter| font.has(letter)));
         assert!(!font.has('模'));
-        assert!(FILE.len() < 100_000);
-        // The widths that Arial and Helvetica have, in thousandths: W 944, i 222, minus 584.
-        let width = |text| font.width(text, 1000.0).round() as u32;
-        assert_eq!([width("W"), width("i"), width("−")], [944, 222, 584]);
+        assert!(FONT_FILE.len() < 100_000);
+        // Widths in Arial and Helvetica, in thousandths of an em.
+        let widths = ["W", "i", "−"].map(|text| font.width(text, 1000.0).round() as u32);
+        assert_eq!(widths, [944, 222, 584]);
     }
 
     #[test]
@@ -187,8 +192,8 @@ mod tests {
         assert!(lines.len() > 1 && lines.iter().all(|line| font.width(line, 8.0) <= 70.0));
         assert_eq!(lines.join(" "), "exposure drop with sensor noise, n 237");
     }
-    /// Found by damaged files: a family of 20,000 escape signs in a set of questions took the report 14 seconds, and time grew with the
-    /// square of the length.
+
+    /// Regression: a family name of 20,000 escape characters took a report 14 seconds, and the time grew with the square of the length.
     #[test]
     fn a_very_long_name_is_shortened_at_once() {
         let font = Font::bundled();

@@ -1,6 +1,6 @@
-//! How a figure for a paper looks: its width, letters and palette ([`Look`]), and the pens of its lines ([`Pen`]).
+//! Style of a figure: its width, font size and palette ([`Look`]), and the stroke and marker of each line ([`Pen`]).
 
-use super::sheet::{Colour, Sheet, Stroke};
+use super::sheet::{Colour, PAPER, Point, Shape, Sheet, Stroke};
 use crate::drawing::chart::{COLOURS, INK, LineStyle};
 
 /// The colours of figures.
@@ -19,32 +19,32 @@ const GREYS: [u8; 5] = [0, 120, 60, 148, 90];
 /// Dashes and gaps of lines, in widths of a line of 1 pt.
 const DASHES: [&[f64]; 4] = [&[], &[4.0, 2.0], &[1.5, 1.5], &[7.0, 1.8, 1.5, 1.8]];
 
-/// Dashes and gaps of models without images: one each, then again from the first.
+/// Dashes and gaps of the lines of models without images, used in turn.
 const WITHOUT_IMAGES: [&[f64]; 2] = [&[6.0, 2.5], &[6.0, 1.5, 1.5, 1.5]];
-/// Dots of chance and of the commonest true answer.
+/// Dots and gaps of the lines of chance and of the commonest true answer.
 const DOTS: &[f64] = &[1.0, 2.2];
 
-/// The measures and colours of a figure.
+/// Width, font size and colours of a figure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Look {
     /// Width of the figure in points.
     pub width: f64,
-    /// Height of the letters in points; those of ticks are smaller.
-    pub letters: f64,
+    /// Font size in points; tick labels are smaller.
+    pub font_size: f64,
     pub palette: Palette,
 }
 
-/// The look of a figure that is a column wide.
+/// Style of a figure as wide as a column of a paper.
 #[cfg(test)]
 pub(super) fn column_look() -> Look {
     Look {
         width: 252.0,
-        letters: 8.0,
+        font_size: 8.0,
         palette: Palette::Colour,
     }
 }
 
-/// The mark at each point of a line.
+/// Marker at each point of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Marker {
     Disc,
@@ -64,7 +64,7 @@ const MARKERS: [Marker; 6] = [
     Marker::Ring,
 ];
 
-/// The stroke and the mark of a line.
+/// Stroke and marker of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Pen {
     pub stroke: Stroke,
@@ -72,14 +72,14 @@ pub(super) struct Pen {
 }
 
 impl Look {
-    /// Height of the letters at ticks.
-    pub(super) fn small(&self) -> f64 {
-        self.letters * 0.87
+    /// Font size of tick labels in points.
+    pub(super) fn tick_font_size(&self) -> f64 {
+        self.font_size * 0.87
     }
 
-    /// Widths of lines, in parts of those for letters of 8 points.
-    pub(super) fn weight(&self) -> f64 {
-        self.letters / 8.0
+    /// Factor for line widths, which grow with the font size; 1 at 8 points.
+    pub(super) fn line_scale(&self) -> f64 {
+        self.font_size / 8.0
     }
 
     pub(super) fn colour(&self, style: LineStyle) -> Colour {
@@ -91,7 +91,7 @@ impl Look {
         }
     }
 
-    /// The pen of a line through points. The colours come again after the last, with another dash and mark.
+    /// Stroke and marker of a curve. Colours repeat after the last one, with another dash and marker.
     pub(super) fn pen(&self, style: LineStyle) -> Pen {
         let LineStyle(number) = style;
         let colours = match self.palette {
@@ -101,45 +101,47 @@ impl Look {
         let (dash, marker) = if style == LineStyle::BLACK {
             (DASHES[0], Marker::Ring)
         } else {
-            let turn = number / colours;
+            let repeat = number / colours;
             (
-                DASHES[(number + turn) % DASHES.len()],
-                MARKERS[(number + 3 * turn) % MARKERS.len()],
+                DASHES[(number + repeat) % DASHES.len()],
+                MARKERS[(number + 3 * repeat) % MARKERS.len()],
             )
         };
-        let width = 1.1 * self.weight();
+        let width = 1.1 * self.line_scale();
         Pen {
             stroke: self.dashed(self.colour(style), width, dash),
             marker,
         }
     }
 
-    /// The stroke of the line of a model without images, the `place`th of the figure.
-    pub(super) fn without_images(&self, place: usize) -> Stroke {
-        let dash = WITHOUT_IMAGES[place % WITHOUT_IMAGES.len()];
-        self.dashed(INK, 0.8 * self.weight(), dash)
+    /// Stroke for a model without images; `index` counts these models in the figure.
+    pub(super) fn without_images_stroke(&self, index: usize) -> Stroke {
+        let dash = WITHOUT_IMAGES[index % WITHOUT_IMAGES.len()];
+        self.dashed(INK, 0.8 * self.line_scale(), dash)
     }
 
-    /// The stroke of chance.
-    pub(super) fn dots(&self) -> Stroke {
-        self.dashed(INK, 0.8 * self.weight(), DOTS)
+    /// Dotted stroke, for chance.
+    pub(super) fn dotted_stroke(&self) -> Stroke {
+        self.dashed(INK, 0.8 * self.line_scale(), DOTS)
     }
 
-    /// A thin solid line.
-    pub(super) fn thin(&self, colour: Colour) -> Stroke {
-        Stroke::solid(colour, 0.5 * self.weight())
+    /// Thin solid stroke.
+    pub(super) fn thin_stroke(&self, colour: Colour) -> Stroke {
+        Stroke::solid(colour, 0.5 * self.line_scale())
     }
 
     fn dashed(&self, colour: Colour, width: f64, dash: &[f64]) -> Stroke {
-        let lengths = dash.iter().map(|length| length * self.weight());
         Stroke {
             colour,
             width,
-            dash: lengths.collect(),
+            dash: dash
+                .iter()
+                .map(|length| length * self.line_scale())
+                .collect(),
         }
     }
 
-    /// The mark of a pen, by its name in pgfplots.
+    /// Name of a pen's marker in pgfplots.
     pub(super) fn pgf_mark(pen: &Pen) -> &'static str {
         match pen.marker {
             Marker::Disc => "*",
@@ -151,20 +153,19 @@ impl Look {
         }
     }
 
-    /// Draws the mark of a pen.
-    pub(super) fn mark(&self, sheet: &mut Sheet, pen: &Pen, [x, y]: [f64; 2]) {
-        use super::sheet::{Mark, PAPER};
-        let reach = 1.9 * self.weight();
+    /// Draws the marker of a pen at a point.
+    pub(super) fn draw_marker(&self, sheet: &mut Sheet, pen: &Pen, [x, y]: Point) {
+        let reach = 1.9 * self.line_scale();
         let fill = pen.stroke.colour;
-        let edge = Stroke::solid(fill, 0.8 * self.weight());
+        let edge = Stroke::solid(fill, 0.8 * self.line_scale());
         match pen.marker {
-            Marker::Disc => sheet.marks.push(Mark::Disc {
+            Marker::Disc => sheet.shapes.push(Shape::Disc {
                 centre: [x, y],
                 radius: reach,
                 fill: Some(fill),
                 edge: None,
             }),
-            Marker::Ring => sheet.marks.push(Mark::Disc {
+            Marker::Ring => sheet.shapes.push(Shape::Disc {
                 centre: [x, y],
                 radius: reach,
                 fill: Some(PAPER),
@@ -172,8 +173,12 @@ impl Look {
             }),
             Marker::Square => {
                 let side = reach * 0.9;
-                let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-                let corners = corners.map(|(across, down)| [x + across * side, y + down * side]);
+                let corners = [
+                    [x - side, y - side],
+                    [x + side, y - side],
+                    [x + side, y + side],
+                    [x - side, y + side],
+                ];
                 sheet.area(corners.to_vec(), fill, 1.0);
             }
             Marker::Triangle => {
@@ -204,9 +209,9 @@ mod tests {
 
     use super::*;
 
-    /// Contrast with white after the Web Content Accessibility Guidelines 2.1: (1 + 0.05) / (L + 0.05).
+    /// Contrast with white by the Web Content Accessibility Guidelines 2.1: (1 + 0.05) / (L + 0.05).
     fn contrast(colour: Colour) -> f64 {
-        let light = colour.map(|code| {
+        let linear = colour.map(|code| {
             let share = f64::from(code) / 255.0;
             if share <= 0.04045 {
                 share / 12.92
@@ -214,15 +219,15 @@ mod tests {
                 ((share + 0.055) / 1.055).powf(2.4)
             }
         });
-        1.05 / (0.2126 * light[0] + 0.7152 * light[1] + 0.0722 * light[2] + 0.05)
+        1.05 / (0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05)
     }
 
     #[test]
-    fn lines_stand_out_from_white_and_no_two_of_them_look_the_same() {
+    fn lines_contrast_with_white_and_differ() {
         for palette in [Palette::Colour, Palette::Grey] {
             let look = Look {
                 width: 252.0,
-                letters: 8.0,
+                font_size: 8.0,
                 palette,
             };
             let mut seen = BTreeSet::new();

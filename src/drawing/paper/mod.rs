@@ -1,7 +1,6 @@
-//! The figures of reports, and of papers at the width of a column, with one bundled font: as PDF, SVG and pgfplots.
+//! Drawing of figures for reports and papers, as PDF, SVG and pgfplots, with one bundled font.
 //!
-//! A chart becomes a [`Sheet`] of marks in points; PDF and SVG write the same marks. What a figure says in words stands in its caption,
-//! which is a text of its own.
+//! A chart becomes a [`Sheet`] of shapes in points; PDF and SVG write the same shapes. Captions are separate texts, not part of a sheet.
 
 mod axes;
 mod bars;
@@ -34,14 +33,14 @@ pub(crate) use svg::svg;
 pub(crate) use tables::tables;
 pub(crate) use tex::tex;
 
-use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::chart::figure_chart::FigureChart;
 
 /// Draws a figure as a sheet.
-pub(crate) fn sheet(figure: &Drawn, look: &Look) -> Sheet {
+pub(crate) fn sheet(figure: &FigureChart, look: &Look) -> Sheet {
     match figure {
-        Drawn::Lines(chart) => lines::lines(chart, look),
-        Drawn::Bars(chart) => bars::bars(chart, look),
-        Drawn::Reliability(chart) => reliability::reliability(chart, look),
-        Drawn::Thresholds(chart) => thresholds::thresholds(chart, look),
+        FigureChart::Lines(chart) => lines::lines(chart, look),
+        FigureChart::Bars(chart) => bars::bars(chart, look),
+        FigureChart::Reliability(chart) => reliability::reliability(chart, look),
+        FigureChart::Thresholds(chart) => thresholds::thresholds(chart, look),
     }
 }

@@ -1,8 +1,8 @@
-//! A run on one sheet of the width of the text: [`overview_sheet`].
+//! Drawing of the overview figure, which summarizes a run on one sheet: [`overview_sheet`].
 
 use super::lines::lines;
 use super::look::Look;
-use super::rows::{column, in_rows};
+use super::rows::{arrange_in_rows, column_look};
 use super::samples::{Pixels, samples};
 use super::sheet::Sheet;
 use crate::drawing::chart::Chart;
@@ -10,32 +10,32 @@ use crate::drawing::figures::OverviewPanels;
 use crate::error::Result;
 use crate::types::Thumbnail;
 
-/// Panels in a row.
+/// Number of panels in a row.
 const COLUMNS: usize = 2;
 
-/// The sheet, its caption, and the panels that it lacks.
+/// The drawn overview, its caption, and the panels that are missing.
 #[derive(Debug)]
 pub(crate) struct OverviewSheet {
     pub sheet: Sheet,
-    /// A caption for each panel, after its letter.
+    /// Letter and caption of each panel.
     pub caption: String,
-    /// The panels that are left out, each with the reason.
+    /// Name of each missing panel, and the reason.
     pub left_out: Vec<(&'static str, String)>,
-    /// The charts of the sheet, for other forms.
+    /// The charts of the sheet, for output in other formats.
     pub charts: Vec<Chart>,
 }
 
-/// Up to four panels on one sheet, two in a row: the charts, and samples of the images. Panels are lettered as far as there are data.
+/// Draws up to four panels on one sheet, two in a row: the charts, then sample images. The panels that have data are lettered in order.
 ///
 /// # Errors
-/// If a small copy that a run stored cannot be read.
+/// If a thumbnail that a run stored cannot be decoded.
 pub(crate) fn overview_sheet(
     panels: &OverviewPanels,
     thumbnails: &[Thumbnail],
     look: &Look,
     pixels: Pixels,
 ) -> Result<OverviewSheet> {
-    let half = column(COLUMNS, look);
+    let half = column_look(COLUMNS, look);
     let mut parts: Vec<(Sheet, String)> = Vec::new();
     let (mut left_out, mut charts) = (Vec::new(), Vec::new());
     for (name, chart) in &panels.charts {
@@ -58,16 +58,16 @@ pub(crate) fn overview_sheet(
     let captions: Vec<String> = parts
         .iter()
         .enumerate()
-        .map(|(place, (_, caption))| format!("({}) {caption}", letter(place)))
+        .map(|(index, (_, caption))| format!("({}) {caption}", letter(index)))
         .collect();
     Ok(OverviewSheet {
         caption: format!("{} ({}.)", captions.join(" "), panels.note),
-        sheet: in_rows(parts.into_iter().map(|(sheet, _)| sheet), COLUMNS, look),
+        sheet: arrange_in_rows(parts.into_iter().map(|(sheet, _)| sheet), COLUMNS, look),
         left_out,
         charts,
     })
 }
 
-fn letter(place: usize) -> char {
-    ('a'..='z').nth(place).unwrap_or('z')
+fn letter(index: usize) -> char {
+    ('a'..='z').nth(index).unwrap_or('z')
 }

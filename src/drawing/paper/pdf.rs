@@ -1,26 +1,26 @@
-//! Writes a sheet as a PDF file: [`pdf`].
+//! Writer of a sheet as a PDF file: [`pdf`].
 //!
-//! One page of the size of the sheet. Text stays text, in the letters of the bundled font that occur. The same sheet gives the same bytes:
-//! the file has no date.
+//! The file has one page of the sheet's size. Text can be selected; the glyphs that occur are embedded. The same sheet always gives the
+//! same bytes, because the file has no date.
 
 use std::collections::BTreeMap;
 
 use pdf_writer::types::LineJoinStyle;
 use pdf_writer::{Content, Filter, Finish as _, Name, Pdf, Rect, Ref, Str, TextStr};
 
-use super::pdf_font::{EmbeddedFont, deflated};
-use super::sheet::{Colour, Mark, Place, Sheet, Stroke, Turn, Words};
+use super::pdf_font::{EmbeddedFont, deflate};
+use super::sheet::{Colour, Label, Point, Shape, Sheet, Stroke, TextDirection};
 use crate::drawing::chart::INK;
 use crate::error::{Error, Result};
 use crate::types::Rgb;
 
-/// Handle length of a cubic curve that draws a quarter of a circle, in radii: 4 (√2 − 1) / 3.
+/// Distance of a control point from its end point, in radii, of a Bézier curve for a quarter of a circle: 4 (√2 − 1) / 3.
 const HANDLE: f64 = 0.552_284_749_8;
 
-/// Name of the font in the content of the page.
+/// Resource name of the font.
 const FONT: Name<'_> = Name(b"F");
 
-/// The sheet as a PDF 1.4 file, the version that every TeX takes without a warning.
+/// Writes a sheet as a PDF 1.4 file, the version that every TeX engine embeds without a warning.
 ///
 /// # Errors
 /// If the sheet has no area or the font cannot be embedded.
@@ -33,8 +33,8 @@ pub(crate) fn pdf(sheet: &Sheet, title: &str) -> Result<Vec<u8>> {
         ));
     }
     let mut page = Page::new(height);
-    for mark in &sheet.marks {
-        page.draw(mark);
+    for shape in &sheet.shapes {
+        page.draw(shape);
     }
     page.document([width, height], title)
 }
@@ -49,7 +49,7 @@ struct Page<'a> {
 }
 
 impl<'a> Page<'a> {
-    /// An empty page whose y axis points down, as that of a sheet does.
+    /// Empty page whose y axis points down, as on a sheet.
     fn new(height: f32) -> Self {
         let mut content = Content::new();
         content.transform([1.0, 0.0, 0.0, -1.0, 0.0, height]);
@@ -62,13 +62,13 @@ impl<'a> Page<'a> {
         }
     }
 
-    fn draw(&mut self, mark: &'a Mark) {
-        match mark {
-            Mark::Line { places, stroke } => {
-                self.path(places);
+    fn draw(&mut self, shape: &'a Shape) {
+        match shape {
+            Shape::Line { points, stroke } => {
+                self.path(points);
                 self.paint(None, Some(stroke));
             }
-            Mark::Area {
+            Shape::Area {
                 corners,
                 fill,
                 opacity,
@@ -80,7 +80,7 @@ impl<'a> Page<'a> {
                 self.paint(Some(*fill), None);
                 self.content.restore_state();
             }
-            Mark::Disc {
+            Shape::Disc {
                 centre,
                 radius,
                 fill,
@@ -89,8 +89,8 @@ impl<'a> Page<'a> {
                 self.circle(*centre, *radius);
                 self.paint(*fill, edge.as_ref());
             }
-            Mark::Words(words) => self.write(words),
-            Mark::Picture {
+            Shape::Label(label) => self.write_label(label),
+            Shape::Picture {
                 corner: [x, y],
                 size: [width, height],
                 image,
@@ -99,7 +99,7 @@ impl<'a> Page<'a> {
                 let name = picture_name(self.pictures.len());
                 self.pictures.push(image);
                 self.content.save_state();
-                // A picture fills the unit square, its first row at the top.
+                // PDF draws an image in the unit square, its first row at the top.
                 self.content
                     .transform([width, 0.0, 0.0, -height, x, y + height]);
                 self.content.x_object(Name(name.as_bytes()));
@@ -108,8 +108,8 @@ impl<'a> Page<'a> {
         }
     }
 
-    fn path(&mut self, places: &[Place]) {
-        for (index, [x, y]) in places.iter().enumerate() {
+    fn path(&mut self, points: &[Point]) {
+        for (index, [x, y]) in points.iter().enumerate() {
             let (x, y) = (*x as f32, *y as f32);
             if index == 0 {
                 self.content.move_to(x, y);
@@ -119,7 +119,7 @@ impl<'a> Page<'a> {
         }
     }
 
-    fn circle(&mut self, [x, y]: Place, radius: f64) {
+    fn circle(&mut self, [x, y]: Point, radius: f64) {
         let at = |across: f64, down: f64| {
             let [x, y] = [x + radius * across, y + radius * down];
             [x as f32, y as f32]
@@ -147,7 +147,7 @@ impl<'a> Page<'a> {
             self.set_fill(fill);
         }
         if let Some(stroke) = stroke {
-            let [red, green, blue] = parts(stroke.colour);
+            let [red, green, blue] = rgb_shares(stroke.colour);
             let dash = stroke.dash.iter().map(|length| *length as f32);
             self.content
                 .set_stroke_rgb(red, green, blue)
@@ -163,7 +163,7 @@ impl<'a> Page<'a> {
     }
 
     fn set_fill(&mut self, colour: Colour) {
-        let [red, green, blue] = parts(colour);
+        let [red, green, blue] = rgb_shares(colour);
         self.content.set_fill_rgb(red, green, blue);
     }
 
@@ -176,24 +176,24 @@ impl<'a> Page<'a> {
         self.content.set_parameters(Name(name.as_bytes()));
     }
 
-    fn write(&mut self, words: &Words) {
-        let [x, y] = words.start.map(|part| part as f32);
-        // Letters stand upright although the y axis points down.
-        let matrix = match words.turn {
-            Turn::Right => [1.0, 0.0, 0.0, -1.0, x, y],
-            Turn::Up => [0.0, -1.0, -1.0, 0.0, x, y],
+    fn write_label(&mut self, label: &Label) {
+        let [x, y] = label.start.map(|part| part as f32);
+        // Flip the text, because the y axis of the page points down.
+        let matrix = match label.direction {
+            TextDirection::Right => [1.0, 0.0, 0.0, -1.0, x, y],
+            TextDirection::Up => [0.0, -1.0, -1.0, 0.0, x, y],
         };
-        let text = self.font.encode(&words.text);
+        let text = self.font.encode(&label.text);
         self.set_fill(INK);
         self.content
             .begin_text()
-            .set_font(FONT, words.size as f32)
+            .set_font(FONT, label.size as f32)
             .set_text_matrix(matrix)
             .show(Str(&text))
             .end_text();
     }
 
-    /// The whole file.
+    /// Writes the whole file.
     fn document(self, [width, height]: [f32; 2], title: &str) -> Result<Vec<u8>> {
         let mut next = Ref::new(1);
         let (catalog, pages, page) = (next.bump(), next.bump(), next.bump());
@@ -205,7 +205,7 @@ impl<'a> Page<'a> {
         pdf.catalog(catalog).pages(pages);
         pdf.document_info(info).title(TextStr(title));
         pdf.pages(pages).kids([page]).count(1);
-        let packed = deflated(&self.content.finish());
+        let packed = deflate(&self.content.finish());
         pdf.stream(content, &packed).filter(Filter::FlateDecode);
 
         let font = self.font.write(&mut pdf, &mut next)?;
@@ -244,7 +244,7 @@ impl<'a> Page<'a> {
 }
 
 fn write_picture(pdf: &mut Pdf, id: Ref, image: &Rgb) -> Ref {
-    let packed = deflated(image.samples());
+    let packed = deflate(image.samples());
     let mut object = pdf.image_xobject(id, &packed);
     object.filter(Filter::FlateDecode);
     object
@@ -261,7 +261,7 @@ fn picture_name(index: usize) -> String {
 }
 
 /// Red, green and blue from 0 to 1.
-fn parts(colour: Colour) -> [f32; 3] {
+fn rgb_shares(colour: Colour) -> [f32; 3] {
     colour.map(|part| f32::from(part) / 255.0)
 }
 
@@ -269,7 +269,7 @@ fn parts(colour: Colour) -> [f32; 3] {
 mod tests {
     use std::sync::Arc;
 
-    use super::super::font::FILE;
+    use super::super::font::FONT_FILE;
     use super::super::sheet::Anchor;
     use super::*;
     use crate::types::Rgb;
@@ -279,10 +279,10 @@ mod tests {
             size: [100.0, 50.0],
             ..Sheet::default()
         };
-        sheet.words("accuracy −5 μ", [10.0, 20.0], 8.0, Anchor::Start);
+        sheet.label("accuracy −5 μ", [10.0, 20.0], 8.0, Anchor::Start);
         sheet.line(&[[0.0, 0.0], [50.0, 25.0]], &Stroke::solid(INK, 1.0));
         sheet.area(vec![[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]], [1, 2, 3], 0.2);
-        sheet.marks.push(Mark::Picture {
+        sheet.shapes.push(Shape::Picture {
             corner: [5.0, 5.0],
             size: [20.0, 10.0],
             image: Arc::new(Rgb::black(2, 4)),
@@ -290,13 +290,13 @@ mod tests {
         sheet
     }
 
-    fn has(file: &[u8], words: &str) -> bool {
-        file.windows(words.len())
-            .any(|part| part == words.as_bytes())
+    fn has(file: &[u8], label: &str) -> bool {
+        file.windows(label.len())
+            .any(|part| part == label.as_bytes())
     }
 
     #[test]
-    fn the_file_has_its_font_and_is_the_same_twice() {
+    fn a_pdf_is_reproducible_and_embeds_its_font() {
         let file = pdf(&sheet(), "accuracy").unwrap();
         assert_eq!(file, pdf(&sheet(), "accuracy").unwrap());
         assert!(file.starts_with(b"%PDF-1.4"));
@@ -309,25 +309,30 @@ mod tests {
         let mut moved = sheet();
         moved.line(&[[0.0, 0.0], [50.0, 26.0]], &Stroke::solid(INK, 1.0));
         assert_ne!(file, pdf(&moved, "accuracy").unwrap());
-        // A part of the font is smaller than the whole.
-        assert!(file.len() < FILE.len());
+        // Only the glyphs that occur are embedded.
+        assert!(file.len() < FONT_FILE.len());
     }
 
     #[test]
-    fn a_sheet_without_words_has_no_font_and_one_without_a_size_is_refused() {
+    fn a_sheet_without_labels_has_no_font() {
         let mut bare = sheet();
-        bare.marks.remove(0);
+        bare.shapes.remove(0);
         assert!(!has(&pdf(&bare, "bare").unwrap(), "/FontFile2"));
-        bare.size = [0.0, 0.0];
-        assert!(pdf(&bare, "bare").is_err());
     }
 
     #[test]
-    fn letters_that_the_font_lacks_are_named() {
+    fn a_sheet_without_area_is_refused() {
+        let mut empty = sheet();
+        empty.size = [0.0, 0.0];
+        assert!(pdf(&empty, "empty").is_err());
+    }
+
+    #[test]
+    fn missing_characters_are_named() {
         let mut sheet = sheet();
-        assert!(sheet.check_letters().is_ok());
-        sheet.words("模型", [0.0, 0.0], 8.0, Anchor::Start);
-        let error = sheet.check_letters().unwrap_err().to_string();
+        assert!(sheet.check_characters().is_ok());
+        sheet.label("模型", [0.0, 0.0], 8.0, Anchor::Start);
+        let error = sheet.check_characters().unwrap_err().to_string();
         assert!(
             error.contains("模型") && error.contains("--label"),
             "{error}"

@@ -1,4 +1,4 @@
-//! Embeds the letters of the bundled font that occur in a PDF file: [`EmbeddedFont`]. [`deflated`] compresses its streams.
+//! Subset of the bundled font for a PDF file ([`EmbeddedFont`]), and compression of its streams ([`deflate`]).
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -9,35 +9,37 @@ use pdf_writer::types::{CidFontType, FontFlags, SystemInfo, UnicodeCmap};
 use pdf_writer::{Filter, Finish as _, Name, Pdf, Rect, Ref, Str};
 use subsetter::GlyphRemapper;
 
-use super::font::{FILE, Font};
+use super::font::{FONT_FILE, Font};
 use crate::error::{Error, Result};
 
-/// Name of the font, with the six letters that mark a part of a font (PDF 1.7, 9.6.4).
+/// Name of the font, after the six letters that mark a subset (PDF 1.7, 9.6.4).
 const NAME: Name<'_> = Name(b"DARKQA+Arimo");
 
-/// Character codes are glyph numbers of the embedded part (PDF 1.7, 9.7.5).
+/// Character codes are glyph numbers of the subset (PDF 1.7, 9.7.5).
 const CODES: SystemInfo<'_> = SystemInfo {
     registry: Str(b"Adobe"),
     ordering: Str(b"Identity"),
     supplement: 0,
 };
 
-/// Thickness of vertical stems in thousandths of the letter height, which a font file does not have; that of Arial.
+/// Thickness of vertical stems in thousandths of an em. The font file lacks it, so it is the value of Arial.
 const STEM: f32 = 80.0;
 
-/// The letters of the bundled font that were used.
+/// The glyphs of the bundled font that a file uses.
 #[derive(Default)]
 pub(super) struct EmbeddedFont {
     glyphs: GlyphRemapper,
-    /// The character and the width of each new glyph number, in thousandths of the letter height.
+    /// Character and width, in thousandths of an em, by glyph number in the subset.
     letters: BTreeMap<u16, (char, f32)>,
 }
 
 impl EmbeddedFont {
-    /// A text as character codes, two bytes each.
+    /// Encodes a text as character codes of two bytes each, and adds its glyphs to the subset.
     pub(super) fn encode(&mut self, text: &str) -> Vec<u8> {
-        let letters = Font::bundled().letters(text).into_iter().zip(text.chars());
-        letters
+        Font::bundled()
+            .letters(text)
+            .into_iter()
+            .zip(text.chars())
             .flat_map(|(letter, character)| {
                 let code = self.glyphs.remap(letter.glyph.0);
                 self.letters
@@ -47,15 +49,15 @@ impl EmbeddedFont {
             .collect()
     }
 
-    /// Writes the font with its letters; `None` if no text was encoded.
+    /// Writes the subset and returns its reference; `None` if no text was encoded.
     ///
     /// # Errors
-    /// If the font file cannot be reduced to these letters.
+    /// If the subset cannot be made.
     pub(super) fn write(&self, pdf: &mut Pdf, next: &mut Ref) -> Result<Option<Ref>> {
         if self.letters.is_empty() {
             return Ok(None);
         }
-        let part = subsetter::subset(FILE, 0, &self.glyphs)
+        let subset = subsetter::subset(FONT_FILE, 0, &self.glyphs)
             .map_err(|e| Error::data("figure as PDF", format!("bundled font: {e}")))?;
         let (font, cid_font, descriptor) = (next.bump(), next.bump(), next.bump());
         let (characters, file) = (next.bump(), next.bump());
@@ -98,20 +100,20 @@ impl EmbeddedFont {
         }
         pdf.cmap(characters, &cmap.finish());
 
-        let packed = deflated(&part);
+        let packed = deflate(&subset);
         let mut stream = pdf.stream(file, &packed);
         stream.filter(Filter::FlateDecode);
-        stream.pair(Name(b"Length1"), part.len() as i32);
+        stream.pair(Name(b"Length1"), subset.len() as i32);
         stream.finish();
         Ok(Some(font))
     }
 }
 
-/// The bytes, compressed for the filter `FlateDecode`.
-pub(super) fn deflated(bytes: &[u8]) -> Vec<u8> {
+/// Compresses bytes for the PDF filter `FlateDecode`.
+pub(super) fn deflate(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    let written = encoder.write_all(bytes);
-    written
+    encoder
+        .write_all(bytes)
         .and_then(|()| encoder.finish())
         .expect("a vector takes every write")
 }

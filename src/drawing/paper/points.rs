@@ -1,115 +1,127 @@
-//! A panel of points and lines over two axes of numbers: [`points`].
+//! Drawing of panels of points and lines over two numeric axes: [`points`].
 
 use super::font::Font;
-use super::legend::{Entry, Legend, Sample};
+use super::legend::{Legend, LegendEntry, LegendSample};
 use super::look::Look;
-use super::sheet::{Anchor, GRID, Place, Sheet, Turn};
+use super::sheet::{Anchor, GRID, Point, Sheet, TextDirection};
 use super::title::Title;
 use crate::drawing::chart::INK;
 use crate::drawing::chart::points::{PointPanel, PointSeries};
 
-/// Height of the panel between its axes, in parts of its width.
+/// Height of the plot area as a share of its width.
 const RATIO: f64 = 0.75;
-/// Share of a range that is added at both of its ends.
+/// Margin at each end of an axis, as a share of the range of its values.
 const MARGIN: f64 = 0.06;
-/// Most distances between ticks on an axis.
-const STEPS: f64 = 6.0;
+/// Maximum number of intervals between ticks on an axis.
+const MAX_STEPS: f64 = 6.0;
 
-/// The panel as a sheet, with its legend below.
+/// Draws a panel, with its legend below.
 pub(crate) fn points(panel: &PointPanel, look: &Look) -> Sheet {
-    let (letters, small) = (look.letters, look.small());
-    let [across, up] = [0, 1].map(|axis| Scale::new(panel.range(axis)));
+    let (font_size, small) = (look.font_size, look.tick_font_size());
+    let [horizontal, vertical] = [0, 1].map(|axis| Scale::new(panel.range(axis)));
     let font = Font::bundled();
-    let numbers = up
+    let numbers = vertical
         .ticks()
         .map(|(_, text)| font.width(&text, small))
         .fold(0.0, f64::max);
-    let left = numbers + 0.55 * small + 1.35 * letters;
-    let width = look.width - left - 0.6 * letters;
+    let left = numbers + 0.55 * small + 1.35 * font_size;
+    let width = look.width - left - 0.6 * font_size;
     let title = Title::new(&panel.title, look, width);
-    let top = Title::highest(std::slice::from_ref(&title), look) + 0.65 * letters;
+    let top = Title::max_height(std::slice::from_ref(&title), look) + 0.65 * font_size;
     let area = Area {
         corner: [left, top],
         size: [width, RATIO * width],
-        scales: [across, up],
+        scales: [horizontal, vertical],
     };
     let mut sheet = Sheet::default();
-    title.draw(&mut sheet, look, [left, top - 0.6 * letters]);
+    title.draw(&mut sheet, look, [left, top - 0.6 * font_size]);
     area.draw_axes(&mut sheet, look);
     let bottom = top + area.size[1];
-    let [below, beside] = panel.axes;
-    let place = [left + width / 2.0, bottom + 1.3 * small + 0.95 * letters];
-    sheet.words(below, place, letters, Anchor::Middle);
-    let place = [
-        left - numbers - 0.55 * small - 0.35 * letters,
+    let [x_title, y_title] = panel.axes;
+    let position = [left + width / 2.0, bottom + 1.3 * small + 0.95 * font_size];
+    sheet.label(x_title, position, font_size, Anchor::Middle);
+    let position = [
+        left - numbers - 0.55 * small - 0.35 * font_size,
         f64::midpoint(top, bottom),
     ];
-    sheet.turned_words(beside, place, letters, Anchor::Middle, Turn::Up);
+    sheet.rotated_label(
+        y_title,
+        position,
+        font_size,
+        Anchor::Middle,
+        TextDirection::Up,
+    );
     for series in &panel.series {
         area.draw_series(&mut sheet, look, series);
     }
-    let entries = panel.series.iter().map(|series| Entry {
+    let entries = panel.series.iter().map(|series| LegendEntry {
         name: &series.name,
         style: series.style,
-        sample: Sample::Curve,
+        sample: LegendSample::Curve,
     });
     let legend = Legend::new(entries, look);
-    let end = bottom + 1.5 * small + 2.0 * letters;
+    let end = bottom + 1.5 * small + 2.0 * font_size;
     legend.draw(&mut sheet, look, end);
     sheet.size = [look.width, end + legend.height];
     sheet
 }
 
-/// The rectangle between the axes, in points.
+/// Plot area in points.
 struct Area {
-    corner: Place,
+    /// Upper left corner.
+    corner: Point,
+    /// Width and height.
     size: [f64; 2],
-    /// Of the horizontal and the vertical axis.
+    /// Scales of the horizontal and the vertical axis.
     scales: [Scale; 2],
 }
 
 impl Area {
-    fn place(&self, [x, y]: [f64; 2]) -> Place {
-        let [across, up] = &self.scales;
+    /// Position of a pair of values on the sheet.
+    fn position(&self, [x, y]: [f64; 2]) -> Point {
+        let [horizontal, vertical] = &self.scales;
         [
-            self.corner[0] + self.size[0] * across.share(x),
-            self.corner[1] + self.size[1] * (1.0 - up.share(y)),
+            self.corner[0] + self.size[0] * horizontal.share(x),
+            self.corner[1] + self.size[1] * (1.0 - vertical.share(y)),
         ]
     }
 
     fn draw_axes(&self, sheet: &mut Sheet, look: &Look) {
-        let small = look.small();
-        let [across, up] = &self.scales;
-        let [left, bottom] = self.place([across.low, up.low]);
+        let small = look.tick_font_size();
+        let [horizontal, vertical] = &self.scales;
+        let [left, bottom] = self.position([horizontal.low, vertical.low]);
         let right = left + self.size[0];
-        for (value, text) in up.ticks() {
-            let [_, y] = self.place([across.low, value]);
-            sheet.line(&[[left, y], [right, y]], &look.thin(GRID));
-            let place = [left - 0.4 * small, y + 0.35 * small];
-            sheet.words(&text, place, small, Anchor::End);
+        for (value, text) in vertical.ticks() {
+            let [_, y] = self.position([horizontal.low, value]);
+            sheet.line(&[[left, y], [right, y]], &look.thin_stroke(GRID));
+            let position = [left - 0.4 * small, y + 0.35 * small];
+            sheet.label(&text, position, small, Anchor::End);
         }
-        for (value, text) in across.ticks() {
-            let [x, _] = self.place([value, up.low]);
-            sheet.line(&[[x, bottom], [x, bottom + 0.25 * small]], &look.thin(INK));
-            sheet.words(&text, [x, bottom + 1.15 * small], small, Anchor::Middle);
+        for (value, text) in horizontal.ticks() {
+            let [x, _] = self.position([value, vertical.low]);
+            sheet.line(
+                &[[x, bottom], [x, bottom + 0.25 * small]],
+                &look.thin_stroke(INK),
+            );
+            sheet.label(&text, [x, bottom + 1.15 * small], small, Anchor::Middle);
         }
         let axes = [[left, self.corner[1]], [left, bottom], [right, bottom]];
-        sheet.line(&axes, &look.thin(INK));
+        sheet.line(&axes, &look.thin_stroke(INK));
     }
 
     fn draw_series(&self, sheet: &mut Sheet, look: &Look, series: &PointSeries) {
         let pen = look.pen(series.style);
         for line in &series.lines {
-            let places: Vec<Place> = line.iter().map(|place| self.place(*place)).collect();
-            sheet.line(&places, &pen.stroke);
+            let points: Vec<Point> = line.iter().map(|point| self.position(*point)).collect();
+            sheet.line(&points, &pen.stroke);
         }
         for point in &series.points {
-            look.mark(sheet, &pen, self.place(*point));
+            look.draw_marker(sheet, &pen, self.position(*point));
         }
     }
 }
 
-/// The range of an axis, and the distance of its ticks.
+/// Range of an axis, and distance between its ticks.
 struct Scale {
     low: f64,
     high: f64,
@@ -117,7 +129,8 @@ struct Scale {
 }
 
 impl Scale {
-    /// The scale that holds a range with margins; without a range, from 0 to 1.
+    /// Scale of a range with margins; from 0 to 1 with margins if there is no range. The ticks are at multiples of 1, 2 or 5 times a power
+    /// of ten.
     fn new(range: Option<[f64; 2]>) -> Self {
         let [low, high] = range.unwrap_or([0.0, 1.0]);
         let margin = if high > low {
@@ -126,10 +139,12 @@ impl Scale {
             1.0
         };
         let (low, high) = (low - margin, high + margin);
-        let least = (high - low) / STEPS;
-        let power = libm::pow(10.0, libm::log10(least).floor());
-        let steps = [1.0, 2.0, 5.0].map(|factor| factor * power);
-        let step = steps.into_iter().find(|step| *step >= least);
+        let min_step = (high - low) / MAX_STEPS;
+        let power = libm::pow(10.0, libm::log10(min_step).floor());
+        let step = [1.0, 2.0, 5.0]
+            .map(|factor| factor * power)
+            .into_iter()
+            .find(|step| *step >= min_step);
         Self {
             low,
             high,
@@ -137,12 +152,12 @@ impl Scale {
         }
     }
 
-    /// Place of a value between the ends of the axis, from 0 to 1.
+    /// Position of a value between the ends of the axis, from 0 to 1.
     fn share(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
 
-    /// The ticks and their texts.
+    /// Value and label of each tick.
     fn ticks(&self) -> impl Iterator<Item = (f64, String)> {
         let decimals = (-libm::log10(self.step * 1.001).floor()).max(0.0) as usize;
         let first = (self.low / self.step).ceil() as i64;
@@ -159,7 +174,7 @@ mod tests {
     use super::*;
     use crate::drawing::chart::LineStyle;
     use crate::drawing::paper::look::column_look as look;
-    use crate::drawing::paper::sheet::Mark;
+    use crate::drawing::paper::sheet::Shape;
 
     fn panel(series: Vec<PointSeries>) -> PointPanel {
         PointPanel {
@@ -169,15 +184,15 @@ mod tests {
         }
     }
 
-    /// The place of a text by the middle of its letters.
-    fn middle(sheet: &Sheet, text: &str) -> Place {
+    /// Bottom centre of the first label with a text.
+    fn label_position(sheet: &Sheet, text: &str) -> Point {
         sheet
-            .marks
+            .shapes
             .iter()
-            .find_map(|mark| match mark {
-                Mark::Words(words) if words.text == text => {
-                    let width = Font::bundled().width(text, words.size);
-                    Some([words.start[0] + width / 2.0, words.start[1]])
+            .find_map(|shape| match shape {
+                Shape::Label(label) if label.text == text => {
+                    let width = Font::bundled().width(text, label.size);
+                    Some([label.start[0] + width / 2.0, label.start[1]])
                 }
                 _ => None,
             })
@@ -185,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn points_lie_where_the_axes_say() {
+    fn points_are_drawn_at_their_axis_positions() {
         let line = vec![[6.0, -2.0], [8.0, 1.0], [10.0, 4.0]];
         let sheet = points(
             &panel(vec![PointSeries {
@@ -196,32 +211,32 @@ mod tests {
             }]),
             &look(),
         );
-        let drawn: Vec<&Vec<Place>> = sheet
-            .marks
+        let drawn: Vec<&Vec<Point>> = sheet
+            .shapes
             .iter()
-            .filter_map(|mark| match mark {
-                Mark::Line { places, stroke } if places.len() == 3 && stroke.colour != INK => {
-                    Some(places)
+            .filter_map(|shape| match shape {
+                Shape::Line { points, stroke } if points.len() == 3 && stroke.colour != INK => {
+                    Some(points)
                 }
                 _ => None,
             })
             .collect();
         assert_eq!(drawn.len(), 1);
         let [first, second, third] = [drawn[0][0], drawn[0][1], drawn[0][2]];
-        assert!((first[0] - middle(&sheet, "6")[0]).abs() < 1e-9);
-        assert!((third[0] - middle(&sheet, "10")[0]).abs() < 1e-9);
-        let height = |text: &str| middle(&sheet, text)[1] - 0.35 * look().small();
-        assert!((first[1] - height("−2")).abs() < 1e-9);
-        assert!((third[1] - height("4")).abs() < 1e-9);
-        let is_at_second = |mark: &Mark| {
-            matches!(mark, Mark::Disc { centre, .. } if (centre[0] - second[0]).abs() < 1e-9
+        assert!((first[0] - label_position(&sheet, "6")[0]).abs() < 1e-9);
+        assert!((third[0] - label_position(&sheet, "10")[0]).abs() < 1e-9);
+        let baseline = 0.35 * look().tick_font_size();
+        assert!((first[1] - (label_position(&sheet, "−2")[1] - baseline)).abs() < 1e-9);
+        assert!((third[1] - (label_position(&sheet, "4")[1] - baseline)).abs() < 1e-9);
+        let has_marker = sheet.shapes.iter().any(|shape| {
+            matches!(shape, Shape::Disc { centre, .. } if (centre[0] - second[0]).abs() < 1e-9
                 && (centre[1] - second[1]).abs() < 1e-9)
-        };
-        assert!(sheet.marks.iter().any(is_at_second));
+        });
+        assert!(has_marker);
     }
 
     #[test]
-    fn ticks_are_few_round_and_inside() {
+    fn ticks_are_few_and_round() {
         for (range, texts) in [
             (None, ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"].as_slice()),
             (Some([3.0, 3.0]), &["2.0", "2.5", "3.0", "3.5", "4.0"]),

@@ -1,4 +1,4 @@
-//! The marks of a figure for a paper, in points: [`Sheet`]. PDF and SVG are two ways to write the same marks.
+//! Shapes of a drawn figure, in points: [`Sheet`]. They can be written as PDF or as SVG.
 
 use std::sync::Arc;
 
@@ -7,26 +7,26 @@ use crate::types::Rgb;
 
 use super::font::Font;
 
-/// A place in points, from the left and from the top.
-pub(crate) type Place = [f64; 2];
+/// Position in points: distance from the left, and from the top.
+pub(crate) type Point = [f64; 2];
 
 /// Red, green and blue.
 pub(crate) type Colour = [u8; 3];
 
 /// Colour of grid lines.
 pub(super) const GRID: Colour = [221, 221, 221];
-/// Colour of the paper, in hollow marks.
+/// Colour of the background, and of hollow markers.
 pub(super) const PAPER: Colour = [255, 255, 255];
 
-/// The marks of a figure, in the order in which they are drawn.
+/// A drawn figure: its shapes from the lowest to the topmost.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Sheet {
     /// Width and height in points.
     pub size: [f64; 2],
-    pub marks: Vec<Mark>,
+    pub shapes: Vec<Shape>,
 }
 
-/// How a line is drawn.
+/// Colour, width and dashes of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Stroke {
     pub colour: Colour,
@@ -37,67 +37,68 @@ pub(crate) struct Stroke {
 }
 
 impl Stroke {
-    /// A solid line.
+    /// Stroke without dashes; `width` is in points.
     pub(super) fn solid(colour: Colour, width: f64) -> Self {
-        let dash = Vec::new();
         Self {
             colour,
             width,
-            dash,
+            dash: Vec::new(),
         }
     }
 }
 
-/// One mark.
+/// One shape of a figure.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Mark {
-    /// An open line through places.
-    Line { places: Vec<Place>, stroke: Stroke },
+pub(crate) enum Shape {
+    /// An open line through points.
+    Line {
+        points: Vec<Point>,
+        stroke: Stroke,
+    },
     /// A filled polygon.
     Area {
-        corners: Vec<Place>,
+        corners: Vec<Point>,
         fill: Colour,
-        /// From 0, not visible, to 1.
+        /// From 0 (invisible) to 1.
         opacity: f64,
     },
     /// A circle.
     Disc {
-        centre: Place,
+        centre: Point,
         radius: f64,
         fill: Option<Colour>,
         edge: Option<Stroke>,
     },
-    /// Words on one line.
-    Words(Words),
-    /// A picture.
+    Label(Label),
+    /// A bitmap image.
     Picture {
-        /// Its left upper corner.
-        corner: Place,
+        /// Upper left corner.
+        corner: Point,
         /// Width and height in points.
         size: [f64; 2],
         image: Arc<Rgb>,
     },
 }
 
-/// Words on one line.
+/// Text on one line.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Words {
+pub(crate) struct Label {
     pub text: String,
-    /// The left end of the baseline; of words that run upwards the lower end.
-    pub start: Place,
-    /// Height of the letters in points.
+    /// Start of the baseline: its left end, or its lower end if the text runs upwards.
+    pub start: Point,
+    /// Font size in points.
     pub size: f64,
-    pub turn: Turn,
+    pub direction: TextDirection,
 }
 
-/// Which way words run.
+/// Direction in which a text runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Turn {
+pub(crate) enum TextDirection {
     Right,
     Up,
 }
 
-/// Where words stand to their place.
+/// Part of a text's baseline that is at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Anchor {
     Start,
@@ -106,106 +107,106 @@ pub(super) enum Anchor {
 }
 
 impl Sheet {
-    pub(super) fn line(&mut self, places: &[Place], stroke: &Stroke) {
-        self.marks.push(Mark::Line {
-            places: places.to_vec(),
+    pub(super) fn line(&mut self, points: &[Point], stroke: &Stroke) {
+        self.shapes.push(Shape::Line {
+            points: points.to_vec(),
             stroke: stroke.clone(),
         });
     }
 
-    pub(super) fn area(&mut self, corners: Vec<Place>, fill: Colour, opacity: f64) {
-        self.marks.push(Mark::Area {
+    pub(super) fn area(&mut self, corners: Vec<Point>, fill: Colour, opacity: f64) {
+        self.shapes.push(Shape::Area {
             corners,
             fill,
             opacity,
         });
     }
 
-    /// Words whose anchor is at a place on their baseline.
-    pub(super) fn words(&mut self, text: &str, place: Place, size: f64, anchor: Anchor) {
-        self.turned_words(text, place, size, anchor, Turn::Right);
+    /// Adds a horizontal text whose anchor is at a position.
+    pub(super) fn label(&mut self, text: &str, position: Point, size: f64, anchor: Anchor) {
+        self.rotated_label(text, position, size, anchor, TextDirection::Right);
     }
 
-    pub(super) fn turned_words(
+    /// Adds a text in any direction.
+    pub(super) fn rotated_label(
         &mut self,
         text: &str,
-        [x, y]: Place,
+        [x, y]: Point,
         size: f64,
         anchor: Anchor,
-        turn: Turn,
+        direction: TextDirection,
     ) {
         if text.is_empty() {
             return;
         }
         let width = Font::bundled().width(text, size);
-        let back = match anchor {
+        let offset = match anchor {
             Anchor::Start => 0.0,
             Anchor::Middle => width / 2.0,
             Anchor::End => width,
         };
-        let start = match turn {
-            Turn::Right => [x - back, y],
-            Turn::Up => [x, y + back],
+        let start = match direction {
+            TextDirection::Right => [x - offset, y],
+            TextDirection::Up => [x, y + offset],
         };
-        self.marks.push(Mark::Words(Words {
+        self.shapes.push(Shape::Label(Label {
             text: text.to_owned(),
             start,
             size,
-            turn,
+            direction,
         }));
     }
 
-    /// The same marks on a white ground, for viewers with a dark one.
+    /// Adds a white background, for viewers with a dark one.
     pub(super) fn on_paper(mut self) -> Self {
         let [width, height] = self.size;
-        let corners = vec![[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
-        let ground = Mark::Area {
-            corners,
+        let background = Shape::Area {
+            corners: vec![[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]],
             fill: PAPER,
             opacity: 1.0,
         };
-        self.marks.insert(0, ground);
+        self.shapes.insert(0, background);
         self
     }
 
-    /// Draws another sheet with its left upper corner at a place.
-    pub(super) fn place(&mut self, other: Sheet, at: Place) {
-        let moved = |[x, y]: Place| [x + at[0], y + at[1]];
-        self.marks
-            .extend(other.marks.into_iter().map(|mark| match mark {
-                Mark::Line { places, stroke } => Mark::Line {
-                    places: places.into_iter().map(moved).collect(),
+    /// Adds the shapes of another sheet, with its upper left corner at a position.
+    pub(super) fn insert(&mut self, other: Sheet, [left, top]: Point) {
+        let moved = |[x, y]: Point| [x + left, y + top];
+        self.shapes
+            .extend(other.shapes.into_iter().map(|shape| match shape {
+                Shape::Line { points, stroke } => Shape::Line {
+                    points: points.into_iter().map(moved).collect(),
                     stroke,
                 },
-                Mark::Area {
+                Shape::Area {
                     corners,
                     fill,
                     opacity,
-                } => Mark::Area {
+                } => Shape::Area {
                     corners: corners.into_iter().map(moved).collect(),
                     fill,
                     opacity,
                 },
-                Mark::Disc {
+                Shape::Disc {
                     centre,
                     radius,
                     fill,
                     edge,
-                } => Mark::Disc {
+                } => Shape::Disc {
                     centre: moved(centre),
                     radius,
                     fill,
                     edge,
                 },
-                Mark::Words(words) => Mark::Words(Words {
-                    start: moved(words.start),
-                    ..words
+                Shape::Label(label) => Shape::Label(Label {
+                    start: moved(label.start),
+                    ..label
                 }),
-                Mark::Picture {
+                Shape::Picture {
                     corner,
                     size,
                     image,
-                } => Mark::Picture {
+                } => Shape::Picture {
                     corner: moved(corner),
                     size,
                     image,
@@ -213,14 +214,14 @@ impl Sheet {
             }));
     }
 
-    /// Checks that the font of figures has all letters of the sheet.
+    /// Checks that the bundled font has all characters of the sheet.
     ///
     /// # Errors
-    /// If it lacks a letter; the error names the words and the letter.
-    pub(crate) fn check_letters(&self) -> Result<()> {
+    /// If the font lacks a character; the error names the text and the character.
+    pub(crate) fn check_characters(&self) -> Result<()> {
         let font = Font::bundled();
-        for mark in &self.marks {
-            let Mark::Words(Words { text, .. }) = mark else {
+        for shape in &self.shapes {
+            let Shape::Label(Label { text, .. }) = shape else {
                 continue;
             };
             if let Some(letter) = text.chars().find(|letter| !font.has(*letter)) {

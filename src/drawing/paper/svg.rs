@@ -1,4 +1,4 @@
-//! A sheet as SVG: [`svg`]. Words stay words; each says its width, so that another font takes the same room.
+//! Writer of a sheet as SVG: [`svg`]. Text can be selected; its `textLength` keeps its width if another font is used.
 
 use std::fmt::Write;
 
@@ -6,34 +6,34 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
 use super::font::{FAMILIES, Font};
-use super::sheet::{Colour, Mark, Place, Sheet, Stroke, Turn, Words};
+use super::sheet::{Colour, Label, Point, Shape, Sheet, Stroke, TextDirection};
 use crate::drawing::chart::INK;
 use crate::error::Result;
 use crate::types::Rgb;
 use crate::types::text::shown;
 
-/// How a picture is written as PNG.
+/// Encoder of an image as PNG.
 pub(crate) type Png<'a> = &'a dyn Fn(&Rgb) -> Result<Vec<u8>>;
 
-/// The sheet as SVG, its size in points.
+/// Writes a sheet as SVG, with its size in points.
 ///
 /// # Errors
-/// If a picture cannot be encoded.
+/// If an image cannot be encoded.
 pub(crate) fn svg(sheet: &Sheet, png: Png) -> Result<String> {
     let [width, height] = sheet.size.map(number);
     let mut text = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\" \
          font-family=\"{FAMILIES}\" style=\"font-kerning:none\">\n"
     );
-    for mark in &sheet.marks {
-        text += &element(mark, png)?;
+    for shape in &sheet.shapes {
+        text += &element(shape, png)?;
         text.push('\n');
     }
     text += "</svg>\n";
     Ok(shown(&text).into_owned())
 }
 
-/// A number with two decimals at most.
+/// Number with at most two decimals.
 fn number(value: f64) -> String {
     let text = format!("{value:.2}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
@@ -49,15 +49,16 @@ fn hex([red, green, blue]: Colour) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-fn points(places: &[Place]) -> String {
-    let places: Vec<String> = places
+fn point_list(points: &[Point]) -> String {
+    let points: Vec<String> = points
         .iter()
         .map(|[x, y]| format!("{},{}", number(*x), number(*y)))
         .collect();
-    places.join(" ")
+    points.join(" ")
 }
 
-fn stroked(stroke: &Stroke) -> String {
+/// SVG attributes of a stroke, each after a space.
+fn stroke_attributes(stroke: &Stroke) -> String {
     let mut text = format!(
         " stroke=\"{}\" stroke-width=\"{}\" stroke-linejoin=\"round\"",
         hex(stroke.colour),
@@ -69,24 +70,24 @@ fn stroked(stroke: &Stroke) -> String {
     text
 }
 
-fn element(mark: &Mark, png: Png) -> Result<String> {
-    Ok(match mark {
-        Mark::Line { places, stroke } => format!(
+fn element(shape: &Shape, png: Png) -> Result<String> {
+    Ok(match shape {
+        Shape::Line { points, stroke } => format!(
             "<polyline points=\"{}\" fill=\"none\"{}/>",
-            points(places),
-            stroked(stroke)
+            point_list(points),
+            stroke_attributes(stroke)
         ),
-        Mark::Area {
+        Shape::Area {
             corners,
             fill,
             opacity,
         } => format!(
             "<polygon points=\"{}\" fill=\"{}\" fill-opacity=\"{}\"/>",
-            points(corners),
+            point_list(corners),
             hex(*fill),
             number(*opacity)
         ),
-        Mark::Disc {
+        Shape::Disc {
             centre: [x, y],
             radius,
             fill,
@@ -97,10 +98,10 @@ fn element(mark: &Mark, png: Png) -> Result<String> {
             number(*y),
             number(*radius),
             fill.map_or_else(|| "none".to_owned(), hex),
-            edge.as_ref().map(stroked).unwrap_or_default()
+            edge.as_ref().map(stroke_attributes).unwrap_or_default()
         ),
-        Mark::Words(words) => text(words),
-        Mark::Picture {
+        Shape::Label(label) => text_element(label),
+        Shape::Picture {
             corner: [x, y],
             size: [width, height],
             image,
@@ -115,30 +116,30 @@ fn element(mark: &Mark, png: Png) -> Result<String> {
     })
 }
 
-fn text(words: &Words) -> String {
-    let [x, y] = words.start.map(number);
-    let turn = match words.turn {
-        Turn::Right => String::new(),
-        Turn::Up => format!(" transform=\"rotate(-90 {x} {y})\""),
+fn text_element(label: &Label) -> String {
+    let [x, y] = label.start.map(number);
+    let rotation = match label.direction {
+        TextDirection::Right => String::new(),
+        TextDirection::Up => format!(" transform=\"rotate(-90 {x} {y})\""),
     };
     let font = Font::bundled();
-    // Only the width of words whose letters the font has is known.
-    let length = if words.text.chars().all(|letter| font.has(letter)) {
-        let width = number(font.width(&words.text, words.size));
+    // The width is unknown if the font lacks a character.
+    let length = if label.text.chars().all(|letter| font.has(letter)) {
+        let width = number(font.width(&label.text, label.size));
         format!(" textLength=\"{width}\" lengthAdjust=\"spacingAndGlyphs\"")
     } else {
         String::new()
     };
     format!(
-        "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"{length}{turn}>{}</text>",
-        number(words.size),
+        "<text x=\"{x}\" y=\"{y}\" font-size=\"{}\" fill=\"{}\"{length}{rotation}>{}</text>",
+        number(label.size),
         hex(INK),
-        escaped(&words.text)
+        escape_xml(&label.text)
     )
 }
 
-/// Text with the special characters of XML escaped.
-fn escaped(text: &str) -> String {
+/// Escapes the special characters of XML.
+fn escape_xml(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")

@@ -1,8 +1,8 @@
-//! Tables of a paper as LaTeX that fit its columns: [`tables`].
+//! LaTeX tables that fit the columns of a paper: [`tables`].
 //!
-//! A table is set in letters of 8 pt, its intervals in 5 pt. Whether it fits is reckoned with the widths of the bundled font, which is
-//! wider than Times, in which these papers are set; the first form that fits is taken: intervals with a decimal, without, names in
-//! several lines, and at last the columns in several parts below one another.
+//! A table is set at 8 pt, its intervals at 5 pt. Widths are estimated with the bundled font, which is wider than Times, the font of these
+//! papers. The first layout that fits is used: intervals with one decimal, intervals without decimals, names on several lines, and last
+//! the columns in several parts below one another.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -12,46 +12,50 @@ use super::look::Look;
 use crate::text::latex::{MOST_ROWS, escaped};
 use crate::text::table::{Column, ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::text::words::{interval, words};
+use darkqa_score::estimate::Estimate;
 
-/// Heights of letters of tables and of intervals, in points.
-const LETTERS: f64 = 8.0;
-const TINY: f64 = 5.0;
-/// How much wider letters are than those of Arial: of 8 points, and tiny ones. Digits of Computer Modern have 0.531 em at 8 points and
-/// 0.681 em at 5 points, those of Arial 0.556 em; letters of Times are narrower than both.
+/// Font size of tables in points.
+const FONT_SIZE: f64 = 8.0;
+/// Font size of intervals in points.
+const INTERVAL_FONT_SIZE: f64 = 5.0;
+/// Maximum width of a text relative to Arial, at the font size of tables. Digits of Computer Modern are 0.531 em wide at 8 points and
+/// 0.681 em at 5 points, digits of Arial 0.556 em; Times is narrower than both.
 const WIDER: f64 = 1.08;
+/// Maximum width of a text relative to Arial, at the font size of intervals.
 const TINY_WIDER: f64 = 1.23;
-/// Half of the room between two columns, in points.
+/// Half of the space between two columns, in points.
 const TABCOLSEP: f64 = 2.6;
-/// Least width of the column of names, in points, and the least beside intervals with a decimal.
-const LEAST_NAME: f64 = 45.0;
-const AMPLE_NAME: f64 = 60.0;
+/// Minimum width of the column of names in points (chosen).
+const MIN_NAME_WIDTH: f64 = 45.0;
+/// Minimum width of the column of names in points if intervals have a decimal (chosen).
+const MIN_NAME_WIDTH_WITH_DECIMALS: f64 = 60.0;
 
-/// The commands of the tables: a number above its interval, a name in lines, and a head in lines.
+/// Definitions of the commands in the tables: a number above its interval, a name on several lines, and a head on several lines.
 const COMMANDS: &str = "\
 \\providecommand{\\dqci}[2]{\\begin{tabular}[t]{@{}r@{}}#1\\\\[-3.5pt]{\\fontsize{5}{5.5}\\selectfont #2}\\end{tabular}}
 \\providecommand{\\dqname}[1]{\\begin{tabular}[t]{@{}l@{}}#1\\end{tabular}}
 \\providecommand{\\dqhead}[1]{\\begin{tabular}[b]{@{}r@{}}#1\\end{tabular}}
 ";
 
-/// Decimals of the ends of intervals.
+/// Precision of the ends of intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ends {
+enum Precision {
     Tenths,
     Whole,
 }
 
-/// How a table is set.
+/// Layout of a table.
 #[derive(Debug, Clone, PartialEq)]
-struct Form {
-    ends: Ends,
-    /// Room for names, in points.
-    names: f64,
-    /// The columns of each part; the first column of a table is its names.
+struct Layout {
+    precision: Precision,
+    /// Width of the column of names in points.
+    name_width: f64,
+    /// Columns of each part, without column 0, which has the names.
     parts: Vec<Range<usize>>,
 }
 
-/// The files of the tables by name, and the number of long tables: `tables.tex`, and `tables-full.tex` if there are tables of more than
-/// forty rows.
+/// Writes the tables as files, by name, and returns the number of long tables: `tables.tex`, and `tables-full.tex` if some tables have
+/// more than forty rows.
 pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String, Vec<u8>)>, usize) {
     let (long, short): (Vec<&Table>, Vec<&Table>) =
         all.iter().partition(|table| table.rows.len() > MOST_ROWS);
@@ -59,7 +63,7 @@ pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String,
     let mut text =
         format!("% Tables of darkqa-eval. In the preamble: \\usepackage{{booktabs}}\n{COMMANDS}");
     for table in &short {
-        text += &floating(table, float, look.width);
+        text += &float_table(table, float, look.width);
     }
     let mut files = vec![("tables.tex".to_owned(), text.into_bytes())];
     if !long.is_empty() {
@@ -67,145 +71,154 @@ pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String,
             "% Long tables of darkqa-eval, for text in one column. In the preamble: \\usepackage{booktabs,longtable}\n",
         ) + COMMANDS;
         for table in &long {
-            text += &breaking(table, look.width);
+            text += &long_table(table, look.width);
         }
         files.push(("tables-full.tex".to_owned(), text.into_bytes()));
     }
     (files, long.len())
 }
 
-/// The ends of an interval in tiny letters.
-fn ends(cell: &TableCell, ends: Ends) -> Option<String> {
-    let of = interval(ColumnKind::Accuracy, cell)?;
-    let number = |share: f64| {
-        let text = match ends {
-            Ends::Tenths => format!("{:.1}", 100.0 * share),
-            Ends::Whole => format!("{:.0}", 100.0 * share),
-        };
-        match text.as_str() {
-            "-0.0" => "0.0".to_owned(),
-            "-0" => "0".to_owned(),
-            _ => text.replace('-', "−"),
-        }
-    };
-    // "to" is a comma where ends have signs.
-    let between = if value(cell).contains(['+', '−']) {
+/// Formats the interval of a cell; `None` if the cell has no interval.
+fn interval_text(cell: &TableCell, precision: Precision) -> Option<String> {
+    let Estimate { low, high, .. } = interval(ColumnKind::Accuracy, cell)?;
+    // A dash next to minus signs would be confusing.
+    let separator = if value_text(cell).contains(['+', '−']) {
         ", "
     } else {
         "–"
     };
-    Some(format!("{}{between}{}", number(of.low), number(of.high)))
+    let [low, high] = [low, high].map(|share| percent_text(share, precision));
+    Some(format!("{low}{separator}{high}"))
 }
 
-fn value(cell: &TableCell) -> String {
+/// Share in percent, without the sign of a negative zero.
+fn percent_text(share: f64, precision: Precision) -> String {
+    let text = match precision {
+        Precision::Tenths => format!("{:.1}", 100.0 * share),
+        Precision::Whole => format!("{:.0}", 100.0 * share),
+    };
+    match text.as_str() {
+        "-0.0" => "0.0".to_owned(),
+        "-0" => "0".to_owned(),
+        _ => text.replace('-', "−"),
+    }
+}
+
+fn value_text(cell: &TableCell) -> String {
     words(ColumnKind::Accuracy, cell)
 }
 
-fn name(row: &TableRow) -> String {
+fn row_name(row: &TableRow) -> String {
     words(ColumnKind::Text, &row.cells[0])
 }
 
-fn head(column: &Column) -> &str {
-    column.heads.page.as_deref().unwrap_or_default()
+/// Lines of a column's head: one word on each.
+fn head_lines(column: &Column) -> Vec<&str> {
+    let head = column.heads.page.as_deref().unwrap_or_default();
+    head.split_whitespace().collect()
 }
 
 /// Width in points of a column of numbers.
-fn column_width(table: &Table, column: usize, form: Ends) -> f64 {
+fn column_width(table: &Table, column: usize, precision: Precision) -> f64 {
     let font = Font::bundled();
-    let head = head_lines(head(&table.columns[column]));
-    let head = head.iter().map(|line| font.width(line, LETTERS));
+    let head = head_lines(&table.columns[column]);
+    let head = head.iter().map(|line| font.width(line, FONT_SIZE));
     let cells = table.rows.iter().map(|row| {
         let cell = &row.cells[column];
         let arrow = match cell {
-            TableCell::Below(_) => font.width("↓", LETTERS),
+            TableCell::Below(_) => font.width("↓", FONT_SIZE),
             _ => 0.0,
         };
-        let value = font.width(&value(cell), LETTERS) * WIDER + arrow;
-        value.max(ends(cell, form).map_or(0.0, |ends| font.width(&ends, TINY) * TINY_WIDER))
+        let value = font.width(&value_text(cell), FONT_SIZE) * WIDER + arrow;
+        let interval = interval_text(cell, precision);
+        value.max(interval.map_or(0.0, |text| {
+            font.width(&text, INTERVAL_FONT_SIZE) * TINY_WIDER
+        }))
     });
     head.chain(cells).fold(0.0, f64::max)
 }
 
-/// The words of a head, one a line.
-fn head_lines(head: &str) -> Vec<&str> {
-    head.split_whitespace().collect()
-}
-
-/// Width in points of the widest name, all on one line.
+/// Width in points of the widest name, each on one line.
 fn names_width(table: &Table) -> f64 {
     let font = Font::bundled();
     table
         .rows
         .iter()
-        .map(|row| font.width(&name(row), LETTERS) * WIDER)
+        .map(|row| font.width(&row_name(row), FONT_SIZE) * WIDER)
         .fold(0.0, f64::max)
 }
 
-/// The first form in which the table is no wider than `width` points.
-fn form(table: &Table, width: f64) -> Form {
+/// Width in points that some columns of numbers leave for the names in a table of `width` points.
+fn width_for_names(table: &Table, width: f64, precision: Precision, columns: &Range<usize>) -> f64 {
+    let numbers: f64 = columns
+        .clone()
+        .map(|column| column_width(table, column, precision) + 2.0 * TABCOLSEP)
+        .sum();
+    width - numbers
+}
+
+/// Selects the first layout in which the table is at most `width` points wide.
+fn layout(table: &Table, width: f64) -> Layout {
     let columns = table.columns.len();
-    let room = |ends: Ends, part: &Range<usize>| {
-        let numbers: f64 = part
-            .clone()
-            .map(|column| column_width(table, column, ends) + 2.0 * TABCOLSEP)
-            .sum();
-        width - numbers
-    };
     let names = names_width(table);
-    // One long name costs a line of its own sooner than a decimal of all intervals.
-    for (ends, least) in [
-        (Ends::Tenths, names.min(AMPLE_NAME)),
-        (Ends::Whole, names.min(LEAST_NAME)),
+    // Prefer breaking a long name over dropping the decimals of all intervals.
+    for (precision, min_width) in [
+        (Precision::Tenths, names.min(MIN_NAME_WIDTH_WITH_DECIMALS)),
+        (Precision::Whole, names.min(MIN_NAME_WIDTH)),
     ] {
         let all = 1..columns;
-        let room = room(ends, &all);
-        if room >= least {
-            return Form {
-                ends,
-                names: room.min(names),
+        let available = width_for_names(table, width, precision, &all);
+        if available >= min_width {
+            return Layout {
+                precision,
+                name_width: available.min(names),
                 parts: vec![all],
             };
         }
     }
-    let least = names.min(LEAST_NAME);
+    let min_width = names.min(MIN_NAME_WIDTH);
     for number in 2..columns.max(3) {
-        let each = (columns - 1).div_ceil(number).max(1);
-        let starts = (1..columns).step_by(each);
-        let parts: Vec<Range<usize>> = starts
-            .map(|start| start..(start + each).min(columns))
+        let part_columns = (columns - 1).div_ceil(number).max(1);
+        let parts: Vec<Range<usize>> = (1..columns)
+            .step_by(part_columns)
+            .map(|start| start..(start + part_columns).min(columns))
             .collect();
-        let room = parts
+        let available = parts
             .iter()
-            .map(|part| room(Ends::Whole, part))
+            .map(|part| width_for_names(table, width, Precision::Whole, part))
             .fold(f64::INFINITY, f64::min);
-        if room >= least || each == 1 {
-            return Form {
-                ends: Ends::Whole,
-                names: room.min(names).max(least.min(room)),
+        if available >= min_width || part_columns == 1 {
+            return Layout {
+                precision: Precision::Whole,
+                name_width: available.min(names).max(min_width.min(available)),
                 parts,
             };
         }
     }
-    Form {
-        ends: Ends::Whole,
-        names: least,
+    Layout {
+        precision: Precision::Whole,
+        name_width: min_width,
         parts: std::iter::once(1..columns).collect(),
     }
 }
 
-/// A name in lines of at most `room` points, broken after "-", "/", "_", ":" and spaces, and where nothing else is left, anywhere.
-fn name_lines(name: &str, room: f64) -> Vec<String> {
+/// True if a text, without white space at its end, is at most `width` points wide.
+fn fits(font: &Font, text: &str, width: f64) -> bool {
+    font.width(text.trim_end(), FONT_SIZE) * WIDER <= width
+}
+
+/// Breaks a name into lines of at most `width` points: after "-", "/", "_", ":" or a space, and within a piece only if it is too wide.
+fn name_lines(name: &str, width: f64) -> Vec<String> {
     let font = Font::bundled();
-    let fits = |text: &str| font.width(text.trim_end(), LETTERS) * WIDER <= room;
     let mut lines = vec![String::new()];
     for piece in name.split_inclusive(['-', '/', '_', ':', ' ']) {
         let last = lines.last().map_or("", String::as_str);
-        if !last.is_empty() && !fits(&format!("{last}{piece}")) {
+        if !last.is_empty() && !fits(&font, &format!("{last}{piece}"), width) {
             lines.push(String::new());
         }
         for letter in piece.chars() {
             let last = lines.last().map_or("", String::as_str);
-            if !last.is_empty() && !fits(&format!("{last}{letter}")) {
+            if !last.is_empty() && !fits(&font, &format!("{last}{letter}"), width) {
                 lines.push(String::new());
             }
             if let Some(line) = lines.last_mut() {
@@ -220,12 +233,12 @@ fn name_lines(name: &str, room: f64) -> Vec<String> {
         .collect()
 }
 
-fn name_text(row: &TableRow, room: f64) -> String {
-    let lines = name_lines(&name(row), room);
-    let lines: Vec<String> = lines
+/// LaTeX of a row's name, broken into lines and bold if the row is the best.
+fn name_latex(row: &TableRow, width: f64) -> String {
+    let lines: Vec<String> = name_lines(&row_name(row), width)
         .iter()
         .map(|line| {
-            let line = text(line);
+            let line = latex(line);
             if row.is_best {
                 format!("\\textbf{{{line}}}")
             } else {
@@ -239,16 +252,17 @@ fn name_text(row: &TableRow, room: f64) -> String {
     }
 }
 
-/// Text of LaTeX.
-fn text(plain: &str) -> String {
+/// Escapes a text for LaTeX.
+fn latex(plain: &str) -> String {
     escaped(plain)
         .replace('–', "--")
         .replace('↓', "$\\downarrow$")
 }
 
-fn cell_text(cell: &TableCell, form: Ends) -> String {
-    let number = text(&value(cell));
-    let Some(ends) = ends(cell, form) else {
+/// LaTeX of a number above its interval.
+fn cell_latex(cell: &TableCell, precision: Precision) -> String {
+    let number = latex(&value_text(cell));
+    let Some(interval) = interval_text(cell, precision) else {
         return number;
     };
     let number = match cell {
@@ -256,14 +270,14 @@ fn cell_text(cell: &TableCell, form: Ends) -> String {
         TableCell::Effect(_, result) if result.is_shown() => format!("\\textbf{{{number}}}"),
         _ => number,
     };
-    format!("\\dqci{{{number}}}{{{}}}", text(&ends))
+    format!("\\dqci{{{number}}}{{{}}}", latex(&interval))
 }
 
-/// The rows of a part with rules between their groups; `after_heads` is written after the heads.
-fn body(table: &Table, form: &Form, part: &Range<usize>, after_heads: &str) -> String {
+/// LaTeX of the heads and rows of a part, with rules between groups of rows. `after_heads` is written after the heads.
+fn body(table: &Table, layout: &Layout, part: &Range<usize>, after_heads: &str) -> String {
     let mut body = String::from("    \\toprule\n   ");
     for column in &table.columns[part.clone()] {
-        let lines: Vec<String> = head_lines(head(column)).into_iter().map(text).collect();
+        let lines: Vec<String> = head_lines(column).into_iter().map(latex).collect();
         match &*lines {
             [single] => {
                 let _ = write!(body, " & {single}");
@@ -275,8 +289,7 @@ fn body(table: &Table, form: &Form, part: &Range<usize>, after_heads: &str) -> S
     }
     body += " \\\\\n";
     body += after_heads;
-    let rows = table.headed_rows_in(TableFormat::Latex);
-    for (index, (heading, row)) in rows.enumerate() {
+    for (index, (heading, row)) in table.headed_rows_in(TableFormat::Latex).enumerate() {
         if index == 0 || heading.is_some() {
             body += "    \\midrule\n";
         }
@@ -285,26 +298,27 @@ fn body(table: &Table, form: &Form, part: &Range<usize>, after_heads: &str) -> S
                 body,
                 "    \\multicolumn{{{}}}{{@{{}}l@{{}}}}{{\\textit{{{}}}}} \\\\",
                 part.len() + 1,
-                text(heading)
+                latex(heading)
             );
         }
         let cells: Vec<String> = row.cells[part.clone()]
             .iter()
-            .map(|cell| cell_text(cell, form.ends))
+            .map(|cell| cell_latex(cell, layout.precision))
             .collect();
-        let name = name_text(row, form.names);
+        let name = name_latex(row, layout.name_width);
         let _ = writeln!(body, "    {name} & {} \\\\", cells.join(" & "));
     }
     body + "    \\bottomrule\n"
 }
 
-fn floating(table: &Table, float: &str, width: f64) -> String {
-    let form = form(table, width);
+/// LaTeX of a table as a float of the given environment.
+fn float_table(table: &Table, float: &str, width: f64) -> String {
+    let layout = layout(table, width);
     let mut all = format!(
         "\n\\begin{{{float}}}\n  \\centering\n  \\caption{{{}}}\n  \\fontsize{{8}}{{9.5}}\\selectfont\\setlength{{\\tabcolsep}}{{{TABCOLSEP}pt}}\n",
-        text(&table.caption)
+        latex(&table.caption)
     );
-    for (index, part) in form.parts.iter().enumerate() {
+    for (index, part) in layout.parts.iter().enumerate() {
         if index > 0 {
             all += "\n  \\medskip\n";
         }
@@ -312,23 +326,24 @@ fn floating(table: &Table, float: &str, width: f64) -> String {
         let _ = write!(
             all,
             "  \\begin{{tabular}}{{{columns}}}\n{}  \\end{{tabular}}\n",
-            body(table, &form, part, "")
+            body(table, &layout, part, "")
         );
     }
     all + &format!("\\end{{{float}}}\n")
 }
 
-fn breaking(table: &Table, width: f64) -> String {
-    let form = form(table, width);
+/// LaTeX of a table that can break across pages.
+fn long_table(table: &Table, width: f64) -> String {
+    let layout = layout(table, width);
     let mut all =
         String::from("\n{\\fontsize{8}{9.5}\\selectfont\\setlength{\\tabcolsep}{2.6pt}\n");
-    for part in &form.parts {
+    for part in &layout.parts {
         let columns = format!("@{{}}l*{{{}}}{{r}}@{{}}", part.len());
         let _ = write!(
             all,
             "\\begin{{longtable}}{{{columns}}}\n    \\caption{{{}}} \\\\\n{}\\end{{longtable}}\n",
-            text(&table.caption),
-            body(table, &form, part, "    \\endhead\n")
+            latex(&table.caption),
+            body(table, &layout, part, "    \\endhead\n")
         );
     }
     all + "}\n"
@@ -339,7 +354,6 @@ mod tests {
     use super::*;
     use crate::drawing::paper::Palette;
     use crate::text::table::ColumnHeads;
-    use darkqa_score::estimate::Estimate;
 
     fn table(names: &[&str], columns: usize) -> Table {
         let cell = TableCell::Below(Estimate {
@@ -348,13 +362,6 @@ mod tests {
             high: 1.0,
             n: 40,
         });
-        let column = |head: String| Column {
-            kind: ColumnKind::Accuracy,
-            heads: ColumnHeads {
-                page: Some(head),
-                ..ColumnHeads::default()
-            },
-        };
         let heads = (0..columns).map(|level| format!("L{level}"));
         let rows = names.iter().map(|name| TableRow {
             cells: std::iter::once(TableCell::from(*name))
@@ -368,26 +375,33 @@ mod tests {
             caption: "50 % of a_b & c".to_owned(),
             columns: std::iter::once(String::new())
                 .chain(heads)
-                .map(column)
+                .map(|head| Column {
+                    kind: ColumnKind::Accuracy,
+                    heads: ColumnHeads {
+                        page: Some(head),
+                        ..ColumnHeads::default()
+                    },
+                })
                 .collect(),
             rows: rows.collect(),
             ..Table::default()
         }
     }
 
-    /// The width of a part in a form, by the widths of the letters.
-    fn width(table: &Table, form: &Form, part: &Range<usize>) -> f64 {
+    /// Width of a part in points.
+    fn width(table: &Table, layout: &Layout, part: &Range<usize>) -> f64 {
         let font = Font::bundled();
         let names = table
             .rows
             .iter()
-            .flat_map(|row| name_lines(&name(row), form.names))
-            .map(|line| font.width(&line, LETTERS))
+            .flat_map(|row| name_lines(&row_name(row), layout.name_width))
+            .map(|line| font.width(&line, FONT_SIZE))
             .fold(0.0, f64::max);
-        let columns = part
+        let columns: f64 = part
             .clone()
-            .map(|column| column_width(table, column, form.ends));
-        names + columns.map(|width| width + 2.0 * TABCOLSEP).sum::<f64>()
+            .map(|column| column_width(table, column, layout.precision) + 2.0 * TABCOLSEP)
+            .sum();
+        names + columns
     }
 
     #[test]
@@ -397,35 +411,41 @@ mod tests {
         for names in [vec!["sim-A", "sim-B"], vec![long, "sim"], vec![unbroken]] {
             for columns in [1, 6, 12] {
                 let table = table(&names, columns);
-                for room in [219.1, 237.1, 252.0, 397.5, 516.0] {
-                    let form = form(&table, room);
-                    for part in &form.parts {
-                        let width = width(&table, &form, part);
+                for max_width in [219.1, 237.1, 252.0, 397.5, 516.0] {
+                    let layout = layout(&table, max_width);
+                    for part in &layout.parts {
+                        let width = width(&table, &layout, part);
                         assert!(
-                            width <= room + 1e-9,
-                            "{names:?} {columns} {room}: {form:?} {width}"
+                            width <= max_width + 1e-9,
+                            "{names:?} {columns} {max_width}: {layout:?} {width}"
                         );
                     }
-                    let all: usize = form.parts.iter().map(Range::len).sum();
+                    let all: usize = layout.parts.iter().map(Range::len).sum();
                     assert_eq!(all, columns);
-                    let whole = name_lines(names[0], form.names).concat();
-                    assert_eq!(whole, names[0]);
+                    let joined = name_lines(names[0], layout.name_width).concat();
+                    assert_eq!(joined, names[0]);
                 }
             }
         }
-        // What fits whole stays whole.
-        let easy = form(&table(&["sim-A"], 6), 516.0);
-        assert_eq!((easy.ends, easy.parts.len()), (Ends::Tenths, 1));
-        assert!(form(&table(&[long], 12), 219.1).parts.len() > 1);
+        // A table that fits is not divided and keeps its decimals.
+        let narrow = layout(&table(&["sim-A"], 6), 516.0);
+        assert_eq!(
+            (narrow.precision, narrow.parts.len()),
+            (Precision::Tenths, 1)
+        );
+        assert!(layout(&table(&[long], 12), 219.1).parts.len() > 1);
+    }
+
+    fn look(width: f64) -> Look {
+        Look {
+            width,
+            font_size: 8.0,
+            palette: Palette::Colour,
+        }
     }
 
     #[test]
-    fn marks_are_latex_and_long_tables_are_no_floats() {
-        let look = |width| Look {
-            width,
-            letters: 8.0,
-            palette: Palette::Colour,
-        };
+    fn short_tables_are_floats_and_long_ones_longtables() {
         let (files, long) = tables(&[table(&["a_1", "b"], 2)], &look(252.0), false);
         let text = String::from_utf8(files[0].1.clone()).unwrap();
         assert_eq!((files.len(), long), (1, 0));

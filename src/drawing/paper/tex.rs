@@ -1,4 +1,4 @@
-//! A chart of lines as source for pgfplots, in the letters of the paper, with its data beside it: [`tex`].
+//! Writer of a line chart as pgfplots source, set in the font of the paper, with its data in separate files: [`tex`].
 
 use std::fmt::Write;
 
@@ -6,31 +6,34 @@ use super::font::Font;
 use super::legend::Legend;
 use super::look::Look;
 use super::sheet::{Colour, Stroke};
-use crate::drawing::chart::{Chart, Panel, PanelContent, PlotLine};
+use crate::drawing::chart::{Chart, LineContent, Panel, PlotLine};
 use crate::text::latex::escaped;
-use crate::types::AxisLevel;
 use crate::types::text::shown;
 
-/// Room left of the first axes, between axes, and right of the last ones, in heights of letters.
+/// Space left of the first axes in a row, in em.
 const FIRST: f64 = 4.6;
+/// Space between two axes in em.
 const BETWEEN: f64 = 2.6;
+/// Space right of the last axes in a row, in em.
 const LAST: f64 = 1.0;
 
-/// Room for the sample of a line in the legend, in points.
+/// Width of a line sample in the legend, in points.
 const SAMPLE: f64 = 43.0;
-/// How much wider letters of a paper can be than those of Arial.
+/// Maximum width of a text in the font of a paper, relative to Arial.
 const WIDER: f64 = 1.08;
+/// Intervals are drawn as bands in panels of up to this many curves, and as bars in others.
+const MAX_BANDS: usize = 3;
 
-/// The source of a chart and the data of its panels, as files by name.
+/// Writes a chart as files by name: its source, and the data of each panel.
 pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8>)> {
-    let most = (look.width / (14.0 * look.letters)) as usize;
-    let columns = chart.columns.min(most).min(chart.panels.len()).max(1);
+    let fitting = (look.width / (14.0 * look.font_size)) as usize;
+    let columns = chart.columns.min(fitting).min(chart.panels.len()).max(1);
     let rows = chart.panels.len().div_ceil(columns);
-    // Room for what TeX sets beside the axes: numbers, and in the first column the title.
-    let between = (10.0 * BETWEEN * look.letters).floor() / 10.0;
-    let beside = (FIRST + LAST) * look.letters + between * (columns - 1) as f64;
-    // Written with one decimal, and never more than there is.
-    let width = (10.0 * (look.width - beside) / columns as f64).floor() / 10.0;
+    // Space for tick labels, and in the first column for the axis title.
+    let between = (10.0 * BETWEEN * look.font_size).floor() / 10.0;
+    let margins = (FIRST + LAST) * look.font_size + between * (columns - 1) as f64;
+    // Rounded down to the one decimal that is written, so that the figure never gets too wide.
+    let width = (10.0 * (look.width - margins) / columns as f64).floor() / 10.0;
     let legend = Legend::for_chart(chart, look);
     let mut text = format!(
         "% Made by darkqa-eval. In the preamble: \\usepackage{{pgfplots}}\n\
@@ -45,7 +48,7 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
          xlabel style={{font=\\footnotesize, text width={width:.1}pt, align=center}}, title style={{font=\\footnotesize, text width={width:.1}pt, align=center}},\n  \
          legend style={{font=\\footnotesize, draw=none}}, legend columns={}, legend cell align=left]\n",
         between,
-        rows_apart(chart, look, width),
+        row_spacing(chart, look, width),
         0.68 * width,
         legend_columns(chart, look),
     );
@@ -54,32 +57,35 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
     for (index, panel) in chart.panels.iter().enumerate() {
         let data = format!("{name}-{}.dat", index + 1);
         let is_first = index % columns == 0;
-        text += &head(panel, if is_first { chart.measure } else { "" });
+        text += &axes_options(panel, if is_first { chart.measure } else { "" });
         if index == 0 {
             let _ = write!(text, ", legend to name={{darkqa-{name}}}");
         }
         text += "]\n";
-        let bands = panel
+        let curves = panel
             .lines
             .iter()
-            .filter(|line| matches!(line.content, PanelContent::Curve(_)))
-            .count()
-            <= 3;
-        for (place, line) in panel.lines.iter().enumerate() {
+            .filter(|line| matches!(line.content, LineContent::Curve(_)));
+        let source = PanelSource {
+            look,
+            legend: &legend,
+            data: &data,
+            has_bands: curves.count() <= MAX_BANDS,
+        };
+        for (index, line) in panel.lines.iter().enumerate() {
             if line.is_empty() {
                 continue;
             }
-            let is_new = !named.contains(&&*line.name);
-            text += &plot(line, place + 1, &data, (look, &legend), bands);
-            if is_new {
+            text += &source.plot(line, index + 1);
+            // All panels share one legend, with one entry for each name.
+            if !named.contains(&&*line.name) {
                 named.push(&line.name);
-                // Later panels have no legend of their own: a name that they add stands in theirs.
-                let room = (look.width - SAMPLE) / WIDER;
-                let entry = Font::bundled().shortened(&line.name, look.letters, room);
+                let max_width = (look.width - SAMPLE) / WIDER;
+                let entry = Font::bundled().shortened(&line.name, look.font_size, max_width);
                 let _ = writeln!(text, "\\addlegendentry{{{}}}", escaped(&entry));
             }
         }
-        files.push((data, dat(panel).into_bytes()));
+        files.push((data, data_file(panel).into_bytes()));
     }
     let _ = write!(
         text,
@@ -89,37 +95,39 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
     files
 }
 
-/// Room between two rows of axes in points: for the levels, the title of the axis, and the lines of the longest title below.
-fn rows_apart(chart: &Chart, look: &Look, width: f64) -> f64 {
+/// Space between two rows of axes in points: tick labels, axis title, and the lines of the longest panel title.
+fn row_spacing(chart: &Chart, look: &Look, width: f64) -> f64 {
     let font = Font::bundled();
     let lines = chart
         .panels
         .iter()
-        .map(|panel| font.wrapped(&panel.title, look.letters, width).len());
-    (6.3 + 1.25 * lines.max().unwrap_or(1) as f64) * look.letters
+        .map(|panel| font.wrapped(&panel.title, look.font_size, width).len());
+    (6.3 + 1.25 * lines.max().unwrap_or(1) as f64) * look.font_size
 }
 
-/// Columns of the legend, by its longest name.
+/// Number of legend columns that fit the longest name.
 fn legend_columns(chart: &Chart, look: &Look) -> usize {
     let widest = chart
         .panels
         .iter()
         .flat_map(|panel| &panel.lines)
-        .map(|line| Font::bundled().width(&line.name, look.letters))
+        .map(|line| Font::bundled().width(&line.name, look.font_size))
         .fold(0.0, f64::max)
         * WIDER
         + SAMPLE;
     (look.width / widest).max(1.0) as usize
 }
 
-/// The start of a panel's axes.
-fn head(panel: &Panel, measure: &str) -> String {
+/// Start of a panel: its options without the closing bracket.
+fn axes_options(panel: &Panel, measure: &str) -> String {
     let levels = panel.levels();
-    let ticks: Vec<String> = levels.iter().map(|of| of.value().to_string()).collect();
+    let ticks: Vec<String> = levels
+        .iter()
+        .map(|level| level.value().to_string())
+        .collect();
     let labels: Vec<String> = levels
         .iter()
-        .map(|of| format!("{of}\\\\{}", of.value()))
-        .map(|label| format!("{{{label}}}"))
+        .map(|level| format!("{{{level}\\\\{}}}", level.value()))
         .collect();
     format!(
         "\\nextgroupplot[title={{{}}}, xlabel={{{}}}, ylabel={{{}}}, xmin={}, xmax={},\n  xtick={{{}}}, xticklabels={{{}}}, \
@@ -127,8 +135,8 @@ fn head(panel: &Panel, measure: &str) -> String {
         escaped(&panel.title),
         escaped(&panel.axis_title()),
         escaped(measure),
-        -0.035 * panel.farthest(),
-        1.035 * panel.farthest(),
+        -0.035 * panel.axis_end(),
+        1.035 * panel.axis_end(),
         ticks.join(","),
         labels.join(",")
     )
@@ -138,7 +146,8 @@ fn rgb([red, green, blue]: Colour) -> String {
     format!("{{rgb,255:red,{red};green,{green};blue,{blue}}}")
 }
 
-fn stroke(stroke: &Stroke) -> String {
+/// Options of a stroke: colour, width and dashes.
+fn stroke_options(stroke: &Stroke) -> String {
     let mut text = format!(
         "color={}, line width={:.2}pt",
         rgb(stroke.colour),
@@ -149,8 +158,8 @@ fn stroke(stroke: &Stroke) -> String {
             .dash
             .iter()
             .enumerate()
-            .map(|(place, length)| {
-                let word = if place % 2 == 0 { "on" } else { "off" };
+            .map(|(index, length)| {
+                let word = if index % 2 == 0 { "on" } else { "off" };
                 format!("{word} {length:.2}pt")
             })
             .collect();
@@ -159,95 +168,102 @@ fn stroke(stroke: &Stroke) -> String {
     text
 }
 
-fn plot(
-    line: &PlotLine,
-    place: usize,
-    data: &str,
-    (look, legend): (&Look, &Legend<'_>),
-    bands: bool,
-) -> String {
-    let file = format!("{{\\darkqadata/{data}}}");
-    let colour = rgb(look.colour(line.style));
-    match &line.content {
-        PanelContent::Flat(share) => format!(
-            "\\addplot[{}, domain=\\pgfkeysvalueof{{/pgfplots/xmin}}:\\pgfkeysvalueof{{/pgfplots/xmax}}, samples=2] {{{}}};\n",
-            stroke(&legend.flat(line.into(), look)),
-            100.0 * share
-        ),
-        PanelContent::Marks(marks) => {
-            let mut text = String::new();
-            for (index, mark) in marks.iter().enumerate() {
-                let [low, middle, high] = mark.ev;
-                let share = mark.share;
-                let forget = if index == 0 { "" } else { ", forget plot" };
-                let _ = writeln!(
-                    text,
-                    "\\addplot[color={colour}, only marks, mark=o{forget}, error bars/.cd, x dir=both, x explicit, y dir=both, y explicit] \
-                     coordinates {{({middle},{}) += ({},{}) -= ({},{})}};",
-                    100.0 * share.value,
-                    high - middle,
-                    100.0 * (share.high - share.value),
-                    middle - low,
-                    100.0 * (share.value - share.low)
-                );
+/// Source of the plots in one panel.
+struct PanelSource<'a> {
+    look: &'a Look,
+    legend: &'a Legend<'a>,
+    /// Name of the panel's data file.
+    data: &'a str,
+    /// True if intervals are drawn as bands, false if as bars.
+    has_bands: bool,
+}
+
+impl PanelSource<'_> {
+    /// Plot commands of a line. `number` counts the lines of the panel from 1 and names its columns in the data file.
+    fn plot(&self, line: &PlotLine, number: usize) -> String {
+        let colour = rgb(self.look.colour(line.style));
+        match &line.content {
+            LineContent::Flat(share) => format!(
+                "\\addplot[{}, domain=\\pgfkeysvalueof{{/pgfplots/xmin}}:\\pgfkeysvalueof{{/pgfplots/xmax}}, samples=2] {{{}}};\n",
+                stroke_options(&self.legend.flat_stroke(line.into(), self.look)),
+                100.0 * share
+            ),
+            LineContent::Marks(marks) => {
+                let mut text = String::new();
+                for (index, mark) in marks.iter().enumerate() {
+                    let [low, middle, high] = mark.ev;
+                    let share = mark.share;
+                    let forget = if index == 0 { "" } else { ", forget plot" };
+                    let _ = writeln!(
+                        text,
+                        "\\addplot[color={colour}, only marks, mark=o{forget}, error bars/.cd, x dir=both, x explicit, y dir=both, y explicit] \
+                         coordinates {{({middle},{}) += ({},{}) -= ({},{})}};",
+                        100.0 * share.value,
+                        high - middle,
+                        100.0 * (share.high - share.value),
+                        middle - low,
+                        100.0 * (share.value - share.low)
+                    );
+                }
+                text
             }
-            text
-        }
-        PanelContent::Curve(_) => {
-            let pen = look.pen(line.style);
-            let solid = "mark options={solid}";
-            let mark = Look::pgf_mark(&pen);
-            let drawn = stroke(&pen.stroke);
-            if bands {
-                format!(
-                    "\\addplot[draw=none, forget plot, name path=low{place}] table[x=x, y=low{place}]{file};\n\
-                     \\addplot[draw=none, forget plot, name path=high{place}] table[x=x, y=high{place}]{file};\n\
-                     \\addplot[fill={colour}, fill opacity=0.16, forget plot] fill between[of=low{place} and high{place}];\n\
-                     \\addplot[{drawn}, mark={mark}, mark size=1.6pt, {solid}] table[x=x, y=y{place}]{file};\n"
-                )
-            } else {
-                format!(
-                    "\\addplot[{drawn}, mark={mark}, mark size=1.6pt, {solid}, error bars/.cd, y dir=both, y explicit, error mark=none]\n  \
-                     table[x=x, y=y{place}, y error plus expr=\\thisrow{{high{place}}}-\\thisrow{{y{place}}}, y error minus \
-                     expr=\\thisrow{{y{place}}}-\\thisrow{{low{place}}}]{file};\n"
-                )
+            LineContent::Curve(_) => {
+                let file = format!("{{\\darkqadata/{}}}", self.data);
+                let pen = self.look.pen(line.style);
+                let solid = "mark options={solid}";
+                let mark = Look::pgf_mark(&pen);
+                let stroke = stroke_options(&pen.stroke);
+                if self.has_bands {
+                    format!(
+                        "\\addplot[draw=none, forget plot, name path=low{number}] table[x=x, y=low{number}]{file};\n\
+                         \\addplot[draw=none, forget plot, name path=high{number}] table[x=x, y=high{number}]{file};\n\
+                         \\addplot[fill={colour}, fill opacity=0.16, forget plot] fill between[of=low{number} and high{number}];\n\
+                         \\addplot[{stroke}, mark={mark}, mark size=1.6pt, {solid}] table[x=x, y=y{number}]{file};\n"
+                    )
+                } else {
+                    format!(
+                        "\\addplot[{stroke}, mark={mark}, mark size=1.6pt, {solid}, error bars/.cd, y dir=both, y explicit, error mark=none]\n  \
+                         table[x=x, y=y{number}, y error plus expr=\\thisrow{{high{number}}}-\\thisrow{{y{number}}}, y error minus \
+                         expr=\\thisrow{{y{number}}}-\\thisrow{{low{number}}}]{file};\n"
+                    )
+                }
             }
         }
     }
 }
 
-/// The data of a panel: a row a level; for each curve its value and both ends in percent, `nan` where it has no point.
-fn dat(panel: &Panel) -> String {
+/// Data of a panel: one row for each level; for each curve its value and both ends of its interval in percent, `nan` without a point.
+fn data_file(panel: &Panel) -> String {
     let mut text = String::new();
     let curves: Vec<_> = panel
         .lines
         .iter()
         .enumerate()
-        .filter_map(|(place, line)| match &line.content {
-            PanelContent::Curve(points) if !points.is_empty() => Some((place + 1, line, points)),
+        .filter_map(|(index, line)| match &line.content {
+            LineContent::Curve(points) if !points.is_empty() => Some((index + 1, line, points)),
             _ => None,
         })
         .collect();
-    for (place, line, _) in &curves {
+    for (number, line, _) in &curves {
         let name = line.name.replace(['\n', '\r'], " ");
         let name = shown(&name);
         let _ = writeln!(
             text,
-            "# y{place}, low{place}, high{place}: {name}, in percent"
+            "# y{number}, low{number}, high{number}: {name}, in percent"
         );
     }
     text += "level x";
-    for (place, ..) in &curves {
-        let _ = write!(text, " y{place} low{place} high{place}");
+    for (number, ..) in &curves {
+        let _ = write!(text, " y{number} low{number} high{number}");
     }
     text.push('\n');
     for level in panel.levels() {
         let _ = write!(text, "{level} {}", level.value());
         for (.., points) in &curves {
-            let at = points.iter().find(|(at, _): &&(AxisLevel, _)| *at == level);
-            match at {
-                Some((_, of)) => {
-                    let [value, low, high] = [of.value, of.low, of.high].map(|share| 100.0 * share);
+            match points.iter().find(|(other, _)| *other == level) {
+                Some((_, share)) => {
+                    let [value, low, high] =
+                        [share.value, share.low, share.high].map(|share| 100.0 * share);
                     let _ = write!(text, " {value} {low} {high}");
                 }
                 None => text += " nan nan nan",

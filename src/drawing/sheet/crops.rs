@@ -1,20 +1,20 @@
-//! Crops of images side by side: [`crops`].
+//! Sheet of crops from the middle of images, side by side: [`crops`].
 
 use super::{CELL, GAP, LINE, SheetCanvas};
 use crate::types::Rgb;
 
-/// One row of crops. Its images have the same size.
+/// Row of crops. All its images have the same size.
 #[derive(Debug, Clone)]
 pub(crate) struct CropRow<'a> {
     /// Label of the row.
     pub name: String,
     /// One image for each column.
     pub images: Vec<&'a Rgb>,
-    /// Factor by which the light of the images is amplified.
-    pub amplified: f64,
+    /// Factor by which the images are brightened in linear light.
+    pub gain: f64,
 }
 
-/// A sheet with the middle of each image at full resolution, brightened by the factor of its row, below the column names.
+/// Draws the middle of each image at full resolution, brightened by the gain of its row, below the column names.
 #[must_use]
 pub(crate) fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
     let height = CELL * 2 / 3;
@@ -28,20 +28,21 @@ pub(crate) fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
     }
     for (index, row) in rows.iter().enumerate() {
         let top = GAP + LINE + index * step[0];
-        let label = format!("{}, light × {:.1}", row.name, row.amplified);
+        let label = format!("{}, light × {:.1}", row.name, row.gain);
         sheet.write([top, GAP], sheet.width - GAP, &label, [90; 3]);
-        let scale = libm::pow(row.amplified.max(0.0), 1.0 / 2.2);
+        // Codes are gamma-encoded.
+        let scale = libm::pow(row.gain.max(0.0), 1.0 / 2.2);
         for (column, image) in row.images.iter().enumerate() {
             let size = [image.height().min(height), image.width().min(CELL)];
             let first = [
                 (image.height() - size[0]) / 2,
                 (image.width() - size[1]) / 2,
             ];
-            let place = [top + LINE, GAP + column * step[1]];
-            sheet.fill(place, size, |y, x| {
-                let at = ((first[0] + y) * image.width() + first[1] + x) * 3;
+            let corner = [top + LINE, GAP + column * step[1]];
+            sheet.fill(corner, size, |y, x| {
+                let index = ((first[0] + y) * image.width() + first[1] + x) * 3;
                 [0, 1, 2].map(|channel| {
-                    let code = f64::from(image.samples()[at + channel]);
+                    let code = f64::from(image.samples()[index + channel]);
                     (code * scale).round().min(255.0) as u8
                 })
             });
@@ -55,12 +56,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_middle_is_shown_brightened() {
+    fn crops_are_brightened() {
         let image = Rgb::new(3, 500, vec![10; 4500]).unwrap();
         let rows = [CropRow {
             name: "a".to_owned(),
             images: vec![&image, &image],
-            amplified: 4.0,
+            gain: 4.0,
         }];
         let sheet = crops(&["real", "made"], &rows);
         let brightened = sheet

@@ -1,20 +1,20 @@
-//! The paper's figure of examples, each variant by level: [`levels()`].
+//! Figure of example images, each variant by level, as in the DarkQA paper: [`levels()`].
 
 use std::collections::BTreeSet;
 
-use super::{CELL, GAP, LINE, SheetCanvas, fitted, letter_width, lines, mean};
+use super::{CELL, GAP, LINE, SheetCanvas, fitted_size, letter_width, lines, mean_colour};
 use crate::types::degradations::Axis;
 use crate::types::{AxisLevel, Rgb};
 
-/// The images of a frame at the levels of one axis.
+/// Images of a frame at the levels of one axis.
 #[derive(Debug, Clone)]
 pub(crate) struct LevelBlock {
-    /// The levels without L0, from left to right.
+    /// Levels from left to right, without L0.
     pub levels: Vec<AxisLevel>,
     pub rows: Vec<LevelRow>,
 }
 
-/// The images of one kind of degradation, in one noise profile.
+/// Images of one kind of degradation with one noise profile.
 #[derive(Debug, Clone)]
 pub(crate) struct LevelRow {
     pub name: String,
@@ -22,47 +22,49 @@ pub(crate) struct LevelRow {
     pub images: Vec<LevelImage>,
 }
 
-/// An image at a level.
+/// Image at a level.
 #[derive(Debug, Clone)]
 pub(crate) struct LevelImage {
     pub image: Rgb,
-    /// How much darker than the frame it is shown, in EV.
+    /// Difference in brightness to the clean frame, in EV; it selects the gain of the inset.
     pub dark_ev: f64,
 }
 
-/// Letters of the longest names of the paper's rows.
-const NAME: usize = 6;
+/// Minimum number of characters for which the column of names has space; the paper's names fit.
+const MIN_NAME_LETTERS: usize = 6;
 
-/// A sheet with the frame and its levels, block below block and kind below kind, as the paper's figure of examples (DarkQA, Fig. 3);
-/// `foot` stands below them.
+/// Draws the frame and its levels, with one row for each kind of degradation, like Fig. 3 of the DarkQA paper. `foot` is written below.
 ///
-/// Images are scaled down by means of pixels. As in the paper's insets, the lower right corner of L3, L4 and L5 shows the
-/// middle of the image (half of each side, a quarter of the area) with 10, 20 and 50 times its light. Pixels of insets are
-/// picked, not averaged, so that the noise keeps its strength. The paper says "pixel intensities amplified". Multiplied codes
-/// would make a bright room white, so we take this to mean the light, and state it below the images.
+/// Images are scaled down by averaging pixels. As in the paper, the lower right corner of L3, L4 and L5 has an inset: the middle of the
+/// image (half of each side, a quarter of the area), brightened by a factor of 10, 20 or 50. Pixels of insets are picked, not averaged, so
+/// that the noise keeps its strength. The paper writes "pixel intensities amplified". Multiplying the codes would make a bright room white,
+/// so we brighten linear light, and state that below the images.
 #[must_use]
 pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
-    let size = fitted(clean.height(), clean.width());
+    let size = fitted_size(clean);
     let [height, width] = size;
-    let rows = blocks.iter().flat_map(|block| &block.rows);
-    let letters = rows.map(|row| row.name.chars().count()).max();
-    // A gap before a long name and behind it.
+    let letters = blocks
+        .iter()
+        .flat_map(|block| &block.rows)
+        .map(|row| row.name.chars().count())
+        .max();
+    // A gap on both sides of a long name.
     let longest = letters.unwrap_or_default() * letter_width() + 2 * GAP;
-    let margin = longest.max(NAME * letter_width() + GAP);
+    let margin = longest.max(MIN_NAME_LETTERS * letter_width() + GAP);
     // A label needs its width even if the image is small.
     let cell = width.max(CELL / 2);
     let columns = blocks.iter().map(|block| block.levels.len()).max();
     let row_height = GAP + height.max(LINE);
-    let heights = blocks
+    let blocks_height: usize = blocks
         .iter()
-        .map(|block| GAP + LINE + block.rows.len() * row_height);
+        .map(|block| GAP + LINE + block.rows.len() * row_height)
+        .sum();
     let sheet_width = margin + (columns.unwrap_or_default() + 1) * (cell + GAP);
-    let foot = [foot.to_owned(), how_inset(blocks)];
-    let foot: Vec<String> = foot
+    let foot: Vec<String> = [foot.to_owned(), insets_note(blocks)]
         .iter()
         .flat_map(|text| lines(text, sheet_width.saturating_sub(2 * GAP)))
         .collect();
-    let below = heights.sum::<usize>() + GAP;
+    let below = blocks_height + GAP;
     let foot_height = match foot.len() {
         0 => 0,
         number => number * LINE + GAP,
@@ -73,18 +75,18 @@ pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     for block in blocks {
         sheet.write([top, left(0)], cell, "L0", [0; 3]);
         for (index, level) in block.levels.iter().enumerate() {
-            sheet.write([top, left(index + 1)], cell, &label(*level), [0; 3]);
+            sheet.write([top, left(index + 1)], cell, &level_label(*level), [0; 3]);
         }
         top += LINE + GAP;
         for row in &block.rows {
             let middle = top + height.saturating_sub(LINE) / 2;
             sheet.write([middle, GAP], margin, &row.name, [0; 3]);
-            sheet.fill([top, left(0)], size, |y, x| mean(clean, size, y, x));
+            sheet.fill([top, left(0)], size, |y, x| mean_colour(clean, size, y, x));
             for (index, LevelImage { image, dark_ev }) in row.images.iter().enumerate() {
-                let place = [top, left(index + 1)];
-                sheet.fill(place, size, |y, x| mean(image, size, y, x));
-                if let Some(factor) = amplification(*dark_ev) {
-                    inset(&mut sheet, place, size, image, factor);
+                let corner = [top, left(index + 1)];
+                sheet.fill(corner, size, |y, x| mean_colour(image, size, y, x));
+                if let Some(gain) = inset_gain(*dark_ev) {
+                    draw_inset(&mut sheet, corner, size, image, gain);
                 }
             }
             top += row_height;
@@ -96,32 +98,26 @@ pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     sheet.finish()
 }
 
-/// The factors of light of the insets of some images, without duplicates.
-fn insets(blocks: &[LevelBlock]) -> Vec<u16> {
-    let factors: BTreeSet<u16> = blocks
+/// Note on the gains of the insets; empty without insets.
+fn insets_note(blocks: &[LevelBlock]) -> String {
+    let gains: BTreeSet<u16> = blocks
         .iter()
         .flat_map(|block| &block.rows)
         .flat_map(|row| &row.images)
-        .filter_map(|image| amplification(image.dark_ev))
+        .filter_map(|image| inset_gain(image.dark_ev))
         .collect();
-    factors.into_iter().collect()
-}
-
-/// Describes the insets; empty without one.
-fn how_inset(blocks: &[LevelBlock]) -> String {
-    let factors = insets(blocks);
-    if factors.is_empty() {
+    if gains.is_empty() {
         return String::new();
     }
-    let factors: Vec<String> = factors.iter().map(|factor| format!("×{factor}")).collect();
+    let gains: Vec<String> = gains.iter().map(|factor| format!("×{factor}")).collect();
     format!(
         "Insets: the middle of the image, linear light {}",
-        factors.join(", ")
+        gains.join(", ")
     )
 }
 
-/// A level above its column, as `L3 -6 EV` or `T33.33 ms`.
-pub(super) fn label(level: AxisLevel) -> String {
+/// Label of a level's column, as in `L3 -6 EV` or `T33.33 ms`.
+pub(super) fn level_label(level: AxisLevel) -> String {
     let axis = level.axis().unwrap_or(Axis::LIGHT);
     if axis == Axis::LIGHT {
         format!("{level} -{} {}", level.value(), axis.unit)
@@ -130,8 +126,8 @@ pub(super) fn label(level: AxisLevel) -> String {
     }
 }
 
-/// Factor by which the light of an inset is amplified; `None` below 5 EV, where the image itself is visible.
-fn amplification(dark_ev: f64) -> Option<u16> {
+/// Factor by which an inset is brightened in linear light; `None` below 5 EV, where the image itself is visible.
+fn inset_gain(dark_ev: f64) -> Option<u16> {
     match dark_ev {
         ..5.0 => None,
         5.0..7.0 => Some(10),
@@ -140,13 +136,13 @@ fn amplification(dark_ev: f64) -> Option<u16> {
     }
 }
 
-/// Draws the amplified middle of the image in the lower right corner of a cell, with a white edge and its factor.
-fn inset(
+/// Draws the brightened middle of an image in the lower right corner of a cell, with a white edge and its gain.
+fn draw_inset(
     sheet: &mut SheetCanvas,
     [top, left]: [usize; 2],
     size: [usize; 2],
     image: &Rgb,
-    factor: u16,
+    gain: u16,
 ) {
     let [height, width] = size.map(|side| side / 2);
     if height < 4 || width < 4 {
@@ -156,17 +152,14 @@ fn inset(
     sheet.fill([top - 1, left - 1], [height + 1, width + 1], |_, _| {
         [255; 3]
     });
-    let brightened = brightened(factor);
-    let source = |at: usize, of: usize, side: usize| side / 4 + at * (side / 2) / of;
+    let brightened = brightened_codes(gain);
     sheet.fill([top, left], [height, width], |row, column| {
-        let (y, x) = (
-            source(row, height, image.height()),
-            source(column, width, image.width()),
-        );
-        let at = (y * image.width() + x) * 3;
-        [0, 1, 2].map(|channel| brightened[usize::from(image.samples()[at + channel])])
+        let y = inset_source(row, height, image.height());
+        let x = inset_source(column, width, image.width());
+        let index = (y * image.width() + x) * 3;
+        [0, 1, 2].map(|channel| brightened[usize::from(image.samples()[index + channel])])
     });
-    let label = format!("×{factor}");
+    let label = format!("×{gain}");
     let label_width = label.chars().count() * letter_width();
     if height > LINE && width > label_width {
         sheet.fill([top, left], [LINE, label_width + 2], |_, _| [0; 3]);
@@ -174,9 +167,15 @@ fn inset(
     }
 }
 
-/// For each code, the code of `factor` times its light: the code times factor^(1/2.2).
-fn brightened(factor: u16) -> [u8; 256] {
-    let scale = libm::pow(f64::from(factor), 1.0 / 2.2);
+/// Row or column of an image that an inset's row or column is taken from. `inset_side` and `image_side` are lengths in pixels; the inset
+/// has the middle half of each side.
+fn inset_source(index: usize, inset_side: usize, image_side: usize) -> usize {
+    image_side / 4 + index * (image_side / 2) / inset_side
+}
+
+/// Lookup table of brightened codes: a gain in linear light multiplies a gamma-encoded code by gain^(1/2.2).
+fn brightened_codes(gain: u16) -> [u8; 256] {
+    let scale = libm::pow(f64::from(gain), 1.0 / 2.2);
     std::array::from_fn(|code| (code as f64 * scale).round().min(255.0) as u8)
 }
 
@@ -190,8 +189,9 @@ mod tests {
         Rgb::new(height, width, vec![code; height * width * 3]).unwrap()
     }
 
+    /// Sheet with two rows of grey images, codes 3 and 4, of a clean frame with code 100.
     fn sheet(height: usize, width: usize, severities: &[Severity]) -> Rgb {
-        let row = |code: u8| LevelRow {
+        let rows = [3, 4].map(|code: u8| LevelRow {
             name: code.to_string(),
             images: severities
                 .iter()
@@ -200,36 +200,37 @@ mod tests {
                     dark_ev: severity.value(),
                 })
                 .collect(),
-        };
+        });
         let block = LevelBlock {
             levels: severities
                 .iter()
                 .map(|severity| AxisLevel::new(Kind::Exposure, *severity))
                 .collect(),
-            rows: vec![row(3), row(4)],
+            rows: rows.to_vec(),
         };
         levels(&grey(height, width, 100), &[block], "paper: K 0.77")
     }
 
-    #[test]
-    fn insets_are_amplified_by_their_level() {
-        let sheet = sheet(100, 300, &[Severity::L1, Severity::L5]);
-        let has = |code: u8| {
-            sheet
-                .samples()
-                .chunks(3)
-                .filter(|pixel| **pixel == [code; 3])
-                .count()
-        };
-        // The clean frame twice; the cells, less the quarter of the amplified inset and its edge.
-        assert!(has(100) >= 2 * 100 * 300);
-        assert!(has(3) > 100 * 300 && has(3) < 2 * 100 * 300);
-        assert!(has(18) > 4000 && has(24) > 4000);
+    /// Number of grey pixels of a code.
+    fn count(samples: &[u8], code: u8) -> usize {
+        samples
+            .chunks(3)
+            .filter(|pixel| **pixel == [code; 3])
+            .count()
     }
 
     #[test]
-    fn blocks_stand_below_each_other() {
-        let block = |kind: Kind, code| LevelBlock {
+    fn insets_are_brightened_by_level() {
+        let sheet = sheet(100, 300, &[Severity::L1, Severity::L5]);
+        let samples = sheet.samples();
+        // The clean frame is drawn twice; the inset covers a quarter of an image.
+        assert!(count(samples, 100) >= 2 * 100 * 300);
+        assert!(count(samples, 3) > 100 * 300 && count(samples, 3) < 2 * 100 * 300);
+        assert!(count(samples, 18) > 4000 && count(samples, 24) > 4000);
+    }
+
+    fn block(kind: Kind, code: u8) -> LevelBlock {
+        LevelBlock {
             levels: vec![AxisLevel::new(kind, kind.ladder()[2])],
             rows: vec![LevelRow {
                 name: kind.word().to_owned(),
@@ -238,7 +239,11 @@ mod tests {
                     dark_ev: 0.0,
                 }],
             }],
-        };
+        }
+    }
+
+    #[test]
+    fn blocks_are_below_each_other() {
         let both = levels(
             &grey(50, 80, 100),
             &[block(Kind::Auto, 7), block(Kind::Motion, 9)],
@@ -246,22 +251,29 @@ mod tests {
         );
         let one = levels(&grey(50, 80, 100), &[block(Kind::Auto, 7)], "");
         assert_eq!(both.height() - GAP, 2 * (one.height() - GAP));
-        let rows = both.samples().chunks(3 * both.width());
-        let first = |code: u8| {
-            let mut rows = rows.clone();
-            let cells = |row: &[u8]| row.chunks(3).filter(|pixel| *pixel == [code; 3]).count();
-            rows.position(|row| cells(row) == 80)
-        };
-        assert!(first(7).unwrap() + 50 < first(9).unwrap());
-        assert_eq!(
-            label(AxisLevel::new(Kind::Motion, Severity::TIMES[2])),
-            "T33.33 ms"
-        );
-        assert_eq!(label(AxisLevel::new(Kind::Auto, Severity::L3)), "L3 -6 EV");
+        let [auto_top, motion_top] = [7, 9].map(|code| {
+            both.samples()
+                .chunks(3 * both.width())
+                .position(|row| count(row, code) == 80)
+                .unwrap()
+        });
+        assert!(auto_top + 50 < motion_top);
     }
 
     #[test]
-    fn a_long_name_does_not_touch_the_picture() {
+    fn labels_name_level_and_severity() {
+        assert_eq!(
+            level_label(AxisLevel::new(Kind::Motion, Severity::TIMES[2])),
+            "T33.33 ms"
+        );
+        assert_eq!(
+            level_label(AxisLevel::new(Kind::Auto, Severity::L3)),
+            "L3 -6 EV"
+        );
+    }
+
+    #[test]
+    fn a_long_name_does_not_touch_the_image() {
         let block = LevelBlock {
             levels: vec![AxisLevel::new(Kind::Sensor, Severity::L5)],
             rows: vec![LevelRow {
@@ -273,21 +285,18 @@ mod tests {
             }],
         };
         let sheet = levels(&grey(60, 80, 100), &[block], "");
-        let rows: Vec<&[u8]> = sheet.samples().chunks(3 * sheet.width()).collect();
-        let is_frame = |row: &&[u8]| {
-            row.windows(3 * 80)
+        let mut frame_rows = 0;
+        for row in sheet.samples().chunks(3 * sheet.width()) {
+            let frame_left = row
+                .windows(3 * 80)
                 .step_by(3)
-                .position(|run| run.iter().all(|sample| *sample == 100))
-        };
-        let frame: Vec<(&[u8], usize)> = rows
-            .iter()
-            .filter_map(|row| Some((*row, is_frame(row)?)))
-            .collect();
-        assert_eq!(frame.len(), 60);
-        for (row, left) in frame {
-            let before = row[3 * (left - GAP)..3 * left].iter();
-            assert!(before.into_iter().all(|sample| *sample == 255));
+                .position(|run| run.iter().all(|sample| *sample == 100));
+            let Some(left) = frame_left else { continue };
+            let gap = &row[3 * (left - GAP)..3 * left];
+            assert!(gap.iter().all(|sample| *sample == 255));
+            frame_rows += 1;
         }
+        assert_eq!(frame_rows, 60);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Figures made of images with labels: [`levels()`], [`noise()`], [`crops()`], [`story()`] and [`contact()`].
+//! Figures that arrange images with labels: [`levels()`], [`noise()`], [`crops()`], [`story()`] and [`contact()`].
 
 mod contact;
 mod crops;
@@ -6,6 +6,8 @@ mod levels;
 mod noise;
 mod story;
 mod strokes;
+
+use std::ops::Range;
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
 
@@ -17,7 +19,7 @@ pub(crate) use story::{Story, StoryCell, StoryMark, StoryRow, story};
 
 use crate::types::Rgb;
 
-/// Version of the drawing, raised whenever a pixel of a figure of levels or of noise changes for the same images.
+/// Version of the drawing code. Raise it when any pixel of a figure of levels or noise changes for the same images.
 pub(crate) const VERSION: u32 = 1;
 
 /// Height of a line of text in pixels.
@@ -27,7 +29,7 @@ const GAP: usize = 8;
 /// Maximum width of an image on a sheet in pixels.
 const CELL: usize = 360;
 
-/// A white image on which images and text are drawn.
+/// Image that starts white, on which images and text are drawn. Positions are row and column, in pixels.
 struct SheetCanvas {
     height: usize,
     width: usize,
@@ -46,17 +48,17 @@ impl SheetCanvas {
     /// Sets a pixel; pixels outside the sheet are ignored.
     fn set(&mut self, row: usize, column: usize, colour: [u8; 3]) {
         if row < self.height && column < self.width {
-            let at = (row * self.width + column) * 3;
-            self.samples[at..at + 3].copy_from_slice(&colour);
+            let index = (row * self.width + column) * 3;
+            self.samples[index..index + 3].copy_from_slice(&colour);
         }
     }
 
     fn pixel(&self, row: usize, column: usize) -> [u8; 3] {
-        let at = (row * self.width + column) * 3;
-        [self.samples[at], self.samples[at + 1], self.samples[at + 2]]
+        let index = (row * self.width + column) * 3;
+        [0, 1, 2].map(|channel| self.samples[index + channel])
     }
 
-    /// Fills a rectangle at `[top, left]` with the colours of `colour`, by row and column.
+    /// Fills a rectangle. `colour` is called with the row and column within the rectangle.
     fn fill(
         &mut self,
         [top, left]: [usize; 2],
@@ -70,7 +72,7 @@ impl SheetCanvas {
         }
     }
 
-    /// Writes a line of text, cut to `width` pixels.
+    /// Writes a line of text, cut off at `width` pixels.
     fn write(&mut self, [top, left]: [usize; 2], width: usize, text: &str, ink: [u8; 3]) {
         let step = letter_width();
         for (index, letter) in text.chars().take(width / step).enumerate() {
@@ -83,11 +85,13 @@ impl SheetCanvas {
                     let (row, column) = (top + y, left + index * step + x);
                     if *weight > 0 && row < self.height && column < self.width {
                         let below = self.pixel(row, column);
-                        let mix = |i: usize| {
-                            let (w, a, b) = (u32::from(*weight), ink[i], below[i]);
-                            ((u32::from(a) * w + u32::from(b) * (255 - w) + 127) / 255) as u8
-                        };
-                        self.set(row, column, [mix(0), mix(1), mix(2)]);
+                        let weight = u32::from(*weight);
+                        let mixed = [0, 1, 2].map(|channel| {
+                            let (ink, below) = (u32::from(ink[channel]), below[channel]);
+                            let sum = ink * weight + u32::from(below) * (255 - weight);
+                            ((sum + 127) / 255) as u8
+                        });
+                        self.set(row, column, mixed);
                     }
                 }
             }
@@ -101,7 +105,7 @@ impl SheetCanvas {
     }
 }
 
-/// A text in lines of a width in pixels, cut between words; none for an empty text.
+/// Breaks a text between words into lines of at most `width` pixels. A single longer word keeps its length.
 fn lines(text: &str, width: usize) -> Vec<String> {
     let letters = width / letter_width();
     let mut lines: Vec<String> = Vec::new();
@@ -121,32 +125,38 @@ fn letter_width() -> usize {
     get_raster_width(FontWeight::Regular, RasterHeight::Size20)
 }
 
-/// Size of an image in a cell: height, width. Wider images are scaled down to a width of [`CELL`].
-fn fitted(height: usize, width: usize) -> [usize; 2] {
+/// Height and width of an image on a sheet. Wider images are scaled down to a width of [`CELL`].
+fn fitted_size(image: &Rgb) -> [usize; 2] {
+    fit_to_cell(image.height(), image.width())
+}
+
+fn fit_to_cell(height: usize, width: usize) -> [usize; 2] {
     if width <= CELL {
         return [height, width];
     }
     [(height * CELL / width).max(1), CELL]
 }
 
-/// Mean colour of the pixels that one pixel of a smaller image covers.
-fn mean(image: &Rgb, [height, width]: [usize; 2], row: usize, column: usize) -> [u8; 3] {
-    let span = |at: usize, of: usize, from: usize| {
-        let begin = at * from / of;
-        begin..((at + 1) * from / of).max(begin + 1)
-    };
+/// Colour of a pixel if an image is scaled down to a height and width: the mean of the pixels that it covers.
+fn mean_colour(image: &Rgb, [height, width]: [usize; 2], row: usize, column: usize) -> [u8; 3] {
     let mut sums = [0_u64; 3];
     let mut n = 0;
-    for y in span(row, height, image.height()) {
-        for x in span(column, width, image.width()) {
-            let at = (y * image.width() + x) * 3;
-            for (sum, code) in sums.iter_mut().zip(&image.samples()[at..at + 3]) {
+    for y in covered_pixels(row, height, image.height()) {
+        for x in covered_pixels(column, width, image.width()) {
+            let index = (y * image.width() + x) * 3;
+            for (sum, code) in sums.iter_mut().zip(&image.samples()[index..index + 3]) {
                 *sum += u64::from(*code);
             }
             n += 1;
         }
     }
     sums.map(|sum| ((sum + n / 2) / n) as u8)
+}
+
+/// Rows or columns of the original that one row or column covers if a side is scaled from `original` to `scaled` pixels; at least one.
+fn covered_pixels(index: usize, scaled: usize, original: usize) -> Range<usize> {
+    let begin = index * original / scaled;
+    begin..((index + 1) * original / scaled).max(begin + 1)
 }
 
 #[cfg(test)]
@@ -157,23 +167,23 @@ mod tests {
     fn text_is_cut_at_its_width() {
         let mut canvas = SheetCanvas::new(LINE, 100);
         canvas.write([0, 0], 50, "MMMMMMMMMMMM", [0, 0, 0]);
-        let inked = |from: usize| {
-            (0..LINE).any(|row| (from..100).any(|column| canvas.pixel(row, column) != [255; 3]))
-        };
-        assert!(inked(0) && !inked(50));
+        let [has_text, has_text_beyond] = [0..50, 50..100].map(|mut columns| {
+            columns.any(|column| (0..LINE).any(|row| canvas.pixel(row, column) != [255; 3]))
+        });
+        assert!(has_text && !has_text_beyond);
     }
 
     #[test]
-    fn a_smaller_image_holds_the_means() {
+    fn scaling_down_averages_pixels() {
         let image = Rgb::new(2, 4, (0..24).collect()).unwrap();
-        assert_eq!(mean(&image, [1, 2], 0, 0), [8, 9, 10]);
-        assert_eq!(mean(&image, [2, 4], 1, 3), [21, 22, 23]);
+        assert_eq!(mean_colour(&image, [1, 2], 0, 0), [8, 9, 10]);
+        assert_eq!(mean_colour(&image, [2, 4], 1, 3), [21, 22, 23]);
     }
 
     #[test]
     fn images_are_never_wider_than_their_cell() {
-        assert_eq!(fitted(720, 1280), [202, CELL]);
-        assert_eq!(fitted(3, 5), [3, 5]);
-        assert_eq!(fitted(1, 5000), [1, CELL]);
+        assert_eq!(fit_to_cell(720, 1280), [202, CELL]);
+        assert_eq!(fit_to_cell(3, 5), [3, 5]);
+        assert_eq!(fit_to_cell(1, 5000), [1, CELL]);
     }
 }

@@ -1,11 +1,11 @@
-//! The terms of the noise model as separate images: [`noise()`].
+//! Figure of the noise terms, one image for each: [`noise()`].
 
 use ndarray::Array2;
 
 use super::{CELL, GAP, LINE, SheetCanvas, lines};
 use crate::types::Rgb;
 
-/// One noise term on the sensor.
+/// Noise term on the sensor.
 #[derive(Debug, Clone)]
 pub(crate) struct Signal {
     /// Label of the image.
@@ -14,23 +14,19 @@ pub(crate) struct Signal {
     pub adu: Array2<f32>,
 }
 
-/// A sheet with the middle of each signal at full resolution around mid grey, with its mean and standard deviation, which are
-/// those of the whole signal.
+/// Draws the middle of each signal at full resolution, with the mean and standard deviation of the whole signal.
 ///
-/// Black is three standard deviations below the mean, and white three above it. So all signals look alike, and each has its own scale
-/// in ADU beside it. `foot` stands below them.
+/// Each signal has its own grey scale: black is three standard deviations below its mean and white three above, written in ADU above the
+/// image. `foot` is written below all images.
 #[must_use]
 pub(crate) fn noise(signals: &[Signal], foot: &str) -> Rgb {
     const COLUMNS: usize = 3;
-    let side = |length: fn(&Array2<f32>) -> usize, max: usize| {
-        signals
-            .iter()
-            .map(|signal| length(&signal.adu))
-            .min()
-            .unwrap_or(1)
-            .min(max)
-    };
-    let (height, width) = (side(Array2::nrows, CELL * 3 / 4), side(Array2::ncols, CELL));
+    let (height, width) = signals
+        .iter()
+        .map(|signal| signal.adu.dim())
+        .reduce(|least, size| (least.0.min(size.0), least.1.min(size.1)))
+        .unwrap_or((1, 1));
+    let (height, width) = (height.min(CELL * 3 / 4), width.min(CELL));
     let step = [GAP + 3 * LINE + height, GAP + CELL];
     let below = signals.len().div_ceil(COLUMNS) * step[0] + GAP;
     let sheet_width = COLUMNS * step[1] + GAP;
@@ -79,31 +75,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_deviations_are_black_and_white() {
+    fn black_and_white_are_three_deviations_from_the_mean() {
         let adu = Array2::from_shape_fn((8, 8), |(row, _)| if row % 2 == 0 { 1.0 } else { 3.0 });
         let [mean, deviation] = moments(&adu);
         assert!((mean - 2.0).abs() < 1e-9 && (deviation - 1.0).abs() < 1e-9);
         let name = "row".to_owned();
         let sheet = noise(&[Signal { name, adu }], "");
-        let has = |code: u8| sheet.samples().contains(&code);
-        assert!(has(85) && has(170));
+        assert!(sheet.samples().contains(&85) && sheet.samples().contains(&170));
     }
 
     #[test]
     fn flat_and_tiny_signals_are_grey() {
-        let signal = |size| Signal {
+        let signals = [(1, 1), (500, 2), (2, 500), (9, 9)].map(|size| Signal {
             name: "a name that is longer than its place on the sheet is".to_owned(),
             adu: Array2::zeros(size),
-        };
-        let sheet = noise(
-            &[
-                signal((1, 1)),
-                signal((500, 2)),
-                signal((2, 500)),
-                signal((9, 9)),
-            ],
-            "sony-a7s2, seed 0",
-        );
+        });
+        let sheet = noise(&signals, "sony-a7s2, seed 0");
         assert!(sheet.samples().contains(&128));
         assert_eq!(noise(&[], "").width(), 3 * (GAP + CELL) + GAP);
     }

@@ -1,39 +1,37 @@
-//! Lines, bands and marks with smooth edges on a sheet. Places are `[x, y]` in pixels, from the upper left corner.
+//! Anti-aliased lines and bands on a sheet. Points are `[x, y]` in pixels, from the upper left corner.
+
+use std::ops::Range;
 
 use super::SheetCanvas;
 
 impl SheetCanvas {
-    /// Mixes a colour into a pixel, by a share from 0 to 1; pixels outside the sheet are ignored.
-    fn mix(&mut self, row: usize, column: usize, colour: [u8; 3], share: f64) {
+    /// Blends a colour into a pixel with an opacity from 0 to 1; pixels outside the sheet are ignored.
+    fn blend(&mut self, row: usize, column: usize, colour: [u8; 3], opacity: f64) {
         if row >= self.height || column >= self.width {
             return;
         }
         let below = self.pixel(row, column);
-        let mixed = |i: usize| {
-            let (above, below) = (f64::from(colour[i]), f64::from(below[i]));
-            (below + (above - below) * share).round() as u8
-        };
-        self.set(row, column, [mixed(0), mixed(1), mixed(2)]);
+        let blended = [0, 1, 2].map(|channel| {
+            let (above, below) = (f64::from(colour[channel]), f64::from(below[channel]));
+            (below + (above - below) * opacity).round() as u8
+        });
+        self.set(row, column, blended);
     }
 
-    /// Draws a straight line. A pixel is covered as far as its centre is inside the width of the line, which makes its edges smooth.
+    /// Draws a straight line. The opacity of a pixel falls with the distance of its centre from the line, which smooths the edges.
     pub(super) fn line(&mut self, ends: [[f64; 2]; 2], width: f64, colour: [u8; 3]) {
         let [from, to] = ends;
         let reach = width / 2.0 + 1.0;
-        let range = |axis: usize| {
-            let (low, high) = (from[axis].min(to[axis]), from[axis].max(to[axis]));
-            (low - reach).max(0.0) as usize..(high + reach).max(0.0) as usize + 1
-        };
         let along = [to[0] - from[0], to[1] - from[1]];
-        let length = (along[0] * along[0] + along[1] * along[1]).max(1e-9);
-        for row in range(1) {
-            for column in range(0) {
+        let squared_length = (along[0] * along[0] + along[1] * along[1]).max(1e-9);
+        for row in pixel_range(from[1], to[1], reach) {
+            for column in pixel_range(from[0], to[0], reach) {
                 let [x, y] = [column as f64 + 0.5, row as f64 + 0.5];
-                let part = ((x - from[0]) * along[0] + (y - from[1]) * along[1]) / length;
+                let part = ((x - from[0]) * along[0] + (y - from[1]) * along[1]) / squared_length;
                 let part = part.clamp(0.0, 1.0);
                 let nearest = [from[0] + part * along[0], from[1] + part * along[1]];
                 let distance = (x - nearest[0]).hypot(y - nearest[1]);
-                self.mix(
+                self.blend(
                     row,
                     column,
                     colour,
@@ -43,60 +41,67 @@ impl SheetCanvas {
         }
     }
 
-    /// Draws a line through places, with dashes of a length and a gap if they are given.
+    /// Draws a line through points. `dash` is the length of dashes and gaps in pixels; `None` draws a solid line.
     pub(super) fn path(
         &mut self,
-        places: &[[f64; 2]],
+        points: &[[f64; 2]],
         dash: Option<[f64; 2]>,
         width: f64,
         colour: [u8; 3],
     ) {
         let Some([drawn, gap]) = dash else {
-            for ends in places.windows(2) {
+            for ends in points.windows(2) {
                 self.line([ends[0], ends[1]], width, colour);
             }
             return;
         };
-        let mut walked = 0.0;
-        for ends in places.windows(2) {
+        let mut path_length = 0.0;
+        for ends in points.windows(2) {
             let along = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
             let length = along[0].hypot(along[1]);
             let at = |distance: f64| {
                 let part = (distance / length.max(1e-9)).clamp(0.0, 1.0);
                 [ends[0][0] + part * along[0], ends[0][1] + part * along[1]]
             };
-            // The dashes go on over the corners of the path.
-            let mut start = -(walked % (drawn + gap));
+            // Dashes continue around the corners of the path.
+            let mut start = -(path_length % (drawn + gap));
             while start < length {
                 if start + drawn > 0.0 {
                     self.line([at(start), at(start + drawn)], width, colour);
                 }
                 start += drawn + gap;
             }
-            walked += length;
+            path_length += length;
         }
     }
 
-    /// Tints the area between two lines, given as `[x, upper y, lower y]` from left to right.
-    pub(super) fn band(&mut self, points: &[[f64; 3]], colour: [u8; 3], share: f64) {
+    /// Tints the area between two lines. Points are `[x, upper y, lower y]` from left to right.
+    pub(super) fn band(&mut self, points: &[[f64; 3]], colour: [u8; 3], opacity: f64) {
         for ends in points.windows(2) {
             let [from, to] = [ends[0], ends[1]];
             for column in from[0].round() as usize..to[0].round() as usize {
                 let part = (column as f64 + 0.5 - from[0]) / (to[0] - from[0]).max(1e-9);
-                let at = |i: usize| (from[i] + part * (to[i] - from[i])).round() as usize;
-                for row in at(1)..at(2) {
-                    self.mix(row, column, colour, share);
+                let [upper, lower] =
+                    [1, 2].map(|i| (from[i] + part * (to[i] - from[i])).round() as usize);
+                for row in upper..lower {
+                    self.blend(row, column, colour, opacity);
                 }
             }
         }
     }
 }
 
+/// Rows or columns that are at most `reach` pixels from the range between two coordinates.
+fn pixel_range(a: f64, b: f64, reach: f64) -> Range<usize> {
+    let (low, high) = (a.min(b), a.max(b));
+    (low - reach).max(0.0) as usize..(high + reach).max(0.0) as usize + 1
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn inked(canvas: &SheetCanvas) -> usize {
+    fn count_drawn_pixels(canvas: &SheetCanvas) -> usize {
         canvas
             .samples
             .chunks(3)
@@ -115,14 +120,13 @@ mod tests {
     }
 
     #[test]
-    fn dashes_leave_their_gaps_also_over_corners() {
-        let places = [[0.0, 10.0], [50.0, 10.0], [100.0, 10.0]];
-        let ink = |dash| {
+    fn dashes_leave_gaps() {
+        let points = [[0.0, 10.0], [50.0, 10.0], [100.0, 10.0]];
+        let [solid, dashed] = [None, Some([6.0, 6.0])].map(|dash| {
             let mut canvas = SheetCanvas::new(20, 100);
-            canvas.path(&places, dash, 2.0, [0; 3]);
-            inked(&canvas)
-        };
-        let (solid, dashed) = (ink(None), ink(Some([6.0, 6.0])));
+            canvas.path(&points, dash, 2.0, [0; 3]);
+            count_drawn_pixels(&canvas)
+        });
         assert!(
             dashed > solid / 3 && dashed < solid * 4 / 5,
             "{dashed} of {solid}"
@@ -134,6 +138,6 @@ mod tests {
         let mut canvas = SheetCanvas::new(8, 8);
         canvas.line([[-50.0, -50.0], [50.0, 50.0]], 3.0, [0; 3]);
         canvas.band(&[[0.0, 2.0, 90.0], [90.0, 2.0, 90.0]], [9; 3], 0.5);
-        assert!(inked(&canvas) > 0);
+        assert!(count_drawn_pixels(&canvas) > 0);
     }
 }

@@ -1,10 +1,10 @@
-//! The figure of fidelity against answers: [`drawing`].
+//! Figure of image fidelity and right answers by level: [`figure_spec`].
 
 use std::collections::BTreeMap;
 
-use crate::drawing::chart::drawn::Drawn;
-use crate::drawing::chart::{Chart, LineStyle, Panel, PanelContent, PlotLine};
-use crate::drawing::figures::Drawing;
+use crate::drawing::chart::figure_chart::FigureChart;
+use crate::drawing::chart::{Chart, LineContent, LineStyle, Panel, PlotLine};
+use crate::drawing::figures::FigureSpec;
 use crate::text::words::light;
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Variant};
@@ -12,41 +12,51 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::ConditionFidelity;
 
-/// A light: a variant, raw or with an enhancer.
+/// Variant, and enhancer if there is one.
 type Light<'f> = (&'f Variant, Option<&'f EnhancerName>);
 
-/// A number of a condition as a share, with its interval where it has one.
-type Quantity = fn(&ConditionFidelity) -> Option<Estimate>;
+/// Content of the panel of one quantity.
+struct PanelSpec {
+    title: &'static str,
+    /// Reads the quantity, as a share, from the results of a condition.
+    quantity: fn(&ConditionFidelity) -> Option<Estimate>,
+    /// Value of the quantity by chance, drawn as a horizontal line.
+    chance: Option<f64>,
+}
 
-/// Style of the line of chance.
-const CHANCE: LineStyle = LineStyle::REFERENCE;
-
-/// The panels: title, number, and the share that chance has.
-const PANELS: [(&str, Quantity, Option<f64>); 3] = [
-    ("SSIM of the images", |row| known(row.means[1]?), None),
-    ("share of right answers", |row| known(row.accuracy), None),
-    (
-        "AUC of PSNR",
-        |row| Some(row.predicts[0]?.auc.estimate),
-        Some(0.5),
-    ),
+const PANELS: [PanelSpec; 3] = [
+    PanelSpec {
+        title: "SSIM of the images",
+        quantity: |row| without_interval(row.means[1]?),
+        chance: None,
+    },
+    PanelSpec {
+        title: "share of right answers",
+        quantity: |row| without_interval(row.accuracy),
+        chance: None,
+    },
+    PanelSpec {
+        title: "AUC of PSNR",
+        quantity: |row| Some(row.predicts[0]?.auc.estimate),
+        chance: Some(0.5),
+    },
 ];
 
-/// Similarity of the images, accuracy, and how well similarity tells right from wrong answers, by level: a row of panels for each
-/// axis, a line for each light.
-/// `None` where no image was measured.
-pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
+/// Image similarity, accuracy, and how well similarity predicts right answers, by level: a row of panels for each axis, and a line for
+/// each variant and enhancer. `None` if no image was measured.
+pub(super) fn figure_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     let fidelity = findings.fidelity.as_ref()?;
     let mut lights = BTreeMap::<Light<'_>, Vec<&ConditionFidelity>>::new();
-    // A photograph in the dark lies at no level.
-    let at_levels = fidelity.conditions.iter();
-    for row in at_levels.filter(|row| row.level != AxisLevel::PAIR) {
-        let light = (&row.variant, row.enhancer.as_ref());
-        lights.entry(light).or_default().push(row);
+    for row in &fidelity.conditions {
+        // Photographs in the dark are not at a level.
+        if row.level != AxisLevel::PAIR {
+            let light = (&row.variant, row.enhancer.as_ref());
+            lights.entry(light).or_default().push(row);
+        }
     }
     let panels: Vec<Panel> = Axis::ALL
         .into_iter()
-        .flat_map(|axis| PANELS.map(|panel| self::panel(&lights, axis, panel)))
+        .flat_map(|axis| PANELS.map(|spec| panel(&lights, axis, &spec)))
         .filter(|panel| panel.lines.iter().any(is_curve))
         .collect();
     if panels.is_empty() {
@@ -65,56 +75,59 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
             findings.unit
         ),
     };
-    Some(Drawing {
+    Some(FigureSpec {
         name: "fidelity",
         caption: "Does a better picture mean better answers? Between conditions: how similar the images are to their clean frames \
                   and how many answers are right. Within a condition: AUC of PSNR, 50 is chance. PSNR and the AUC of SSIM are in the table."
             .to_owned(),
-        chart: Drawn::Lines(chart),
+        chart: FigureChart::Lines(chart),
     })
 }
 
 fn is_curve(line: &PlotLine) -> bool {
-    matches!(line.content, PanelContent::Curve(_))
+    matches!(line.content, LineContent::Curve(_))
 }
 
 fn panel(
     lights: &BTreeMap<Light<'_>, Vec<&ConditionFidelity>>,
     axis: Axis,
-    (title, quantity, chance): (&str, Quantity, Option<f64>),
+    spec: &PanelSpec,
 ) -> Panel {
-    let curves = lights.iter().enumerate();
-    let of_axis =
-        curves.filter(|(_, ((variant, _), _))| variant.kind.map(Kind::axis) == Some(axis));
-    let curves = of_axis.filter_map(|(style, ((variant, enhancer), rows))| {
+    let mut lines = Vec::new();
+    for (style, ((variant, enhancer), rows)) in lights.iter().enumerate() {
+        if variant.kind.map(Kind::axis) != Some(axis) {
+            continue;
+        }
         let points: Vec<_> = rows
             .iter()
-            .filter_map(|row| Some((row.level, quantity(row)?)))
+            .filter_map(|row| Some((row.level, (spec.quantity)(row)?)))
             .collect();
-        (!points.is_empty()).then(|| PlotLine {
-            name: light(variant, *enhancer),
-            style: LineStyle(style),
-            content: PanelContent::Curve(points),
-            model: None,
-            items: None,
-        })
-    });
-    let chance = chance.map(|share| PlotLine {
+        if !points.is_empty() {
+            lines.push(PlotLine {
+                name: light(variant, *enhancer),
+                style: LineStyle(style),
+                content: LineContent::Curve(points),
+                model: None,
+                items: None,
+            });
+        }
+    }
+    lines.extend(spec.chance.map(|share| PlotLine {
         name: "chance".to_owned(),
-        style: CHANCE,
-        content: PanelContent::Flat(share),
+        style: LineStyle::REFERENCE,
+        content: LineContent::Flat(share),
         model: None,
         items: None,
-    });
+    }));
     Panel {
-        title: title.to_owned(),
-        lines: curves.chain(chance).collect(),
+        title: spec.title.to_owned(),
+        lines,
         model: None,
     }
 }
 
 /// A number without an interval.
-fn known(value: impl Into<Option<f64>>) -> Option<Estimate> {
+fn without_interval(value: impl Into<Option<f64>>) -> Option<Estimate> {
     value.into().map(|value| Estimate {
         value,
         low: value,

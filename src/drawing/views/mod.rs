@@ -1,18 +1,19 @@
-//! Figures of views that few runs have the data for: [`drawings`].
+//! Figures that need data of few runs: image fidelity, photographs in the dark, or probabilities of answers ([`figure_specs`]).
 
 mod fidelity;
 mod real;
 mod reliability;
 
-use crate::drawing::figures::Drawing;
+use crate::drawing::figures::FigureSpec;
 use darkqa_score::findings::Findings;
 
-/// The figures for which there are data.
-pub(crate) fn drawings(findings: &Findings<'_>) -> impl Iterator<Item = Drawing> {
-    let all = [
-        fidelity::drawing(findings),
-        real::drawing(findings),
-        reliability::drawing(findings),
-    ];
-    all.into_iter().flatten()
+/// The figures that have data.
+pub(crate) fn figure_specs(findings: &Findings<'_>) -> impl Iterator<Item = FigureSpec> {
+    [
+        fidelity::figure_spec(findings),
+        real::figure_spec(findings),
+        reliability::figure_spec(findings),
+    ]
+    .into_iter()
+    .flatten()
 }

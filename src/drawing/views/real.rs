@@ -1,20 +1,23 @@
-//! The figure of photographs in the dark beside synthetic images that are as dark: [`drawing`].
+//! Figure of photographs in the dark compared with synthetic images of the same darkness: [`figure_spec`].
 
 use crate::drawing::chart::LineStyle;
 use crate::drawing::chart::bars::{Bar, BarChart, BarPanel};
-use crate::drawing::chart::drawn::Drawn;
-use crate::drawing::figures::Drawing;
+use crate::drawing::chart::figure_chart::FigureChart;
+use crate::drawing::figures::FigureSpec;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::ComparisonKind;
 use darkqa_score::findings::Findings;
+use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::subject::ModelInCondition;
 
-/// Accuracy of each model in the light, on photographs in the dark, on synthetic images that are as dark, and on enhanced
-/// photographs; `None` where no scene was photographed in the dark.
-pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
-    let chance = findings.summary.family_cells(None, ReadingMode::Strict);
-    let mut chance = chance.filter(|cell| cell.subject.view.is_none());
-    let line = chance.find_map(|cell| Some(cell.accuracy?.value));
+/// Accuracy of each model at L0, on photographs in the dark, on synthetic images that are as dark, and on enhanced photographs; `None` if
+/// no scene was photographed in the dark.
+pub(super) fn figure_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
+    let chance = findings
+        .summary
+        .family_cells(None, ReadingMode::Strict)
+        .filter(|cell| cell.subject.view.is_none())
+        .find_map(|cell| Some(cell.accuracy?.value));
     let mut models: Vec<&str> = Vec::new();
     for subject in &findings.grid.subjects {
         if models.last() != Some(&&*subject.model) {
@@ -25,45 +28,10 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
         .pairs
         .iter()
         .flat_map(|pair| models.iter().map(move |model| (pair, *model)))
-        .map(|(pair, model)| {
-            let rows = findings.comparisons.iter().filter(|row| {
-                row.family.is_none()
-                    && row.first.model == model
-                    && row.first.variant.photograph() == Some(&pair.name)
-            });
-            let mut shown: Vec<&ModelInCondition> = Vec::new();
-            let mut bars = Vec::new();
-            for row in rows {
-                // The light, the photograph, what is as dark, and the enhanced photograph, each once.
-                if !matches!(
-                    row.kind,
-                    ComparisonKind::Level
-                        | ComparisonKind::RealSynthetic
-                        | ComparisonKind::RealEnhanced
-                ) {
-                    continue;
-                }
-                for subject in [&row.second, &row.first] {
-                    if shown.contains(&subject) {
-                        continue;
-                    }
-                    shown.push(subject);
-                    let cell = findings.summary.cell(subject, None, ReadingMode::Strict);
-                    let Some(share) = cell.and_then(|cell| cell.accuracy) else {
-                        continue;
-                    };
-                    bars.push(Bar {
-                        name: subject.condition(),
-                        style: LineStyle(bars.len()),
-                        share,
-                    });
-                }
-            }
-            BarPanel {
-                title: format!("{model}: accuracy in %"),
-                bars,
-                line,
-            }
+        .map(|(pair, model)| BarPanel {
+            title: format!("{model}: accuracy in %"),
+            bars: bars(findings, pair, model),
+            chance,
         })
         .filter(|panel| panel.bars.len() > 1)
         .collect();
@@ -77,11 +45,46 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
             findings.unit
         ),
     };
-    Some(Drawing {
+    Some(FigureSpec {
         name: "real",
         caption: "Real against synthetic darkness: accuracy in the light (L0), on photographs in the dark, on synthetic images \
                   that are as dark, and on enhanced photographs. Broken line: chance."
             .to_owned(),
-        chart: Drawn::Bars(chart),
+        chart: FigureChart::Bars(chart),
     })
+}
+
+/// Bars of a model for one set of photographs. Each condition that is compared with the photographs has one bar.
+fn bars(findings: &Findings<'_>, pair: &PairDarkness, model: &str) -> Vec<Bar> {
+    let mut subjects: Vec<&ModelInCondition> = Vec::new();
+    let mut bars = Vec::new();
+    for row in &findings.comparisons {
+        let is_compared = row.family.is_none()
+            && row.first.model == model
+            && row.first.variant.photograph() == Some(&pair.name)
+            && matches!(
+                row.kind,
+                ComparisonKind::Level
+                    | ComparisonKind::RealSynthetic
+                    | ComparisonKind::RealEnhanced
+            );
+        if !is_compared {
+            continue;
+        }
+        for subject in [&row.second, &row.first] {
+            if subjects.contains(&subject) {
+                continue;
+            }
+            subjects.push(subject);
+            let cell = findings.summary.cell(subject, None, ReadingMode::Strict);
+            if let Some(share) = cell.and_then(|cell| cell.accuracy) {
+                bars.push(Bar {
+                    name: subject.condition(),
+                    style: LineStyle(bars.len()),
+                    share,
+                });
+            }
+        }
+    }
+    bars
 }

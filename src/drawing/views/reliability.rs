@@ -1,21 +1,22 @@
-//! The figure of accuracy over confidence: [`drawing`].
+//! Reliability diagram, accuracy over confidence: [`figure_spec`].
 
 use std::collections::BTreeSet;
 
 use crate::drawing::chart::LineStyle;
-use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::chart::reliability::{ReliabilityChart, ReliabilityLine, ReliabilityPanel};
-use crate::drawing::figures::Drawing;
+use crate::drawing::figures::FigureSpec;
 use crate::text::words::light;
 use crate::types::AxisLevel;
 use darkqa_score::calibration::Calibration;
 use darkqa_score::findings::Findings;
 
-/// Most levels of a panel: L0, the darkest, and what lies between, spread.
-const MOST_LEVELS: usize = 4;
+/// Maximum number of levels in a panel (chosen).
+const MAX_LEVELS: usize = 4;
 
-/// Accuracy over confidence of each model in the main variant, raw, a line a level; `None` without probabilities of choices.
-pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
+/// Accuracy over confidence of each model in the main variant without enhancement, one line for each level; `None` if the servers
+/// returned no probabilities of the choices.
+pub(super) fn figure_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     let variant = findings.grid.main_variant();
     let rows: Vec<(&Calibration, AxisLevel)> = findings
         .calibrations
@@ -30,7 +31,7 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
     let levels = spread(&levels.into_iter().collect::<Vec<_>>());
     let mut panels: Vec<ReliabilityPanel> = Vec::new();
     for (row, level) in rows {
-        let Some(style) = levels.iter().position(|shown| *shown == level) else {
+        let Some(style) = levels.iter().position(|other| *other == level) else {
             continue;
         };
         let line = ReliabilityLine {
@@ -66,22 +67,22 @@ pub(super) fn drawing(findings: &Findings<'_>) -> Option<Drawing> {
             findings.unit
         ),
     };
-    Some(Drawing {
+    Some(FigureSpec {
         name: "reliability",
         caption: "Is a model as often right as it is confident? Accuracy over confidence; on the dotted diagonal both are equal, below it \
                   the model is overconfident."
             .to_owned(),
-        chart: Drawn::Reliability(chart),
+        chart: FigureChart::Reliability(chart),
     })
 }
 
-/// At most [`MOST_LEVELS`] of these levels, with the first and the last.
+/// Selects at most [`MAX_LEVELS`] levels, evenly from the first to the last.
 fn spread(levels: &[AxisLevel]) -> Vec<AxisLevel> {
     let last = levels.len().saturating_sub(1);
-    if levels.len() <= MOST_LEVELS {
+    if levels.len() <= MAX_LEVELS {
         return levels.to_vec();
     }
-    (0..MOST_LEVELS)
-        .map(|place| levels[(place * last).div_ceil(MOST_LEVELS - 1)])
+    (0..MAX_LEVELS)
+        .map(|place| levels[(place * last).div_ceil(MAX_LEVELS - 1)])
         .collect()
 }

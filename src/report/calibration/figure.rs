@@ -1,4 +1,4 @@
-//! The figure of a measured camera, as SVG: [`figure`].
+//! Figure of a camera calibration, as SVG: [`figure`].
 
 use crate::calibrate::{CameraFit, NoiseLine, SettingFit};
 use crate::drawing::chart::LineStyle;
@@ -6,16 +6,16 @@ use crate::drawing::chart::points::{PointPanel, PointSeries};
 use crate::drawing::paper::point_figure;
 use crate::error::Result;
 
-/// Photon transfer with its lines, the probability plots of the read noise, and both deviations over K.
+/// Draws three panels: photon transfer, probability plots of the read noise, and the deviations of read and row noise over the gain K.
 ///
 /// # Errors
-/// If the figure cannot be written.
+/// If the figure cannot be drawn.
 pub(crate) fn figure(camera: &CameraFit) -> Result<String> {
     point_figure(&[transfer(camera), probability(camera), deviations(camera)])
 }
 
-/// A series for each setting.
-fn by_setting(
+/// One series for each camera setting.
+fn setting_series(
     camera: &CameraFit,
     series: impl Fn(&SettingFit, LineStyle) -> PointSeries,
 ) -> Vec<PointSeries> {
@@ -27,15 +27,14 @@ fn by_setting(
         .collect()
 }
 
-/// Variance over signal of each exposure and plane on logarithmic axes, with the line of K.
+/// Panel of variance over signal for each exposure and colour plane on logarithmic axes, with the fitted line of K.
 fn transfer(camera: &CameraFit) -> PointPanel {
-    let series = by_setting(camera, |fit, style| {
-        let positive = |[signal, variance]: &&[f64; 2]| *signal > 0.0 && *variance > 0.0;
+    let series = setting_series(camera, |fit, style| {
         let points: Vec<[f64; 2]> = fit
             .figure
             .transfer
             .iter()
-            .filter(positive)
+            .filter(|[signal, variance]| *signal > 0.0 && *variance > 0.0)
             .map(|point| point.map(libm::log10))
             .collect();
         let signals = points.iter().map(|[signal, _]| *signal);
@@ -43,11 +42,12 @@ fn transfer(camera: &CameraFit) -> PointPanel {
         let line = ends
             .into_iter()
             .flatten()
-            .map(|signal| [signal, signal + libm::log10(fit.gain.value)]);
+            .map(|signal| [signal, signal + libm::log10(fit.gain.value)])
+            .collect();
         PointSeries {
             name: format!("{}: K {:.4}", fit.name, fit.gain.value),
             style,
-            lines: vec![line.collect()],
+            lines: vec![line],
             points,
         }
     });
@@ -58,9 +58,9 @@ fn transfer(camera: &CameraFit) -> PointPanel {
     }
 }
 
-/// Residuals over the fitted scale, over the quantiles of the fitted distribution: a straight line where the fit is right.
+/// Panel of scaled residuals over the quantiles of the fitted distribution; the points are on a straight line if the fit is good.
 fn probability(camera: &CameraFit) -> PointPanel {
-    let series = by_setting(camera, |fit, style| {
+    let series = setting_series(camera, |fit, style| {
         let points = &fit.figure.plot;
         let ends = [points.first(), points.last()].into_iter().flatten();
         PointSeries {
@@ -77,35 +77,50 @@ fn probability(camera: &CameraFit) -> PointPanel {
     }
 }
 
-/// ln σ over ln K of read and row noise, with their lines.
+/// Panel of ln σ over ln K for read and row noise, with their fitted lines.
 fn deviations(camera: &CameraFit) -> PointPanel {
-    let series = |style, name: &str, sigma: fn(&SettingFit) -> f64, line: &NoiseLine| {
-        let points: Vec<[f64; 2]> = camera
-            .settings
-            .iter()
-            .map(|fit| [fit.gain.value, sigma(fit)])
-            .filter(|[_, sigma]| *sigma > 0.0)
-            .map(|point| point.map(libm::log))
-            .collect();
-        let at = |[x, _]: &[f64; 2]| [*x, libm::log(line.at(libm::exp(*x)))];
-        PointSeries {
-            name: name.to_owned(),
-            style: LineStyle(style),
-            lines: vec![points.iter().map(at).collect()],
-            points,
-        }
-    };
+    let read = deviation_series(camera, |fit| fit.read_scale.value, &camera.read_scale);
+    let row = deviation_series(camera, |fit| fit.row_deviation.value, &camera.row_deviation);
     PointPanel {
         title: "noise over gain".to_owned(),
         axes: ["ln K", "ln σ"],
         series: vec![
-            series(0, "σ_TL", |fit| fit.read_scale.value, &camera.read_scale),
-            series(
-                1,
-                "σ_row",
-                |fit| fit.row_deviation.value,
-                &camera.row_deviation,
-            ),
+            PointSeries {
+                name: "σ_TL".to_owned(),
+                style: LineStyle(0),
+                ..read
+            },
+            PointSeries {
+                name: "σ_row".to_owned(),
+                style: LineStyle(1),
+                ..row
+            },
         ],
+    }
+}
+
+/// Unnamed series of ln σ over ln K with its fitted line. Settings without noise are left out.
+fn deviation_series(
+    camera: &CameraFit,
+    sigma: fn(&SettingFit) -> f64,
+    line: &NoiseLine,
+) -> PointSeries {
+    let points: Vec<[f64; 2]> = camera
+        .settings
+        .iter()
+        .map(|fit| [fit.gain.value, sigma(fit)])
+        .filter(|[_, sigma]| *sigma > 0.0)
+        .map(|point| point.map(libm::log))
+        .collect();
+    PointSeries {
+        name: String::new(),
+        style: LineStyle(0),
+        lines: vec![
+            points
+                .iter()
+                .map(|[x, _]| [*x, libm::log(line.at(libm::exp(*x)))])
+                .collect(),
+        ],
+        points,
     }
 }

@@ -38,7 +38,7 @@ pub(crate) fn table(camera: &CameraFit) -> String {
         camera.white
     );
     let bias_head = format!("terminal bias {} ADU", camera.cfa.plane_names().join(" / "));
-    let layout = TableBuilder::new("calibration", &camera.settings)
+    let settings = TableBuilder::new("calibration", &camera.settings)
         .column(Text, "terminal", |fit| fit.name.clone())
         .column(Text, "terminal K ADU/e", |fit| with_error(fit.gain, 4))
         .column(Text, "terminal σ_TL ADU", |fit| {
@@ -51,8 +51,9 @@ pub(crate) fn table(camera: &CameraFit) -> String {
         .column(Text, "terminal σ_row ADU", |fit| {
             with_error(fit.row_deviation, 4)
         })
-        .column(Text, &*bias_head, |fit| bias_cell(camera, fit));
-    let table = terminal::table(&[layout.build()]);
+        .column(Text, &*bias_head, |fit| bias_cell(camera, fit))
+        .build();
+    let table = terminal::table(&[settings]);
     let noise_lines = [
         noise_line("σ_TL", &camera.read_scale),
         noise_line("σ_row", &camera.row_deviation),
@@ -97,7 +98,7 @@ fn bias_cell(camera: &CameraFit, fit: &SettingFit) -> String {
     }
 }
 
-/// A number with this many decimals and the minus sign U+2212.
+/// Number with `digits` decimals and the minus sign U+2212.
 fn decimal(value: f64, digits: usize) -> String {
     format!("{value:.digits$}").replace('-', "−")
 }

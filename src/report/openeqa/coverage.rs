@@ -1,39 +1,52 @@
-//! Counts of scored and unscored answers, in lines: [`coverage`].
+//! Numbers of scored and unscored answers, as lines of text: [`coverage`].
 
 use super::open_report::OpenReport;
 use darkqa_score::open::{Group, OpenCell};
 
-/// Lines with the number of scored answers, and of answers by every other outcome that occurs.
+/// One line with the number of scored answers, then one line for each other outcome that occurs.
 #[must_use]
 pub(in crate::report) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
-    let all = report
+    let scored = total(report, OpenCell::scored);
+    let planned = total(report, |cell| cell.planned);
+    let unjudged = match report.judge {
+        Some(_) => total(report, |cell| cell.unjudged),
+        None => 0,
+    };
+    let outcomes = [
+        (
+            total(report, |cell| cell.missing),
+            "not answered: not scored",
+        ),
+        (unjudged, "not judged yet: not scored"),
+        (
+            total(report, |cell| cell.unmarked),
+            "without a mark in the judge's reply: not scored (--protocol tolerant reads more, --judge-max-tokens gives it more room)",
+        ),
+        (
+            total(report, |cell| cell.null),
+            "without an answer (none in a file, or no \"A:\" in the reply of a blind model): scored 0, unjudged",
+        ),
+        (
+            total(report, |cell| cell.cut),
+            "cut after their last full stop before they were judged, as upstream does",
+        ),
+    ];
+    let mut lines = vec![format!("{scored} of {planned} answers scored")];
+    for (count, outcome) in outcomes {
+        if count > 0 {
+            lines.push(format!("{count} {outcome}"));
+        }
+    }
+    lines
+}
+
+/// Sum of a count over all models and conditions.
+fn total(report: &OpenReport<'_>, count: fn(&OpenCell) -> usize) -> usize {
+    report
         .summary
         .cells
         .iter()
-        .filter(|cell| cell.group == Group::All);
-    let sum = |count: fn(&OpenCell) -> usize| -> usize { all.clone().map(count).sum() };
-    let (scored, planned) = (sum(OpenCell::scored), sum(|cell| cell.planned));
-    let mut lines = vec![format!("{scored} of {planned} answers scored")];
-    let mut add = |count: usize, what: &str| {
-        if count > 0 {
-            lines.push(format!("{count} {what}"));
-        }
-    };
-    add(sum(|cell| cell.missing), "not answered: not scored");
-    if report.judge.is_some() {
-        add(sum(|cell| cell.unjudged), "not judged yet: not scored");
-    }
-    add(
-        sum(|cell| cell.unmarked),
-        "without a mark in the judge's reply: not scored (--protocol tolerant reads more, --judge-max-tokens gives it more room)",
-    );
-    add(
-        sum(|cell| cell.null),
-        "without an answer (none in a file, or no \"A:\" in the reply of a blind model): scored 0, unjudged",
-    );
-    add(
-        sum(|cell| cell.cut),
-        "cut after their last full stop before they were judged, as upstream does",
-    );
-    lines
+        .filter(|cell| cell.group == Group::All)
+        .map(count)
+        .sum()
 }

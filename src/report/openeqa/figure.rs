@@ -2,8 +2,8 @@
 
 use super::open_report::OpenReport;
 use super::tables::ladder;
-use crate::drawing::chart::drawn::Drawn;
-use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use crate::drawing::chart::figure_chart::FigureChart;
+use crate::drawing::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
 use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
@@ -12,7 +12,7 @@ use crate::types::AxisLevel;
 use darkqa_score::open::{Group, OpenCell};
 use darkqa_score::subject::ModelInCondition;
 
-/// One chart of all questions, and one with a panel per category. None if the run has fewer than two levels.
+/// Draws a chart of all questions and a chart with a panel for each category. Empty if the run has fewer than two levels.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     let whole = ladder(report.summary, &Group::All);
     if whole.levels.len() < 2 {
@@ -30,12 +30,6 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
         report.summary.unit,
         counted(report.summary.clusters, "cluster")
     );
-    let chart = |panels: Vec<Panel>, columns: usize| Chart {
-        measure: "score in %",
-        panels,
-        columns,
-        note: note.clone(),
-    };
     let charts = [
         (
             "scores",
@@ -44,15 +38,25 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
             } else {
                 "Score by level. Broken lines: without images."
             },
-            chart(panels(report, &Group::All, &whole), 1),
+            panels(report, &Group::All, &whole),
+            1,
         ),
-        ("categories", "Score by category.", chart(categories, 3)),
+        ("categories", "Score by category.", categories, 3),
     ];
-    charts
-        .into_iter()
-        .filter(|(_, _, chart)| !chart.panels.is_empty())
-        .map(|(name, caption, chart)| figure(name, caption, &Drawn::Lines(chart)))
-        .collect()
+    let mut figures = Vec::new();
+    for (name, caption, panels, columns) in charts {
+        if panels.is_empty() {
+            continue;
+        }
+        let chart = Chart {
+            measure: "score in %",
+            panels,
+            columns,
+            note: note.clone(),
+        };
+        figures.push(figure(name, caption, &FigureChart::Lines(chart))?);
+    }
+    Ok(figures)
 }
 
 /// Panels of a group of questions: one per degradation axis.
@@ -113,7 +117,7 @@ fn curve(
     PlotLine {
         name: format!("{}, {}", series.model, series.light(&[])),
         style,
-        content: PanelContent::Curve(points),
+        content: LineContent::Curve(points),
         model: Some(series.model.to_owned()),
         items: None,
     }
@@ -124,7 +128,7 @@ fn flat_line(subject: &ModelInCondition, cell: &OpenCell, style: LineStyle) -> O
     Some(PlotLine {
         name: format!("{} without images", subject.model),
         style,
-        content: PanelContent::Flat(cell.score?.value),
+        content: LineContent::Flat(cell.score?.value),
         model: Some(subject.model.clone()),
         items: None,
     })

@@ -1,6 +1,6 @@
-//! The items of open questions, as the page's script reads them: [`packed`].
+//! Items of open questions for the page's script: [`packed`].
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use super::open_report::{OpenReport, ReportedAnswer};
 use crate::error::Result;
@@ -13,13 +13,13 @@ use crate::types::{AxisLevel, View};
 use darkqa_score::open::{AnswerOutcome, Group};
 use darkqa_score::subject;
 
-/// Why an answer has no mark, by the index that `why` has of it.
+/// Reasons why an answer has no mark. `why` has indices into this list, which failures of answers extend.
 const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was asked"];
 
-/// Everything that the script shows, as compressed JSON in base64.
+/// Packs the data of the script as compressed JSON in base64.
 ///
 /// # Errors
-/// If the data cannot be written.
+/// If the data cannot be serialized.
 pub(super) fn packed(report: &OpenReport<'_>) -> Result<String> {
     let subjects: Vec<&subject::ModelInCondition> = report
         .summary
@@ -31,14 +31,18 @@ pub(super) fn packed(report: &OpenReport<'_>) -> Result<String> {
     packed_by(|limit| data(report, &subjects, limit))
 }
 
-/// The results of all subjects, a row each, a column for each item.
+/// Results of all answers. Nested lists have a row for each subject and a column for each item.
 struct Results<'a> {
     items: Vec<Item>,
+    /// Mark of each answer, or the code of another outcome.
     codes: Vec<Vec<u8>>,
+    /// Index into `reasons` for each answer.
     why: Vec<Vec<usize>>,
     reasons: Vec<String>,
     texts: Vec<&'a str>,
+    /// Index into `texts` for each answer.
     replies: Vec<Vec<usize>>,
+    /// Index into `texts` for the judge's reply to each answer.
     judged: Vec<Vec<usize>>,
 }
 
@@ -76,7 +80,10 @@ fn data<'a>(
         thumbnails: thumbnails(report.thumbnails, &frames.indices, limit.pictures),
         families: families.list,
         frames: frames.list,
-        subjects: subjects.iter().map(|own| shown(own, subjects)).collect(),
+        subjects: subjects
+            .iter()
+            .map(|subject| subject_data(subject, subjects))
+            .collect(),
         questions,
         choices: vec![&[]],
         items: results.items,
@@ -91,27 +98,32 @@ fn data<'a>(
     }
 }
 
-fn shown<'a>(
-    own: &'a subject::ModelInCondition,
+/// A subject as the script needs it, with the index of the same model at L0.
+fn subject_data<'a>(
+    subject: &'a subject::ModelInCondition,
     all: &[&subject::ModelInCondition],
 ) -> ModelInCondition<'a> {
-    let clean = own.level.and_then(|_| {
-        let clean =
-            subject::ModelInCondition::with_images(&own.model, AxisLevel::L0, &own.variant, None);
+    let clean = subject.level.and_then(|_| {
+        let clean = subject::ModelInCondition::with_images(
+            &subject.model,
+            AxisLevel::L0,
+            &subject.variant,
+            None,
+        );
         all.iter()
             .position(|other| other.matches_up_to_group(&clean))
     });
     ModelInCondition {
-        name: words::name(own),
-        model: &own.model,
-        condition: own.condition(),
-        light: match own.view {
+        name: words::name(subject),
+        model: &subject.model,
+        condition: subject.condition(),
+        light: match subject.view {
             Some(View::Blind) => "blind".to_owned(),
-            _ => words::light(&own.variant, own.enhancer.as_ref()),
+            _ => words::light(&subject.variant, subject.enhancer.as_ref()),
         },
-        level: own.level,
-        variant: own.variant.to_string(),
-        enhancer: own
+        level: subject.level,
+        variant: subject.variant.to_string(),
+        enhancer: subject
             .enhancer
             .as_ref()
             .map(crate::types::EnhancerName::as_str),
@@ -119,15 +131,15 @@ fn shown<'a>(
     }
 }
 
-/// The answers, an item for each question; where several people answered, further items of the same question.
+/// Answers by subject, with one item for each question; if several people answered a question, each answer is an item of its own.
 fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&subject::ModelInCondition]) -> Results<'a> {
-    let places: BTreeMap<&subject::ModelInCondition, usize> =
+    let indices: BTreeMap<&subject::ModelInCondition, usize> =
         subjects.iter().copied().zip(0..).collect();
-    let mut cells = HashMap::<(usize, usize), Vec<&ReportedAnswer>>::new();
+    let mut cells =
+        vec![vec![Vec::<&ReportedAnswer>::new(); subjects.len()]; report.questions.len()];
     for answer in report.answers {
-        if let Some(&place) = places.get(&answer.subject) {
-            let cell = cells.entry((answer.question, place)).or_default();
-            cell.push(answer);
+        if let Some(&subject) = indices.get(&answer.subject) {
+            cells[answer.question][subject].push(answer);
         }
     }
     let mut texts = Distinct::new();
@@ -137,12 +149,12 @@ fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&subject::ModelInConditio
         reasons.index_of(reason);
     }
     let mut items = Vec::new();
-    let empty = || vec![Vec::new(); subjects.len()];
-    let (mut codes, mut why, mut replies, mut judged) =
-        (vec![Vec::new(); subjects.len()], empty(), empty(), empty());
-    for (number, question) in report.questions.iter().enumerate() {
-        let of = |subject: usize| cells.get(&(number, subject)).map_or(&[][..], Vec::as_slice);
-        let times = (0..subjects.len()).map(|subject| of(subject).len()).max();
+    let mut codes = vec![Vec::new(); subjects.len()];
+    let mut why = vec![Vec::new(); subjects.len()];
+    let mut replies = vec![Vec::new(); subjects.len()];
+    let mut judged = vec![Vec::new(); subjects.len()];
+    for (number, (question, answers)) in report.questions.iter().zip(&cells).enumerate() {
+        let times = answers.iter().map(Vec::len).max();
         for time in 0..times.unwrap_or(0).max(1) {
             items.push(Item {
                 name: match time {
@@ -153,15 +165,15 @@ fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&subject::ModelInConditio
                 choices: 0,
                 truth: None,
             });
-            for subject in 0..subjects.len() {
-                let answer = of(subject).get(time).copied();
-                let (code, reason) = answer.map_or((ABSENT, ""), result);
+            for (subject, answers) in answers.iter().enumerate() {
+                let answer = answers.get(time).copied();
+                let (code, reason) = answer.map_or((ABSENT, ""), code_and_reason);
                 codes[subject].push(code);
                 why[subject].push(reasons.index_of(reason));
                 let text = answer.and_then(|answer| answer.answer.as_deref());
                 replies[subject].push(texts.index_of(text.unwrap_or_default()));
-                let said = answer.and_then(|answer| answer.judgement.as_deref());
-                judged[subject].push(texts.index_of(said.unwrap_or_default()));
+                let judgement = answer.and_then(|answer| answer.judgement.as_deref());
+                judged[subject].push(texts.index_of(judgement.unwrap_or_default()));
             }
         }
     }
@@ -176,8 +188,8 @@ fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&subject::ModelInConditio
     }
 }
 
-/// The code of an answer: its mark, clipped to 1 to 5 as it is scored; and why it has none.
-fn result(answer: &ReportedAnswer) -> (u8, &str) {
+/// Code of an answer, and the reason if it has no mark. A mark is clamped to 1 to 5, as for the score.
+fn code_and_reason(answer: &ReportedAnswer) -> (u8, &str) {
     match answer.outcome {
         AnswerOutcome::Marked(mark) => (mark.clamp(1, 5) as u8, REASONS[0]),
         AnswerOutcome::Null => (0, REASONS[0]),

@@ -1,4 +1,4 @@
-//! The report of a run of open questions: its files ([`products`], [`summary_json`]) and its text in the terminal ([`render`]).
+//! Report on open questions: its files ([`products`], [`summary_json`]) and its text for the terminal ([`render`]).
 
 mod coverage;
 mod figure;
@@ -42,36 +42,36 @@ pub(crate) fn products(
     let figures = figure::figures(report)?;
     let page = page::page(report, tables, &figures)?;
     let mut files = table_files(tables, &[], "Table")?;
-    files.extend(chart::files(figures));
+    files.extend(chart::svg_files(figures));
     files.extend(upstream::files(report)?);
     files.push((PAGE.to_owned(), page.into_bytes()));
     Ok(files)
 }
 
-/// The head of `summary.json`.
+/// Head of `summary.json`.
 #[derive(Serialize)]
 struct Head<'a> {
     schema: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     folder: Option<&'a Path>,
     run: &'a RunManifest,
-    /// The runs that were joined to it, with their names.
+    /// Further runs of the report, by name.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     joined: BTreeMap<&'a str, &'a RunManifest>,
     judge: Option<&'a str>,
     protocol: String,
     clustered_by: &'static str,
     clusters: usize,
-    /// The noise profiles of the noisy images.
+    /// Noise profiles of the noisy images.
     readings: NoiseProfiles,
     alerts: &'a [Alert],
 }
 
-/// The summary as JSON: the run's manifest, the judge and the protocol, and the rows of the CSV. `folder` is given if the
-/// summary is not stored in the run's folder.
+/// Serializes the summary as JSON: manifest of the run, judge, protocol, and the rows of the CSV file. `folder` is the run's folder if the
+/// summary is stored elsewhere.
 ///
 /// # Errors
-/// If the summary cannot be written.
+/// If the summary cannot be serialized.
 pub(crate) fn summary_json(
     report: &OpenReport<'_>,
     tables: &[Table],
@@ -93,8 +93,8 @@ pub(crate) fn summary_json(
     json::document(head, &tables[0], tables, length)
 }
 
-/// The text at the end of a run: its progress if it is not complete, the scores by level, split and category, the number of
-/// scored answers, and the folders of the runs.
+/// Text of the report for the terminal: progress of an incomplete run, scores by level, split and category, number of scored answers, and
+/// folders of the runs.
 #[must_use]
 pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folders: &[&Path]) -> String {
     let mut text = lines(report.alerts);

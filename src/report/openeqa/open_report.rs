@@ -1,4 +1,4 @@
-//! The data of a report on open questions: [`OpenReport`].
+//! Data of a report on open questions: [`OpenReport`].
 
 use crate::tables::EnhancerRow;
 use crate::text::alert::Alert;
@@ -9,34 +9,34 @@ use darkqa_score::choice::llm_match::Protocol;
 use darkqa_score::open::{AnswerOutcome, OpenSummary};
 use darkqa_score::subject::ModelInCondition;
 
-/// Everything that a report on open questions shows.
+/// All data of a report on open questions.
 #[derive(Debug, Clone)]
 pub(crate) struct OpenReport<'a> {
     pub summary: &'a OpenSummary,
-    /// The manifest of the run, or of the first of several.
+    /// Manifest of the run, or of the first run of several.
     pub manifest: &'a RunManifest,
-    /// The names and manifests of all runs.
+    /// Names and manifests of all runs.
     pub runs: Vec<(&'a str, &'a RunManifest)>,
-    /// Warnings above everything, if there are several runs.
+    /// Warnings at the top, if there are several runs.
     pub alerts: &'a [Alert],
-    /// How the enhancers were used.
+    /// Use of each enhancer.
     pub enhancers: &'a [EnhancerRow],
     /// Name of the judge; `None` if no judge was named.
     pub judge: Option<&'a str>,
     /// Protocol by which the answers are judged.
     pub protocol: Protocol,
-    /// The folder of the run as a command on it names it.
+    /// Folder of the run, as for use in a command.
     pub folder: String,
-    /// The questions in the order of their file.
+    /// Questions in the order of their file.
     pub questions: &'a [RunQuestion],
-    /// The answers, each to one of the questions.
+    /// All answers to the questions.
     pub answers: &'a [ReportedAnswer],
     /// Thumbnails of images, by walk and condition.
     pub thumbnails: &'a [Thumbnail],
 }
 
 impl OpenReport<'_> {
-    /// The names of all runs.
+    /// Names of all runs.
     pub(in crate::report) fn names(&self) -> Vec<String> {
         self.runs
             .iter()
@@ -44,23 +44,23 @@ impl OpenReport<'_> {
             .collect()
     }
 
-    /// The noise profiles of the noisy images.
+    /// Noise profiles of the noisy images.
     pub(super) fn noise_profiles(&self) -> NoiseProfiles {
         NoiseProfiles::new(self.answers.iter().map(|answer| &answer.subject))
     }
 }
 
-/// One answer of one subject to one question.
+/// Answer of a model in a condition to a question.
 #[derive(Debug, Clone)]
 pub(crate) struct ReportedAnswer {
     pub subject: ModelInCondition,
     /// Index of the question in the report.
     pub question: usize,
-    /// The full text of the answer; `None` if there is none.
+    /// Full text of the answer; `None` without an answer.
     pub answer: Option<String>,
     pub outcome: AnswerOutcome,
-    /// The judge's reply to the answer; `None` if there is none.
+    /// Judge's reply to the answer; `None` without a reply.
     pub judgement: Option<String>,
-    /// Why no answer came, in words; `None` if one came, or if nothing was asked yet.
+    /// Text for the reason why no answer came; `None` if one came, or if the question was not asked yet.
     pub failure: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! The HTML page of a run of open questions: [`page`].
+//! HTML page of a run of open questions: [`page`].
 
 use std::collections::BTreeSet;
 
@@ -16,16 +16,16 @@ use crate::types::degradations::Axis;
 use darkqa_score::open::{AnswerOutcome, Baseline, Group};
 use darkqa_score::subject::ModelInCondition;
 
-/// The sections of the page before the items.
+/// Sections of the page before the items.
 const SECTIONS: [Section; 1] = [(SECTION, "Scores", "", &["scores", "categories"])];
 
-/// Most clauses of the summary; chosen for one screen.
+/// Maximum number of clauses in the summary (chosen to fit one screen).
 const MAX_CLAUSES: usize = 3;
 
-/// The page as HTML.
+/// Renders the page.
 ///
 /// # Errors
-/// If the items cannot be written or the template cannot be filled.
+/// If the items cannot be serialized or the template cannot be rendered.
 pub(super) fn page(
     report: &OpenReport<'_>,
     tables: &[Table],
@@ -47,16 +47,10 @@ pub(super) fn page(
     page_of_open_questions(content, figures)
 }
 
-/// The scores at the darkest level in one sentence, with the differences from L0 and of each enhancer from raw frames. They are no
-/// verdicts: nothing is corrected over tests.
+/// One sentence with the scores at the darkest level: differences from L0, and of each enhancer from raw frames. The differences are not
+/// tested.
 fn summary(report: &OpenReport<'_>) -> Option<String> {
     let whole = ladder(report.summary, &Group::All);
-    let change = |subject: &ModelInCondition, baseline| {
-        let change = report.summary.change(subject, baseline, &Group::All)?;
-        let difference = change.difference;
-        let [value, low, high] = [difference.value, difference.low, difference.high].map(points);
-        Some(format!("{value} [{low}, {high}]"))
-    };
     let clauses: Vec<String> = whole
         .series
         .iter()
@@ -67,10 +61,10 @@ fn summary(report: &OpenReport<'_>) -> Option<String> {
             let model = report.summary.listing.label(series.model);
             let light = series.light(&[]);
             Some(if series.is_enhanced() {
-                let gain = change(&cell.subject, Baseline::Raw)?;
+                let gain = change_text(report, &cell.subject, Baseline::Raw)?;
                 format!("{light}: {score} % ({gain} against raw)")
             } else {
-                let loss = change(&cell.subject, Baseline::Clean)?;
+                let loss = change_text(report, &cell.subject, Baseline::Clean)?;
                 format!("{model} {light} scores {score} % at {level} ({loss} against L0)")
             })
         })
@@ -86,6 +80,18 @@ fn summary(report: &OpenReport<'_>) -> Option<String> {
     }
 }
 
+/// Difference of a score from a baseline, with its interval; `None` if they share no questions.
+fn change_text(
+    report: &OpenReport<'_>,
+    subject: &ModelInCondition,
+    baseline: Baseline,
+) -> Option<String> {
+    let change = report.summary.change(subject, baseline, &Group::All)?;
+    let difference = change.difference;
+    let [value, low, high] = [difference.value, difference.low, difference.high].map(points);
+    Some(format!("{value} [{low}, {high}]"))
+}
+
 /// Warnings at the top of the page: missing marks, missing answers, no judge.
 fn alerts(report: &OpenReport<'_>) -> Vec<String> {
     let (status, counts) = (report.manifest.status, report.manifest.counts);
@@ -97,8 +103,9 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
     let unmarked = report
         .answers
         .iter()
-        .filter(|answer| answer.outcome == AnswerOutcome::Unmarked);
-    match unmarked.count() {
+        .filter(|answer| answer.outcome == AnswerOutcome::Unmarked)
+        .count();
+    match unmarked {
         0 => {}
         n => alerts.push(format!(
             "{n} answers are not scored: the judge's replies to them have no mark."
@@ -116,6 +123,7 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
     alerts
 }
 
+/// Lines at the top of the page on questions, score, intervals and coverage.
 fn intro(report: &OpenReport<'_>) -> Vec<String> {
     let (summary, judge) = (report.summary, report.judge.unwrap_or("nobody"));
     let walks: BTreeSet<_> = report

@@ -12,7 +12,6 @@ use crate::text::words::ends;
 use crate::types::degradations::Axis;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::open::{Baseline, Group, OpenCell, OpenSummary};
-use darkqa_score::subject::ModelInCondition;
 
 /// Name of the page section that has all tables.
 pub(super) const SECTION: &str = "scores";
@@ -22,49 +21,54 @@ pub(super) const SECTION: &str = "scores";
 pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
     let mut tables = vec![summary(report.summary)];
     tables.extend(levels(report));
-    let of = |group| ladder(report.summary, group);
     let groups: Vec<(&Group, Ladder<'_, OpenCell>)> = report
         .summary
         .groups()
         .into_iter()
         .filter(|group| **group != Group::All)
-        .map(|group| (group, of(group)))
+        .map(|group| (group, ladder(report.summary, group)))
         .collect();
     if !groups.is_empty() {
-        let whole = of(&Group::All);
-        let series = whole.series.keys();
-        tables.extend(series.map(|series| by_group(report.summary, series, &whole, &groups)));
+        let whole = ladder(report.summary, &Group::All);
+        for series in whole.series.keys() {
+            tables.push(by_group(report.summary, series, &whole, &groups));
+        }
     }
     let mut tables = with_training(tables, &report.summary.listing);
-    let used = enhancers(report.enhancers);
-    tables.extend(used.map(|table| Table {
+    tables.extend(enhancers(report.enhancers).map(|table| Table {
         section: SECTION,
         ..table
     }));
     tables
 }
 
-/// The scores of a group by series and level.
+/// Scores of a group of questions by series and level.
 pub(super) fn ladder<'a>(summary: &'a OpenSummary, group: &Group) -> Ladder<'a, OpenCell> {
-    let cells = summary.cells.iter().filter(|cell| cell.group == *group);
-    Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_clean()
+    let cells = summary
+        .cells
+        .iter()
+        .filter(|cell| cell.group == *group)
+        .map(|cell| (&cell.subject, cell));
+    Ladder::new(cells).with_clean()
 }
 
-/// The cell of a score with its difference from the clean frames, which is that of the unrounded means.
+/// Difference of a score from a baseline, computed from unrounded means.
+fn change(summary: &OpenSummary, cell: &OpenCell, baseline: Baseline) -> Option<Estimate> {
+    let change = summary.change(&cell.subject, baseline, &cell.group)?;
+    Some(change.difference)
+}
+
+/// Table cell of a score, with its difference from the clean frames.
 fn score(summary: &OpenSummary, cell: Option<&OpenCell>) -> TableCell {
     let Some(cell) = cell else {
         return TableCell::Absent;
     };
-    let change = summary.change(&cell.subject, Baseline::Clean, &cell.group);
-    let change = change.map(|change| change.difference.value);
+    let change = change(summary, cell, Baseline::Clean).map(|change| change.value);
     TableCell::from(cell.score.map(|score| TableCell::Changed(score, change)))
 }
 
+/// Table of all scores.
 fn summary(summary: &OpenSummary) -> Table {
-    let change = |cell: &OpenCell, baseline| -> Option<Estimate> {
-        let change = summary.change(&cell.subject, baseline, &cell.group)?;
-        Some(change.difference)
-    };
     TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .column(Text, "csv by", |cell| cell.group.kind())
@@ -80,17 +84,17 @@ fn summary(summary: &OpenSummary) -> Table {
         .column(
             Points,
             "csv change change_low change_high change_n",
-            |cell| change(cell, Baseline::Clean),
+            |cell| change(summary, cell, Baseline::Clean),
         )
         .column(Points, "csv gain gain_low gain_high", |cell| {
-            change(cell, Baseline::Raw)
+            change(summary, cell, Baseline::Raw)
         })
         .column(Text, "csv reading", |cell| reading(&cell.subject))
         .model_facts(&summary.listing, |cell| &cell.subject)
         .build()
 }
 
-/// The table of each axis.
+/// Tables of scores by level, one for each axis.
 fn levels(report: &OpenReport<'_>) -> Vec<Table> {
     let whole = ladder(report.summary, &Group::All);
     let mut tables: Vec<Table> = whole
@@ -99,7 +103,7 @@ fn levels(report: &OpenReport<'_>) -> Vec<Table> {
         .map(|(axis, ladder)| axis_table(report, axis, &ladder))
         .collect();
     if let Some(last) = tables.last_mut() {
-        last.notes = without_images(report.summary, &whole);
+        last.notes = notes_without_images(report.summary, &whole);
     }
     tables
 }
@@ -139,8 +143,8 @@ fn axis_table(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>
     table
 }
 
-/// A note for each model without images.
-fn without_images(summary: &OpenSummary, ladder: &Ladder<'_, OpenCell>) -> Vec<String> {
+/// One note for each model without images.
+fn notes_without_images(summary: &OpenSummary, ladder: &Ladder<'_, OpenCell>) -> Vec<String> {
     ladder
         .without_level
         .iter()
@@ -159,29 +163,23 @@ fn without_images(summary: &OpenSummary, ladder: &Ladder<'_, OpenCell>) -> Vec<S
         .collect()
 }
 
-/// The scores of one series, with a row for each split and category. In the terminal, the tables of all series are one table,
-/// with a column for models without images.
+/// Scores of one series, with a row for each split and category. The terminal joins the tables of all series to one table, with a column
+/// for models without images.
 fn by_group(
     summary: &OpenSummary,
     series: &Series<'_>,
     whole: &Ladder<'_, OpenCell>,
     groups: &[(&Group, Ladder<'_, OpenCell>)],
 ) -> Table {
-    let rows = groups.iter().enumerate();
-    let once = |index: usize, text: &str| {
-        if index == 0 {
-            text.to_owned()
-        } else {
-            String::new()
-        }
-    };
     let light = series.light(&[]);
-    let mut builder = TableBuilder::new("groups", rows)
+    let mut builder = TableBuilder::new("groups", groups.iter().enumerate())
         .page(SECTION, &format!("{}, {light}", series.model))
         .column(Text, "terminal model", |(index, _)| {
-            once(*index, series.model)
+            first_row_only(*index, series.model)
         })
-        .column(Text, "terminal light", |(index, _)| once(*index, &light))
+        .column(Text, "terminal light", |(index, _)| {
+            first_row_only(*index, &light)
+        })
         .column(
             Text,
             "terminal of | page split or category",
@@ -200,17 +198,24 @@ fn by_group(
     }
     if !whole.without_level.is_empty() {
         builder = builder.column(Accuracy, "terminal blind", |(_, (_, ladder))| {
-            let is_same =
-                |(subject, _): &&(&ModelInCondition, &OpenCell)| subject.model == series.model;
-            let cell_of_model = ladder
+            let blind = ladder
                 .without_level
                 .iter()
-                .find(is_same)
+                .find(|(subject, _)| subject.model == series.model)
                 .or(ladder.without_level.first());
-            score(summary, cell_of_model.map(|(_, cell)| *cell))
+            score(summary, blind.map(|(_, cell)| *cell))
         });
     }
     let mut table = builder.build();
     table.heading = Some(String::new());
     table
+}
+
+/// Text in the first row of a table, empty in all others.
+fn first_row_only(index: usize, text: &str) -> String {
+    if index == 0 {
+        text.to_owned()
+    } else {
+        String::new()
+    }
 }

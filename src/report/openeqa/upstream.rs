@@ -1,4 +1,4 @@
-//! Answers and marks in the file format of `facebookresearch/open-eqa`, for its scripts: [`files`].
+//! Files of answers and marks in the format of `facebookresearch/open-eqa`, for its scripts: [`files`].
 
 use std::collections::BTreeMap;
 
@@ -13,19 +13,19 @@ use darkqa_score::subject::ModelInCondition;
 const FOLDER: &str = "upstream";
 
 #[derive(Serialize)]
-struct GivenAnswer<'a> {
+struct UpstreamAnswer<'a> {
     question_id: &'a str,
     answer: Option<&'a str>,
-    /// In which condition, so that `--answers` takes it for no other; left out at L0, as in upstream's own files. Upstream's scripts
-    /// read the first two fields alone.
+    /// Condition, so that `--answers` assigns the answer to it; omitted at L0, as in upstream's own files. Upstream's scripts read only the
+    /// first two fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     condition: Option<&'a str>,
 }
 
-/// For each subject, `NAME.json` with its answers and, if there is a judge, `NAME-JUDGE-metrics.json` with its marks.
+/// Writes for each subject `NAME.json` with its answers and, if there is a judge, `NAME-JUDGE-metrics.json` with its marks.
 ///
-/// Missing answers and marks are left out. A subject with several answers to one question has no such files, because the format
-/// has one answer per question.
+/// Missing answers and marks are left out. A subject with several answers to a question gets no files, because the format has one answer
+/// for each question.
 pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
     let mut by_subject =
         BTreeMap::<&ModelInCondition, BTreeMap<usize, Vec<&ReportedAnswer>>>::new();
@@ -52,9 +52,9 @@ pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
         };
         let condition = subject.condition();
         let stem = file_name(&format!("{}-{condition}", subject.model));
-        let answers: Vec<GivenAnswer<'_>> = answers_by_question
+        let answers: Vec<UpstreamAnswer<'_>> = answers_by_question
             .iter()
-            .map(|(question, reported)| GivenAnswer {
+            .map(|(question, reported)| UpstreamAnswer {
                 question_id: &report.questions[*question].id.0,
                 answer: reported.answer.as_deref(),
                 condition: Some(&*condition).filter(|condition| *condition != "L0"),
@@ -85,7 +85,7 @@ pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
     Ok(files)
 }
 
-/// A name without characters that are unsafe in file names.
+/// Replaces characters of a name that are unsafe in file names.
 fn file_name(name: &str) -> String {
     name.replace(|c: char| !(c.is_alphanumeric() || "-_.+".contains(c)), "_")
 }

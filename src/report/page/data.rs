@@ -1,4 +1,4 @@
-//! The items as the page's script reads them, whatever was asked: [`PageData`], as compressed JSON in base64 ([`packed_by`]).
+//! Data of the page's script for any kind of question: [`PageData`], as compressed JSON in base64 ([`packed_by`]).
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::Write;
@@ -14,9 +14,11 @@ use crate::error::{Error, Result};
 use crate::types::questions::PixelBox;
 use crate::types::{Axis, AxisLevel, FrameId, ObjectCrop, Thumbnail};
 
-/// Codes of results that are not the index of a choice.
+/// Result code of a reply that could not be parsed. Smaller codes are indices of choices.
 pub(in crate::report) const UNREAD: u8 = 26;
+/// Result code of a failed trial.
 pub(in crate::report) const FAILED: u8 = 27;
+/// Result code of an item that was not asked.
 pub(in crate::report) const ABSENT: u8 = 28;
 
 /// Maximum length of a reply on the page, in characters. The first value with which all replies fit is used.
@@ -48,55 +50,67 @@ pub(in crate::report) struct SizeLimit {
     pub(in crate::report) pictures: usize,
 }
 
-/// The kind of questions.
+/// Kind of questions.
 #[derive(Debug, Clone, Copy, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::report) enum PageKind {
     /// Questions with choices; a result is the index of the choice.
     Choice,
-    /// Open questions; a result is the mark of the judge from 1 to 5, or 0 for an answer that says nothing.
+    /// Open questions; a result is the mark of the judge from 1 to 5, or 0 for an empty answer.
     Open,
 }
 
+/// All data of the script. Objects refer to each other by their indices in these lists; nested lists have a row for each subject and a
+/// column for each item.
 #[derive(Serialize)]
 pub(in crate::report) struct PageData<'a> {
     pub(in crate::report) kind: PageKind,
+    /// Name of each run.
     pub(in crate::report) runs: Vec<String>,
-    /// The folder of each run.
+    /// Folder of each run.
     pub(in crate::report) folders: Vec<String>,
+    /// Name and severity of each level.
     pub(in crate::report) levels: Vec<[String; 2]>,
-    /// Each family: its name in the run, and in words.
+    /// Recorded name and display name of each family.
     pub(in crate::report) families: Vec<[&'a str; 2]>,
     pub(in crate::report) frames: Vec<&'a str>,
-    /// Width and height of each frame of which there are small copies, in pixels.
+    /// Width and height of each frame in pixels, if its thumbnails state them.
     pub(in crate::report) sizes: Vec<Option<[u32; 2]>>,
     pub(in crate::report) subjects: Vec<ModelInCondition<'a>>,
     pub(in crate::report) questions: Vec<Question<'a>>,
     pub(in crate::report) choices: Vec<&'a [String]>,
     pub(in crate::report) items: Vec<Item>,
+    /// Result codes by strict parsing.
     pub(in crate::report) strict: Vec<Vec<u8>>,
+    /// Result codes by lenient parsing; empty for open questions.
     pub(in crate::report) lenient: Vec<Vec<u8>>,
+    /// Reasons why replies were not parsed or did not come.
     pub(in crate::report) reasons: Vec<String>,
+    /// Index into `reasons` of each result.
     pub(in crate::report) why: Vec<Vec<usize>>,
+    /// Distinct texts of replies.
     pub(in crate::report) texts: Vec<String>,
+    /// Index into `texts` of each reply.
     pub(in crate::report) replies: Vec<Vec<usize>>,
-    /// The texts of the judge's replies, as `replies`; empty where nobody judges.
+    /// Index into `texts` of each judge's reply; empty without a judge.
     pub(in crate::report) judged: Vec<Vec<usize>>,
     pub(in crate::report) confusions: Vec<Confusion<'a>>,
+    /// Images by index of the frame and name of the condition.
     pub(in crate::report) thumbnails: BTreeMap<usize, BTreeMap<String, Picture<'a>>>,
 }
 
+/// A model in a condition.
 #[derive(Serialize)]
 pub(in crate::report) struct ModelInCondition<'a> {
     pub(in crate::report) name: String,
     pub(in crate::report) model: &'a str,
     pub(in crate::report) condition: String,
-    /// Variant and enhancer in words, or `blind`.
+    /// Text for variant and enhancer, or `blind`.
     pub(in crate::report) light: String,
     pub(in crate::report) level: Option<AxisLevel>,
     pub(in crate::report) variant: String,
     pub(in crate::report) enhancer: Option<&'a str>,
-    /// Index of the subject of the clean frames of the same images, if it was asked.
+    /// Index of the same model at L0 without an enhancer, if it was asked.
     pub(in crate::report) clean: Option<usize>,
 }
 
@@ -107,23 +121,25 @@ pub(in crate::report) struct Question<'a> {
     pub(in crate::report) family: usize,
     pub(in crate::report) text: &'a str,
     pub(in crate::report) evidence: Option<&'a Value>,
-    /// The boxes of the things that it is about, and the box of all of them, in pixels of its frame.
+    /// Bounding boxes of the objects in question, in pixels of the frame.
     pub(in crate::report) outlines: Vec<PixelBox>,
+    /// Bounding box of all objects in question together.
     pub(in crate::report) object: Option<PixelBox>,
-    /// The right answer of an open question, and further ones.
+    /// Right answer to an open question.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(in crate::report) answer: Option<&'a str>,
+    /// Further right answers to an open question.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     pub(in crate::report) also_right: &'a [String],
 }
 
 #[derive(Serialize)]
 pub(in crate::report) struct Item {
-    /// Id of the question; from its second item on with a number: `id#2`.
+    /// Id of the question; from its second item on with a number, as in `id#2`.
     pub(in crate::report) name: String,
     pub(in crate::report) question: usize,
     pub(in crate::report) choices: usize,
-    /// Index of the true choice; `None` if nobody knows it.
+    /// Index of the true choice; `None` if it is unknown.
     pub(in crate::report) truth: Option<usize>,
 }
 
@@ -135,15 +151,19 @@ pub(in crate::report) struct Confusion<'a> {
     pub(in crate::report) counts: &'a [Vec<usize>],
 }
 
+/// Images of a frame in one condition.
 #[derive(Serialize)]
 pub(in crate::report) struct Picture<'a> {
+    /// Small copy of the whole image, as a data URL.
     pub(in crate::report) small: &'a str,
+    /// Middle of the image, as a data URL.
     pub(in crate::report) crop: &'a str,
+    /// Gain of the crop in EV.
     pub(in crate::report) stops: f32,
     pub(in crate::report) objects: &'a [ObjectCrop],
 }
 
-/// A list without repetition, and the index of each entry.
+/// List of distinct entries, with the index of each.
 pub(in crate::report) struct Distinct<T> {
     pub(in crate::report) list: Vec<T>,
     pub(in crate::report) indices: HashMap<T, usize>,
@@ -157,6 +177,7 @@ impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
         }
     }
 
+    /// Index of an entry, which is added if it is new.
     pub(in crate::report) fn index_of(&mut self, entry: T) -> usize {
         *self.indices.entry(entry).or_insert_with(|| {
             self.list.push(entry);
@@ -165,10 +186,10 @@ impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
     }
 }
 
-/// Data in base64, with as much of the replies and images as there is room for.
+/// Packs data as base64, with the largest size limit that keeps it below [`MAX_PACKED_BYTES`]. `data` builds the data for a limit.
 ///
 /// # Errors
-/// If the data cannot be written.
+/// If the data cannot be serialized.
 pub(in crate::report) fn packed_by<'a>(data: impl Fn(SizeLimit) -> PageData<'a>) -> Result<String> {
     let mut packed = String::new();
     for limit in SIZE_LIMITS {
@@ -181,41 +202,40 @@ pub(in crate::report) fn packed_by<'a>(data: impl Fn(SizeLimit) -> PageData<'a>)
 }
 
 fn pack(data: &PageData<'_>) -> Result<String> {
-    let failed = |e: &dyn std::fmt::Display| Error::data("report.html", e);
-    let mut packed = GzEncoder::new(Vec::new(), Compression::new(6));
-    serde_json::to_writer(std::io::BufWriter::new(&mut packed), data).map_err(|e| failed(&e))?;
-    packed.flush().map_err(|e| failed(&e))?;
-    let bytes = packed.finish().map_err(|e| failed(&e))?;
-    Ok(STANDARD.encode(bytes))
+    let compressed = compress(data).map_err(|e| Error::data("report.html", e))?;
+    Ok(STANDARD.encode(compressed))
 }
 
-/// Texts, all cut to the greatest length with which they have room.
+/// Serializes data as JSON and compresses it with gzip.
+fn compress(data: &PageData<'_>) -> std::io::Result<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::new(6));
+    serde_json::to_writer(std::io::BufWriter::new(&mut encoder), data)?;
+    encoder.flush()?;
+    encoder.finish()
+}
+
+/// Shortens all texts to the first length of [`MAX_REPLY_CHARS`] with which they fit into `limit` bytes together.
 pub(in crate::report) fn shortened(texts: &[&str], limit: usize) -> Vec<String> {
-    let fits = |longest: &&usize| {
-        texts
-            .iter()
-            .map(|text| text.len().min(**longest))
-            .sum::<usize>()
-            <= limit
-    };
-    let longest = MAX_REPLY_CHARS
+    let max_chars = MAX_REPLY_CHARS
+        .into_iter()
+        .find(|max| texts.iter().map(|text| text.len().min(*max)).sum::<usize>() <= limit)
+        .unwrap_or(MAX_REPLY_CHARS[MAX_REPLY_CHARS.len() - 1]);
+    texts
         .iter()
-        .find(fits)
-        .unwrap_or(&MAX_REPLY_CHARS[MAX_REPLY_CHARS.len() - 1]);
-    let cut = |text: &&str| match text.char_indices().nth(*longest) {
-        None => (*text).to_owned(),
-        Some((end, _)) => {
-            let all = text.chars().count();
-            format!(
-                "{} … [cut here after {longest} of {all} characters; records.jsonl has all]",
-                &text[..end]
-            )
-        }
-    };
-    texts.iter().map(cut).collect()
+        .map(|text| match text.char_indices().nth(max_chars) {
+            None => (*text).to_owned(),
+            Some((end, _)) => {
+                let all = text.chars().count();
+                format!(
+                    "{} … [cut here after {max_chars} of {all} characters; records.jsonl has all]",
+                    &text[..end]
+                )
+            }
+        })
+        .collect()
 }
 
-/// The size of each frame that small copies state.
+/// Size of each frame in pixels, if its thumbnails state it.
 pub(in crate::report) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec<Option<[u32; 2]>> {
     let stated: HashMap<&str, [u32; 2]> = thumbnails
         .iter()
@@ -227,7 +247,7 @@ pub(in crate::report) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec
         .collect()
 }
 
-/// The name of each level, in the order of tables, and its severity in words: `6 EV`.
+/// Name of each level, in the order of tables, and its severity, as in `6 EV`.
 pub(in crate::report) fn levels(levels: impl Iterator<Item = AxisLevel>) -> Vec<[String; 2]> {
     let levels: BTreeSet<AxisLevel> = levels.collect();
     levels
@@ -243,8 +263,8 @@ pub(in crate::report) fn levels(levels: impl Iterator<Item = AxisLevel>) -> Vec<
         .collect()
 }
 
-/// The thumbnails that a page shows of these frames, of which it may have no room for all.
-pub(crate) fn shown_thumbnails<'a>(
+/// Selects the thumbnails of some frames that fit on a page, with the object crops that fit.
+pub(crate) fn fitting_thumbnails<'a>(
     all: &[Thumbnail],
     frames: impl IntoIterator<Item = &'a FrameId>,
 ) -> Vec<Thumbnail> {
@@ -253,23 +273,20 @@ pub(crate) fn shown_thumbnails<'a>(
         .enumerate()
         .map(|(n, frame)| (&*frame.0, n))
         .collect();
-    let shown = thumbnails(all, &numbers, SIZE_LIMITS[0].pictures);
-    let picture = |thumbnail: &Thumbnail| {
-        let number = numbers.get(&*thumbnail.frame.0)?;
-        shown.get(number)?.get(&thumbnail.condition.to_string())
-    };
+    let fitting = thumbnails(all, &numbers, SIZE_LIMITS[0].pictures);
     all.iter()
         .filter_map(|thumbnail| {
-            let objects = picture(thumbnail)?.objects.to_vec();
+            let number = numbers.get(&*thumbnail.frame.0)?;
+            let picture = fitting.get(number)?.get(&thumbnail.condition.to_string())?;
             Some(Thumbnail {
-                objects,
+                objects: picture.objects.to_vec(),
                 ..thumbnail.clone()
             })
         })
         .collect()
 }
 
-/// Thumbnails of as many frames as the size limit allows, by the index of the frame; crops of things as there is room behind them.
+/// Thumbnails of as many frames as the size limit allows, by the index of the frame. Object crops are added while bytes are left.
 pub(in crate::report) fn thumbnails<'a>(
     all: &'a [Thumbnail],
     numbers: &HashMap<&str, usize>,
@@ -282,7 +299,7 @@ pub(in crate::report) fn thumbnails<'a>(
             .or_default()
             .push(thumbnail);
     }
-    // Small copies of all frames go before the things of the first ones.
+    // Thumbnails of all frames take precedence over object crops of the first frames.
     let mut kept = Vec::new();
     for (frame, thumbnails) in by_frame {
         let Some(number) = numbers.get(&*frame.0) else {
@@ -290,7 +307,7 @@ pub(in crate::report) fn thumbnails<'a>(
         };
         let size: usize = thumbnails
             .iter()
-            .map(|t| t.small.len() + t.crop.len())
+            .map(|thumbnail| thumbnail.small.len() + thumbnail.crop.len())
             .sum();
         if size > bytes_left {
             break;
@@ -307,16 +324,19 @@ pub(in crate::report) fn thumbnails<'a>(
             .sum();
         let has_room = size <= bytes_left;
         bytes_left -= if has_room { size } else { 0 };
-        let pictures = thumbnails.into_iter().map(|t| {
-            let picture = Picture {
-                small: &t.small,
-                crop: &t.crop,
-                stops: t.stops,
-                objects: if has_room { &t.objects } else { &[] },
-            };
-            (t.condition.to_string(), picture)
-        });
-        by_number.insert(number, pictures.collect());
+        let pictures = thumbnails
+            .into_iter()
+            .map(|thumbnail| {
+                let picture = Picture {
+                    small: &thumbnail.small,
+                    crop: &thumbnail.crop,
+                    stops: thumbnail.stops,
+                    objects: if has_room { &thumbnail.objects } else { &[] },
+                };
+                (thumbnail.condition.to_string(), picture)
+            })
+            .collect();
+        by_number.insert(number, pictures);
     }
     by_number
 }

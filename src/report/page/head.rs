@@ -1,11 +1,10 @@
-//! [`PageHead`], the first screen of the page: a summary in words, one chart, the first finding of each group, and one frame through the
-//! levels.
+//! First screen of the page ([`PageHead`]): summary, chart, main finding of each group, and one frame at each level.
 
 use serde::Serialize;
 
 use super::inputs::PageInputs;
 use super::strip::Strip;
-use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::chart::{Chart, Figure};
 use crate::drawing::figures::{Names, overview, split};
 use crate::drawing::paper::figure;
@@ -15,36 +14,37 @@ use crate::report::finding_groups::{Effect, Finding, FindingGroups};
 use crate::sentences::capitalised;
 use crate::tables::first_to_fail;
 
-/// Half the width of a mark's drawing, in its own units; the largest interval end of all rows is drawn there.
+/// Half the width of the drawing of intervals, in its own units. The largest end of all intervals is drawn there.
 const MARK_REACH: f64 = 50.0;
 
-/// The first screen.
+/// Content of the first screen.
 #[derive(Serialize)]
 pub(in crate::report) struct PageHead {
     summary: String,
     chart: Option<Figure>,
-    /// What fails first, a line for each light.
+    /// Families and frames that fail first, with a line for each variant.
     first_to_fail: Vec<String>,
     rows: Vec<FindingRow>,
     strip: Option<Strip>,
 }
 
-/// The finding that stands for a group.
+/// Main finding of a group.
 #[derive(Serialize)]
 struct FindingRow {
     group: &'static str,
     class: &'static str,
     sign: char,
     text: String,
-    /// The effect with its interval, and its level; empty of a finding without them.
+    /// Effect with its interval; empty without an interval.
     effect: String,
+    /// Level of the effect; empty without a level.
     at: String,
-    /// The intervals in other lights.
+    /// Intervals in other variants.
     in_other_lights: Vec<String>,
     mark: Option<Mark>,
 }
 
-/// An interval as a line with a dot, in units from −[`MARK_REACH`] to +[`MARK_REACH`] around zero.
+/// Interval drawn as a line with a dot, in units from −[`MARK_REACH`] to +[`MARK_REACH`] around zero.
 #[derive(Serialize)]
 struct Mark {
     value: f64,
@@ -53,16 +53,16 @@ struct Mark {
 }
 
 impl PageHead {
-    /// The first screen of an evaluation; `None` if nothing was found, for want of two levels or of a model without images.
+    /// Builds the first screen of an evaluation; `None` without a main finding, as in runs with one level and no blind model.
     ///
     /// # Errors
-    /// If the chart cannot be drawn, or the question of the strip cannot be read.
+    /// If the chart cannot be drawn, or a question cannot be read.
     pub(super) fn new(
         report: &ChoiceReport<'_>,
         groups: &FindingGroups<'_>,
         inputs: &PageInputs<'_>,
     ) -> Result<Option<Self>> {
-        if groups.first().is_empty() {
+        if groups.main_findings().is_empty() {
             return Ok(None);
         }
         Ok(Some(Self {
@@ -73,10 +73,10 @@ impl PageHead {
         }))
     }
 
-    /// The summary alone.
+    /// First screen with only a summary.
     pub(in crate::report) fn from_summary(summary: &str) -> Self {
         Self {
-            summary: unbroken(summary),
+            summary: with_unbroken_percent(summary),
             chart: None,
             first_to_fail: Vec::new(),
             rows: Vec::new(),
@@ -84,9 +84,9 @@ impl PageHead {
         }
     }
 
-    /// The summary and the findings alone.
+    /// First screen with the summary and the main findings, without chart and images.
     pub(in crate::report) fn without_images(groups: &FindingGroups<'_>) -> Self {
-        let first = groups.first();
+        let first = groups.main_findings();
         let reach = first
             .iter()
             .filter_map(|(_, finding)| difference(finding))
@@ -102,14 +102,14 @@ impl PageHead {
     }
 }
 
-/// A text in which no line ends between a number and its percent sign.
-fn unbroken(text: &str) -> String {
+/// Prevents line breaks before percent signs.
+fn with_unbroken_percent(text: &str) -> String {
     text.replace(" %", "\u{a0}%")
 }
 
-/// The difference of a finding with the ends of its interval, in points.
+/// Difference of a finding with the ends of its interval, in points; `None` for a share.
 fn difference(finding: &Finding<'_>) -> Option<[f64; 3]> {
-    match Effect::from_sentence(finding.shown())? {
+    match Effect::from_sentence(finding.main_sentence())? {
         Effect::Difference(numbers) => Some(numbers),
         Effect::Share(_) => None,
     }
@@ -117,17 +117,17 @@ fn difference(finding: &Finding<'_>) -> Option<[f64; 3]> {
 
 impl FindingRow {
     fn new(group: &'static str, finding: &Finding<'_>, reach: f64) -> Self {
-        let tone = finding.shown().tone;
+        let tone = finding.main_sentence().tone;
         let mut intervals = finding.intervals();
         let others = intervals.split_off(intervals.len().min(1));
         let (effect, at) = intervals
             .pop()
-            .map_or_else(Default::default, |own| (own.effect, own.at));
+            .map_or_else(Default::default, |main| (main.effect, main.at));
         Self {
             group,
             class: tone.class(),
             sign: tone.sign(),
-            text: unbroken(&match finding.shown().scope.light {
+            text: with_unbroken_percent(&match finding.main_sentence().scope.light {
                 Some(_) => capitalised(&finding.text()),
                 None => finding.text(),
             }),
@@ -143,7 +143,7 @@ impl FindingRow {
     }
 }
 
-/// The mean accuracy over the levels, raw and with each enhancer; without enhancers by variant, else of each model.
+/// Chart of the first screen: mean accuracy by level raw and with each enhancer, else by variant, else accuracy of each model.
 fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
     let panels = overview(report.findings, &Names::default());
     ["enhancers", "variants", "models"]
@@ -152,8 +152,8 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
             panels
                 .charts
                 .iter()
-                .find(|(name, chart)| *name == wanted && chart.is_ok())
-                .and_then(|(_, chart)| chart.as_ref().ok())
+                .filter(|(name, _)| *name == wanted)
+                .find_map(|(_, chart)| chart.as_ref().ok())
         })
         .map(|(caption, chart)| {
             let chart = Chart {
@@ -161,7 +161,7 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
                 panels: split(chart.panels.clone()),
                 ..chart.clone()
             };
-            figure("head", caption, &Drawn::Lines(chart))
+            figure("head", caption, &FigureChart::Lines(chart))
         })
         .transpose()
 }
@@ -173,7 +173,10 @@ mod tests {
 
     #[test]
     fn a_percent_sign_stays_with_its_number() {
-        assert_eq!(unbroken("from 90.6 % at L0"), "from 90.6\u{a0}% at L0");
+        assert_eq!(
+            with_unbroken_percent("from 90.6 % at L0"),
+            "from 90.6\u{a0}% at L0"
+        );
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Data of the page besides the findings: [`PageInputs`].
+//! Data of the page other than the findings: [`PageInputs`].
 
 use std::collections::{HashMap, HashSet};
 
@@ -12,27 +12,26 @@ use crate::types::{QuestionId, RunQuestion, TextPlace, Thumbnail};
 pub struct PageRun<'a> {
     /// Name of the run: its folder.
     pub name: String,
-    /// The folder of the run as a command on it names it; of an absolute path the name alone, behind `DIR/`.
+    /// Folder of the run, as for use in a command; an absolute path is shortened to `DIR/` and the folder's name.
     pub folder: String,
     pub manifest: &'a RunManifest,
-    /// The usage of the run's trials.
     pub usage: RunUsage,
-    /// Cost of the replies in words; `None` if it is not known.
+    /// Text for the cost of the replies; `None` if it is unknown.
     pub cost: Option<String>,
 }
 
-/// Reads questions by their names.
+/// Function that reads questions by id.
 pub(crate) type ReadQuestions<'a> =
     Box<dyn Fn(&HashSet<&QuestionId>) -> Result<HashMap<QuestionId, RunQuestion>> + 'a>;
 
-/// Data of the page besides the findings.
+/// Data of the page other than the findings.
 pub struct PageInputs<'a> {
-    /// The runs that the page is about.
+    /// Runs on the page.
     pub runs: Vec<PageRun<'a>>,
-    /// Reads those of the wanted questions that the runs store.
+    /// Reads the wanted questions, as far as the runs store them.
     pub questions: ReadQuestions<'a>,
     /// Thumbnails of the images; empty if the runs do not store them.
     pub thumbnails: &'a [Thumbnail],
-    /// Reads what stands in the place of a reply: its text, that of a refusal, or what the error states.
+    /// Reads the text of a reply, of a refusal, or of an error message.
     pub texts: Box<dyn Fn(TextPlace) -> Result<String> + 'a>,
 }

@@ -1,4 +1,4 @@
-//! The items of questions with choices, as the page's script reads them: [`packed`].
+//! Items of multiple-choice questions for the page's script: [`packed`].
 
 use std::collections::HashMap;
 
@@ -16,10 +16,10 @@ use darkqa_score::answers::confusion;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::{Grid, TrialResult};
 
-/// Everything that the script shows, as compressed JSON in base64.
+/// Packs the data of the script as compressed JSON in base64.
 ///
 /// # Errors
-/// If a reply cannot be read, or the data cannot be written.
+/// If a reply or a question cannot be read, or the data cannot be serialized.
 pub(super) fn packed<'a>(
     grid: &'a Grid<'a>,
     confusions: &'a [confusion::Confusion],
@@ -29,14 +29,16 @@ pub(super) fn packed<'a>(
     let grid = sample.as_ref().unwrap_or(grid);
     let replies = Replies::read(grid, inputs)?;
     let questions = questions(grid, inputs)?;
-    packed_by(|limit| data(grid, confusions, inputs, (&questions, &replies, limit)))
+    packed_by(|limit| data(grid, confusions, inputs, &questions, &replies, limit))
 }
 
 fn data<'a>(
     grid: &'a Grid<'a>,
     confusions: &'a [confusion::Confusion],
     inputs: &PageInputs<'a>,
-    (run_questions, replies, limit): (&'a RunQuestions, &Replies, SizeLimit),
+    run_questions: &'a RunQuestions,
+    replies: &Replies,
+    limit: SizeLimit,
 ) -> PageData<'a> {
     let (mut frames, mut families) = (Distinct::new(), Distinct::new());
     let (mut question_ids, mut choices) = (Distinct::new(), Distinct::new());
@@ -74,13 +76,6 @@ fn data<'a>(
             truth: asked.truth,
         });
     }
-    let marks = |mode| {
-        let of =
-            |subject| (0..grid.items.len()).map(move |item| code(grid.result(subject, item), mode));
-        (0..grid.subjects.len())
-            .map(|subject| of(subject).collect())
-            .collect()
-    };
     let (reasons, why) = reasons(grid);
     PageData {
         kind: PageKind::Choice,
@@ -96,23 +91,38 @@ fn data<'a>(
         questions,
         choices: choices.list,
         items,
-        strict: marks(ReadingMode::Strict),
-        lenient: marks(ReadingMode::Lenient),
+        strict: codes(grid, ReadingMode::Strict),
+        lenient: codes(grid, ReadingMode::Lenient),
         reasons,
         why,
         texts: shortened(&replies.texts(), limit.text),
         replies: replies.indices.clone(),
-        confusions: confusions_of(grid, confusions),
+        confusions: confusion_data(grid, confusions),
     }
 }
 
-/// The stored questions, by name.
+/// Stored questions by id.
 type RunQuestions = HashMap<QuestionId, RunQuestion>;
 
-/// The stored questions of the items.
+/// Reads the stored questions of the items.
 fn questions(grid: &Grid<'_>, inputs: &PageInputs<'_>) -> Result<RunQuestions> {
-    let asked = grid.items.iter().map(|item| &*item.asked.question);
-    (inputs.questions)(&asked.collect())
+    let ids = grid
+        .items
+        .iter()
+        .map(|item| &*item.asked.question)
+        .collect();
+    (inputs.questions)(&ids)
+}
+
+/// Result codes with a row for each subject and a column for each item.
+fn codes(grid: &Grid<'_>, mode: ReadingMode) -> Vec<Vec<u8>> {
+    (0..grid.subjects.len())
+        .map(|subject| {
+            (0..grid.items.len())
+                .map(|item| code(grid.result(subject, item), mode))
+                .collect()
+        })
+        .collect()
 }
 
 fn code(result: TrialResult, mode: ReadingMode) -> u8 {
@@ -123,85 +133,94 @@ fn code(result: TrialResult, mode: ReadingMode) -> u8 {
     }
 }
 
+/// Subjects of the grid as the script needs them.
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<ModelInCondition<'a>> {
-    let subject = |subject: &'a darkqa_score::subject::ModelInCondition| ModelInCondition {
-        name: crate::text::words::name(subject),
-        model: &subject.model,
-        condition: subject.condition(),
-        light: match subject.view {
-            Some(View::Blind) => "blind".to_owned(),
-            _ => crate::text::words::light(&subject.variant, subject.enhancer.as_ref()),
-        },
-        level: subject.level,
-        variant: subject.variant.to_string(),
-        enhancer: subject
-            .enhancer
-            .as_ref()
-            .map(crate::types::EnhancerName::as_str),
-        clean: clean(grid, subject),
-    };
-    grid.subjects.iter().map(subject).collect()
+    grid.subjects
+        .iter()
+        .map(|subject| ModelInCondition {
+            name: crate::text::words::name(subject),
+            model: &subject.model,
+            condition: subject.condition(),
+            light: match subject.view {
+                Some(View::Blind) => "blind".to_owned(),
+                _ => crate::text::words::light(&subject.variant, subject.enhancer.as_ref()),
+            },
+            level: subject.level,
+            variant: subject.variant.to_string(),
+            enhancer: subject
+                .enhancer
+                .as_ref()
+                .map(crate::types::EnhancerName::as_str),
+            clean: clean_index(grid, subject),
+        })
+        .collect()
 }
 
-/// Index of the subject of the clean frames of a subject with images.
-fn clean(grid: &Grid<'_>, of: &darkqa_score::subject::ModelInCondition) -> Option<usize> {
-    of.level?;
+/// Index of the same model at L0 without an enhancer; `None` for models without images.
+fn clean_index(
+    grid: &Grid<'_>,
+    subject: &darkqa_score::subject::ModelInCondition,
+) -> Option<usize> {
+    subject.level?;
     let clean = darkqa_score::subject::ModelInCondition::with_images(
-        &of.model,
+        &subject.model,
         AxisLevel::L0,
-        &of.variant,
+        &subject.variant,
         None,
     );
     grid.find_up_to_group(&clean)
 }
 
-/// Why a reply was not read, or why none came.
+/// Reason why a result is not a parsed answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Why {
-    Nothing,
+enum NoAnswerReason {
+    /// No reason: the reply was parsed, or the item was not asked.
+    None,
     Unread(UnreadReason),
+    /// Kind of failure, and HTTP status if there was one.
     Failed(FailureKind, Option<u16>),
 }
 
-impl Why {
+impl NoAnswerReason {
     fn new(trial: Option<TrialRef<'_>>) -> Self {
         let unread = trial.and_then(|trial| trial.strict()?.why);
         let failed = trial.and_then(TrialRef::failure);
         match (unread, failed) {
             (Some(why), _) => Self::Unread(why),
             (None, Some((kind, status))) => Self::Failed(kind, status),
-            (None, None) => Self::Nothing,
+            (None, None) => Self::None,
         }
     }
 
-    fn words(self) -> String {
+    fn text(self) -> String {
         match self {
-            Self::Nothing => String::new(),
+            Self::None => String::new(),
             Self::Unread(why) => outcome_words::unread(why).to_owned(),
             Self::Failed(kind, status) => outcome_words::failed(kind, status),
         }
     }
 }
 
-/// The different reasons in words why replies were not read or did not come, with none first, and for each subject and item the
-/// index of its reason.
+/// Distinct reasons for results without an answer, the first one empty, and the index of the reason by subject and item.
 fn reasons(grid: &Grid<'_>) -> (Vec<String>, Vec<Vec<usize>>) {
     let mut reasons = Distinct::new();
-    reasons.index_of(Why::Nothing);
+    reasons.index_of(NoAnswerReason::None);
     let mut indices = Vec::new();
     for subject in 0..grid.subjects.len() {
-        let why =
-            (0..grid.items.len()).map(|item| reasons.index_of(Why::new(grid.trial(subject, item))));
-        indices.push(why.collect());
+        let row = (0..grid.items.len())
+            .map(|item| reasons.index_of(NoAnswerReason::new(grid.trial(subject, item))))
+            .collect();
+        indices.push(row);
     }
-    (reasons.list.into_iter().map(Why::words).collect(), indices)
+    let texts = reasons.list.into_iter().map(NoAnswerReason::text).collect();
+    (texts, indices)
 }
 
-/// The different replies, and for each subject and item the index of its reply; the first is empty.
-///
-/// Refusals and failure messages take the place of a reply.
+/// Distinct texts of replies, the first one empty. Refusals and error messages count as replies.
 struct Replies {
+    /// Index of each text.
     numbers: HashMap<String, usize>,
+    /// Index of the text by subject and item.
     indices: Vec<Vec<usize>>,
 }
 
@@ -210,21 +229,21 @@ impl Replies {
         let mut numbers = HashMap::from([(String::new(), 0)]);
         let mut indices = Vec::new();
         for subject in 0..grid.subjects.len() {
-            let mut of_subject = Vec::with_capacity(grid.items.len());
+            let mut row = Vec::with_capacity(grid.items.len());
             for item in 0..grid.items.len() {
                 let text = match grid.trial(subject, item) {
                     None => String::new(),
                     Some(trial) => (inputs.texts)(trial.text())?,
                 };
                 let next = numbers.len();
-                of_subject.push(*numbers.entry(text).or_insert(next));
+                row.push(*numbers.entry(text).or_insert(next));
             }
-            indices.push(of_subject);
+            indices.push(row);
         }
         Ok(Self { numbers, indices })
     }
 
-    /// The replies in the order of their indices.
+    /// Texts in the order of their indices.
     fn texts(&self) -> Vec<&str> {
         let mut texts = vec![""; self.numbers.len()];
         for (text, number) in &self.numbers {
@@ -234,7 +253,7 @@ impl Replies {
     }
 }
 
-fn confusions_of<'a>(
+fn confusion_data<'a>(
     grid: &Grid<'_>,
     confusions: &'a [confusion::Confusion],
 ) -> Vec<Confusion<'a>> {

@@ -1,7 +1,7 @@
-//! The HTML page of questions with choices: [`page`] of an evaluation, [`page_of`] of any content.
+//! HTML page of a report: [`page`] for an evaluation, [`page_of`] for other content.
 //!
-//! All numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items, with their
-//! thumbnails, are packed data that its script reads. The page needs no network, and its content security policy allows none.
+//! Numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items and their thumbnails are
+//! packed data, which a script displays. The page needs no network, and its content security policy allows none.
 
 pub(super) mod data;
 mod head;
@@ -13,7 +13,7 @@ mod sections;
 mod strip;
 mod tables;
 
-pub(crate) use data::shown_thumbnails;
+pub(crate) use data::fitting_thumbnails;
 pub(in crate::report) use head::PageHead;
 pub use inputs::PageInputs;
 pub(crate) use inputs::PageRun;
@@ -27,7 +27,7 @@ use crate::error::Result;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{FindingGroup, FindingGroups};
 use crate::report::short::{head, who_is_judged};
-use crate::report::template::filled;
+use crate::report::template::render;
 use crate::sentences::{Sentence, how_to_read};
 use crate::tables::{SECTIONS, Section};
 use crate::text::alert::Alert;
@@ -38,60 +38,61 @@ use crate::types::flags::spelled_setting;
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::grid::Grid;
-use darkqa_score::subject::{ModelInCondition, models_under_test};
+use darkqa_score::subject::models_under_test;
 
-/// The template of the page, its style and its script.
+/// Template of the page.
 const PAGE: &str = include_str!("page.html");
+/// CSS of the page.
 pub(super) const STYLE: &str = include_str!("page.css");
-/// Parts shared by pages: names, the theme, and charts that are drawn at the available width.
+/// Script of names, theme, and charts that are drawn at the available width.
 const CHART_SCRIPT: &str = concat!(
     include_str!("script/base.js"),
     include_str!("script/charts.js")
 );
-/// The items and their images; the parts of one script.
+/// Script of the items and their images.
 const SCRIPT: &str = concat!(
     include_str!("script/images.js"),
     include_str!("script/open.js"),
     include_str!("script/items.js")
 );
 
-/// The values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
+/// Values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
 #[derive(Serialize)]
 struct Page<'a> {
-    /// Class of the body: that of pages on which nothing is known to be right or wrong.
+    /// CSS class of the body; pages without true answers have one.
     class: &'static str,
     title: String,
-    /// Heading: the title without the names of runs.
+    /// Title without the names of runs.
     heading: String,
-    /// The first screen; `None` of a page without one.
+    /// First screen; `None` for a page without one.
     head: Option<PageHead>,
-    /// The noun for families of questions.
+    /// Noun for families of questions.
     family: &'static str,
     /// Warnings at the top of the page.
     alerts: Vec<&'a str>,
     intro: Vec<String>,
-    /// The number of findings; `None` of an experiment that has none.
+    /// Number of findings; `None` for a kind of report without findings.
     findings: Option<usize>,
     groups: Vec<PageGroup<'a>>,
     how_to_read: String,
-    /// Heading of the table of answers against answers.
+    /// Heading of the confusion matrix.
     answers_title: &'static str,
     sections: Vec<sections::PageSection<'a>>,
     runs: Vec<Value>,
-    /// The items, as compressed JSON in base64.
+    /// Items as compressed JSON in base64.
     data: String,
     css: &'static str,
     script: String,
 }
 
-/// A group of findings, as the template reads it.
+/// Group of findings for the template.
 #[derive(Serialize)]
 struct PageGroup<'a> {
     title: &'static str,
     sentences: Vec<PageSentence<'a>>,
 }
 
-/// A finding in words, as the template reads it.
+/// Sentence of a finding for the template.
 #[derive(Serialize)]
 struct PageSentence<'a> {
     class: &'static str,
@@ -120,33 +121,31 @@ impl<'a> PageSentence<'a> {
     }
 }
 
-/// The content of a page, besides its figures and the facts of its runs.
+/// Content of a page, without its figures and the facts about its runs.
 pub(crate) struct PageContent<'a> {
-    /// The models in words, for the heading.
+    /// Text for the models, in the heading.
     pub(crate) who: String,
-    /// The first screen; `None` of a page without one.
+    /// First screen; `None` for a page without one.
     pub(in crate::report) head: Option<PageHead>,
-    /// Lines about the numbers as a whole.
+    /// Lines at the top about all numbers.
     pub(crate) intro: Vec<String>,
     pub(crate) alerts: &'a [Alert],
     pub(in crate::report) groups: FindingGroups<'a>,
     pub(crate) how_to_read: String,
     pub(crate) tables: &'a [Table],
-    /// The sections in order.
     pub(crate) sections: &'static [Section],
-    /// The items and the replies to them.
+    /// Items and the replies to them.
     pub(crate) grid: &'a Grid<'a>,
-    /// Answers against answers, and the heading of their table.
     pub(crate) confusions: &'a [Confusion],
+    /// Heading of the confusion matrix.
     pub(crate) answers_title: &'static str,
-    /// Whether the true answers are known.
     pub(crate) truths: Truths,
 }
 
-/// The page of an evaluation as HTML.
+/// Renders the page of an evaluation.
 ///
 /// # Errors
-/// If the items cannot be written or the template cannot be filled.
+/// If the items cannot be serialized or the template cannot be rendered.
 pub(crate) fn page<'a>(
     report: &'a ChoiceReport<'a>,
     figures: &[Figure],
@@ -171,17 +170,17 @@ pub(crate) fn page<'a>(
     page_of(content, figures, inputs)
 }
 
-/// A page as HTML.
+/// Renders a page from its content.
 ///
 /// # Errors
-/// If the items cannot be written or the template cannot be filled.
+/// If the items cannot be serialized or the template cannot be rendered.
 pub(crate) fn page_of<'a>(
     content: PageContent<'a>,
     figures: &[Figure],
     inputs: &PageInputs<'a>,
 ) -> Result<String> {
     let sections = content.sections;
-    filled(
+    render(
         PAGE,
         Page {
             class: match content.truths {
@@ -197,9 +196,9 @@ pub(crate) fn page_of<'a>(
             groups: content.groups.all().iter().map(PageGroup::new).collect(),
             how_to_read: content.how_to_read,
             answers_title: content.answers_title,
-            intro: [content.intro, Vec::from_iter(sample::words(content.grid))].concat(),
+            intro: [content.intro, Vec::from_iter(sample::note(content.grid))].concat(),
             sections: sections::sections(sections, content.tables, figures, inputs.thumbnails),
-            runs: inputs.runs.iter().map(facts).collect(),
+            runs: inputs.runs.iter().map(run_facts).collect(),
             data: items::packed(content.grid, content.confusions, inputs)?,
             css: STYLE,
             script: [CHART_SCRIPT, SCRIPT].concat(),
@@ -207,30 +206,30 @@ pub(crate) fn page_of<'a>(
     )
 }
 
-/// The content of the page of open questions, besides its figures.
+/// Content of the page of open questions, without its figures.
 pub(in crate::report) struct OpenContent<'a> {
     pub(in crate::report) title: String,
-    /// The scores in one sentence; `None` without scores at two levels.
+    /// One sentence with the scores; `None` without scores at two levels.
     pub(in crate::report) summary: Option<String>,
     pub(in crate::report) intro: Vec<String>,
     pub(in crate::report) alerts: &'a [String],
     pub(in crate::report) tables: &'a [Table],
     pub(in crate::report) sections: &'static [Section],
-    /// The names and manifests of the runs.
+    /// Name and manifest of each run.
     pub(in crate::report) runs: &'a [(&'a str, &'a RunManifest)],
-    /// The items, as compressed JSON in base64.
+    /// Items as compressed JSON in base64.
     pub(in crate::report) items: String,
 }
 
-/// The page of open questions as HTML.
+/// Renders the page of open questions.
 ///
 /// # Errors
-/// If the template cannot be filled.
+/// If the template cannot be rendered.
 pub(in crate::report) fn page_of_open_questions(
     content: OpenContent<'_>,
     figures: &[Figure],
 ) -> Result<String> {
-    filled(
+    render(
         PAGE,
         Page {
             class: "",
@@ -257,7 +256,7 @@ pub(in crate::report) fn page_of_open_questions(
     )
 }
 
-/// `MODEL in the dark`, or how many runs are compared.
+/// Heading of the page, as in `MODEL in the dark`, with the number of runs if there are several.
 fn heading(who: &str, inputs: &PageInputs<'_>) -> String {
     match &*inputs.runs {
         [_] => format!("{who} in the dark"),
@@ -265,7 +264,7 @@ fn heading(who: &str, inputs: &PageInputs<'_>) -> String {
     }
 }
 
-/// The heading, with the name of a single run.
+/// Heading with the name of the run, if there is only one.
 fn title(who: &str, inputs: &PageInputs<'_>) -> String {
     let heading = heading(who, inputs);
     match &*inputs.runs {
@@ -274,15 +273,16 @@ fn title(who: &str, inputs: &PageInputs<'_>) -> String {
     }
 }
 
+/// Lines at the top of the page on the size of the runs, people, and open questions about noise profiles.
 fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
     let grid = &report.findings.grid;
     let size = format!("{} (95 %) · strict parsing", head(report));
     let readings = NoiseProfiles::new(&grid.subjects);
-    let is_people = |subject: &ModelInCondition| grid.listing.is_people(&subject.model);
     let models = grid.subjects.iter().map(|subject| &*subject.model);
-    let judged = models_under_test(models);
-    let has_people = grid.subjects.iter().any(is_people);
-    let has_models = judged.iter().any(|model| !grid.listing.is_people(model));
+    let has_people = models.clone().any(|model| grid.listing.is_people(model));
+    let has_models = models_under_test(models)
+        .iter()
+        .any(|model| !grid.listing.is_people(model));
     let people = (has_people && has_models)
         .then(|| "The summary and the chart are about models, not about people.".to_owned());
     std::iter::once(size)
@@ -291,37 +291,44 @@ fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
         .collect()
 }
 
-fn facts(run: &PageRun<'_>) -> Value {
+/// Facts about a run, as JSON for the template.
+fn run_facts(run: &PageRun<'_>) -> Value {
     let manifest = run.manifest;
-    let mut rows = about(manifest);
+    let mut rows = status_facts(manifest);
     rows.extend(run.usage.facts());
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
-    rows.extend(settings(manifest));
+    rows.extend(setting_facts(manifest));
     json!({"name": run.name, "rows": rows})
 }
 
-/// The facts of a manifest, as rows of names and values.
+/// Facts about a run without usage and cost: names and values.
 fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
-    [about(manifest), settings(manifest)].concat()
+    [status_facts(manifest), setting_facts(manifest)].concat()
 }
 
 fn fact(name: &str, value: impl Into<String>) -> (String, String) {
     (name.to_owned(), value.into())
 }
 
-fn settings(manifest: &RunManifest) -> Vec<(String, String)> {
-    let known = manifest.identity.iter().chain(&manifest.settings);
-    manifest
+/// Platform and settings of a run: names and values.
+fn setting_facts(manifest: &RunManifest) -> Vec<(String, String)> {
+    let platform = manifest
         .platform
         .iter()
-        .map(|(name, value)| (name.clone(), value.clone()))
-        .chain(known.map(|(name, value)| (spelled_setting(name), setting_text(value))))
-        .chain(columns(manifest))
+        .map(|(name, value)| (name.clone(), value.clone()));
+    let settings = manifest
+        .identity
+        .iter()
+        .chain(&manifest.settings)
+        .map(|(name, value)| (spelled_setting(name), setting_text(value)));
+    platform
+        .chain(settings)
+        .chain(column_facts(manifest))
         .collect()
 }
 
-/// The settings of each model, enhancer, noise profile and variant, with the camera of a profile by its name.
-fn columns(manifest: &RunManifest) -> Vec<(String, String)> {
+/// Settings of each model, enhancer, noise profile and variant. The camera of a profile is given by its name.
+fn column_facts(manifest: &RunManifest) -> Vec<(String, String)> {
     let mut rows = Vec::new();
     for (column, values) in &manifest.columns {
         let column = match column.as_str() {
@@ -329,18 +336,20 @@ fn columns(manifest: &RunManifest) -> Vec<(String, String)> {
             other => other,
         };
         for (value, content) in values {
-            let fields = content.as_object().into_iter().flatten();
-            let set: Vec<String> = fields
+            let settings: Vec<String> = content
+                .as_object()
+                .into_iter()
+                .flatten()
                 .filter(|(_, value)| !value.is_null())
                 .map(|(name, value)| format!("{} {}", spelled_setting(name), setting_text(value)))
                 .collect();
-            rows.push(fact(&format!("{column} {value}"), set.join(", ")));
+            rows.push(fact(&format!("{column} {value}"), settings.join(", ")));
         }
     }
     rows
 }
 
-/// The value of a setting: a text as it is, a thing with a name by its name.
+/// Text for the value of a setting: an object with a name is given by its name.
 fn setting_text(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
@@ -353,7 +362,8 @@ fn setting_text(value: &Value) -> String {
     }
 }
 
-fn about(manifest: &RunManifest) -> Vec<(String, String)> {
+/// Status, version and dates of a run: names and values.
+fn status_facts(manifest: &RunManifest) -> Vec<(String, String)> {
     vec![
         fact("status", manifest.status.to_string()),
         fact("made by", format!("darkqa-eval {}", manifest.version)),

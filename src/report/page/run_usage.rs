@@ -1,11 +1,11 @@
-//! The usage of a run's trials: [`RunUsage`].
+//! Usage of a run: [`RunUsage`].
 
 use std::collections::BTreeSet;
 
 use crate::types::{ChoiceDetail, TrialRef, Usage};
 
-/// The usage of a run's trials at endpoints: requests, tokens, bytes of images, waiting, and the models that the servers named.
-/// Built-in models take none of these.
+/// Usage of a run's trials at endpoints: requests, tokens, bytes of images, latency, and the model names that the servers returned.
+/// Built-in models need no endpoint.
 #[derive(Debug, Clone, Default)]
 pub struct RunUsage {
     /// Number of trials of models at endpoints.
@@ -16,18 +16,19 @@ pub struct RunUsage {
     prompt_tokens: u64,
     completion_tokens: u64,
     image_bytes: u64,
-    /// The median and the 95 % quantile of the duration of the last tries in milliseconds; `None` if none is known.
+    /// Median and 95 % quantile of the duration of each trial's last request, in milliseconds; `None` if no duration is known.
     latency: Option<[u64; 2]>,
+    /// Model names that the servers returned.
     served: BTreeSet<String>,
 }
 
 impl RunUsage {
-    /// The sums over some trials; `is_built_in` says of a model's name whether it is asked at no endpoint.
+    /// Sums the usage of trials. `is_built_in` returns true for the name of a model that needs no endpoint.
     pub(crate) fn new<'t>(
         trials: impl Iterator<Item = TrialRef<'t, ChoiceDetail>>,
         is_built_in: impl Fn(&str) -> bool,
     ) -> Self {
-        let (mut usage, mut waits) = (Self::default(), Vec::new());
+        let (mut usage, mut latencies) = (Self::default(), Vec::new());
         for trial in trials {
             if is_built_in(trial.model()) {
                 usage.built_in += 1;
@@ -45,20 +46,20 @@ impl RunUsage {
             usage.image_bytes = usage
                 .image_bytes
                 .saturating_add(trial.images().map_or(0, |images| images.bytes));
-            waits.extend(trial.latency_ms().map(|ms| ms as u32));
+            latencies.extend(trial.latency_ms().map(|ms| ms as u32));
             if let Some(model) = trial.served_model()
                 && !usage.served.contains(model)
             {
                 usage.served.insert(model.to_owned());
             }
         }
-        usage.latency = quantiles(&mut waits);
+        usage.latency = median_and_95(&mut latencies);
         usage
     }
 
-    /// Rows of names and values.
+    /// Facts about the usage: names and values.
     pub(super) fn facts(&self) -> Vec<(String, String)> {
-        let [median, most] = match self.latency {
+        let [median, quantile_95] = match self.latency {
             None => ["–".to_owned(), "–".to_owned()],
             Some(latency) => latency.map(|ms| format!("{ms} ms")),
         };
@@ -68,8 +69,8 @@ impl RunUsage {
                 "requests",
                 match self.built_in {
                     0 => format!("{} for {} trials", self.requests, self.trials),
-                    own => format!(
-                        "{} for {} trials; {own} trials of built-in models took none",
+                    built_in => format!(
+                        "{} for {} trials; {built_in} trials of built-in models took none",
                         self.requests, self.trials
                     ),
                 },
@@ -82,7 +83,10 @@ impl RunUsage {
                 ),
             ),
             ("image bytes", self.image_bytes.to_string()),
-            ("latency", format!("median {median}, 95 % within {most}")),
+            (
+                "latency",
+                format!("median {median}, 95 % within {quantile_95}"),
+            ),
             ("served as", served.join(", ")),
         ];
         rows.into_iter()
@@ -91,14 +95,13 @@ impl RunUsage {
     }
 }
 
-/// The median and the 95 % quantile.
-fn quantiles(waits: &mut [u32]) -> Option<[u64; 2]> {
-    let last = waits.len().checked_sub(1)?;
-    let mut at = |share: f64| {
-        let place = (last as f64 * share).round() as usize;
-        u64::from(*waits.select_nth_unstable(place).1)
-    };
-    Some([at(0.5), at(0.95)])
+/// Median and 95 % quantile by nearest rank; `None` without values. The values are reordered.
+fn median_and_95(values: &mut [u32]) -> Option<[u64; 2]> {
+    let last = values.len().checked_sub(1)?;
+    Some([0.5, 0.95].map(|share| {
+        let rank = (last as f64 * share).round() as usize;
+        u64::from(*values.select_nth_unstable(rank).1)
+    }))
 }
 
 #[cfg(test)]
@@ -106,10 +109,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_of_sorted_waits() {
-        let mut waits: Vec<u32> = (0..101).map(|wait| (wait * 37) % 101).collect();
-        assert_eq!(quantiles(&mut waits), Some([50, 95]));
-        assert_eq!(quantiles(&mut [7]), Some([7, 7]));
-        assert_eq!(quantiles(&mut []), None);
+    fn quantiles_ignore_the_order_of_values() {
+        let mut values: Vec<u32> = (0..101).map(|value| (value * 37) % 101).collect();
+        assert_eq!(median_and_95(&mut values), Some([50, 95]));
+        assert_eq!(median_and_95(&mut [7]), Some([7, 7]));
+        assert_eq!(median_and_95(&mut []), None);
     }
 }

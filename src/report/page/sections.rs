@@ -4,19 +4,19 @@ use serde::Serialize;
 
 use super::tables;
 use crate::drawing::chart::Figure;
-use crate::drawing::samples::{SamplePage, samples};
+use crate::drawing::samples::{SampleTable, samples};
 use crate::tables::{ENHANCERS, Section};
 use crate::text::table::Table;
 use crate::types::Thumbnail;
 
-/// A section as the template reads it.
+/// Section for the template.
 #[derive(Serialize)]
 pub(super) struct PageSection<'a> {
     id: &'static str,
     title: &'static str,
     note: &'static str,
     figures: Vec<&'a Figure>,
-    samples: Vec<SamplePage>,
+    samples: Vec<SampleTable>,
     tables: Vec<tables::PageTable<'a>>,
 }
 

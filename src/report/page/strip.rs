@@ -1,4 +1,4 @@
-//! One frame through the levels with the models' answers on it: [`Strip`].
+//! Images of one frame at each level, with the models' answers: [`Strip`].
 
 use std::collections::{BTreeSet, HashSet};
 
@@ -12,15 +12,16 @@ use darkqa_score::choice::ReadingMode;
 use darkqa_score::grid::{Grid, TrialResult};
 use darkqa_score::subject::{ModelInCondition, pooled_models};
 
-/// Most models whose answers stand on an image, and most rows; chosen for one screen.
+/// Maximum number of models whose answers are below an image (chosen to fit one screen).
 const MAX_MODELS: usize = 3;
+/// Maximum number of rows (chosen to fit one screen).
 const MAX_ROWS: usize = 4;
 
-/// One frame at each level, raw and enhanced, with each model's answer to one question.
+/// Images of one frame at each level, raw and enhanced, with each model's answer to one question.
 #[derive(Serialize)]
 pub(super) struct Strip {
     question: String,
-    /// The true choice; empty if nobody knows it.
+    /// True choice; empty if it is unknown.
     truth: String,
     levels: Vec<String>,
     rows: Vec<StripRow>,
@@ -44,19 +45,19 @@ struct StripCell {
 struct Answer {
     class: &'static str,
     sign: char,
-    /// The chosen text, or that no choice could be read; before it the model's name if there are several.
+    /// Text of the choice or of the reason why there is none, after the model's name if there are several models.
     text: String,
 }
 
-/// One row of images: a variant, raw or with an enhancer.
+/// Variant and enhancer of a row of images.
 struct Row<'a> {
     variant: Variant,
     enhancer: Option<&'a EnhancerName>,
 }
 
 impl Strip {
-    /// The strip of the first frame with thumbnails and of that of its questions whose answers change most between L0 and the other
-    /// images; `None` without thumbnails in several lights.
+    /// Builds the strip of the first frame with thumbnails. The question is the one whose answers change most between L0 and the other
+    /// images. `None` without thumbnails at several levels.
     ///
     /// # Errors
     /// If the question cannot be read.
@@ -75,24 +76,20 @@ impl Strip {
             .collect();
         let rows = rows(grid, &thumbnails);
         let models = models(grid);
-        let changes = |item: usize| {
-            rows.iter()
-                .flat_map(|row| levels.iter().map(move |level| (row, *level)))
-                .filter(|(row, level)| {
-                    models.iter().any(|model| {
-                        row.seen(grid, model, item, *level).is_right() == Some(false)
-                            && row.seen(grid, model, item, AxisLevel::L0).is_right() == Some(true)
-                    })
-                })
-                .count()
-        };
-        let items = grid.items.iter().enumerate();
-        // Of equal ones the first.
-        let Some(item) = items
+        // `max_by_key` returns the last maximum, so the order is reversed to prefer the first item.
+        let Some(item) = grid
+            .items
+            .iter()
+            .enumerate()
             .filter(|(_, item)| *item.asked.frame == *frame)
-            .map(|(place, _)| place)
+            .map(|(index, _)| index)
             .rev()
-            .max_by_key(|place| changes(*place))
+            .max_by_key(|item| {
+                rows.iter()
+                    .flat_map(|row| levels.iter().map(move |level| (row, *level)))
+                    .filter(|(row, level)| row.has_lost_answer(grid, &models, *item, *level))
+                    .count()
+            })
         else {
             return Ok(None);
         };
@@ -100,8 +97,7 @@ impl Strip {
             return Ok(None);
         }
         let asked = grid.items[item].asked;
-        let wanted = HashSet::from([&*asked.question]);
-        let question = (inputs.questions)(&wanted)?
+        let question = (inputs.questions)(&HashSet::from([&*asked.question]))?
             .remove(&*asked.question)
             .map(|question| question.text);
         let truth = asked.truth.and_then(|truth| asked.choices.get(truth));
@@ -110,7 +106,7 @@ impl Strip {
             truth: truth.cloned().unwrap_or_default(),
             rows: rows
                 .iter()
-                .map(|row| row.filled(grid, &models, item, frame, &thumbnails, &levels))
+                .map(|row| row.strip_row(grid, &models, item, frame, &thumbnails, &levels))
                 .collect(),
             levels: levels.iter().map(AxisLevel::to_string).collect(),
         }))
@@ -118,15 +114,15 @@ impl Strip {
 }
 
 impl<'a> Row<'a> {
-    /// An item as a model saw it at a level of this row.
-    fn seen(
+    /// Trial of an item with a model at a level of this row.
+    fn trial(
         &'a self,
         grid: &'a Grid<'a>,
         model: &'a str,
         item: usize,
         level: AxisLevel,
-    ) -> Seen<'a> {
-        Seen {
+    ) -> StripTrial<'a> {
+        StripTrial {
             grid,
             model,
             item,
@@ -135,8 +131,22 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// The row with its images and the answers to an item.
-    fn filled(
+    /// True if a model answers an item right at L0, but wrong at a level.
+    fn has_lost_answer(
+        &self,
+        grid: &Grid<'_>,
+        models: &[&str],
+        item: usize,
+        level: AxisLevel,
+    ) -> bool {
+        models.iter().any(|model| {
+            self.trial(grid, model, item, level).is_right() == Some(false)
+                && self.trial(grid, model, item, AxisLevel::L0).is_right() == Some(true)
+        })
+    }
+
+    /// Builds the images of the row with the answers to an item.
+    fn strip_row(
         &self,
         grid: &Grid<'_>,
         models: &[&str],
@@ -148,12 +158,12 @@ impl<'a> Row<'a> {
         let cells = levels.iter().map(|level| {
             let thumbnail = thumbnails
                 .iter()
-                .find(|thumbnail| thumbnail.frame == *frame && self.shows(thumbnail, *level))?;
+                .find(|thumbnail| thumbnail.frame == *frame && self.contains(thumbnail, *level))?;
             let answers: Vec<Answer> = models
                 .iter()
                 .filter_map(|model| {
-                    let seen = self.seen(grid, model, item, *level);
-                    seen.answer(models.len() > 1)
+                    self.trial(grid, model, item, *level)
+                        .answer(models.len() > 1)
                 })
                 .collect();
             let texts: Vec<String> = answers
@@ -172,8 +182,8 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// Whether a thumbnail is of this row at a level. The clean frame begins each row of raw images.
-    fn shows(&self, thumbnail: &Thumbnail, level: AxisLevel) -> bool {
+    /// True if a thumbnail belongs to this row at a level. The clean frame belongs to each row of raw images.
+    fn contains(&self, thumbnail: &Thumbnail, level: AxisLevel) -> bool {
         let condition = &thumbnail.condition;
         condition.level() == level
             && condition.enhancer.as_ref() == self.enhancer
@@ -181,12 +191,12 @@ impl<'a> Row<'a> {
     }
 }
 
-/// The rows: the exposure drop or another variant beside the main one, the main one, and the main one with each enhancer.
+/// Rows of a strip: another variant such as exposure drop alone, the main variant, and the main variant with each enhancer.
 fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
     let Some(main) = grid.main_variant() else {
         return Vec::new();
     };
-    let shown: BTreeSet<(Variant, Option<&EnhancerName>)> = thumbnails
+    let lights: BTreeSet<(Variant, Option<&EnhancerName>)> = thumbnails
         .iter()
         .map(|thumbnail| {
             let condition = &thumbnail.condition;
@@ -194,13 +204,13 @@ fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
         })
         .filter(|(variant, _)| variant.is_degraded())
         .collect();
-    let beside = shown
+    let other_variant = lights
         .iter()
         .find(|(variant, enhancer)| *variant != main && enhancer.is_none());
-    let of_main = shown.iter().filter(|(variant, _)| *variant == main);
-    beside
+    let main_variant = lights.iter().filter(|(variant, _)| *variant == main);
+    other_variant
         .into_iter()
-        .chain(of_main)
+        .chain(main_variant)
         .take(MAX_ROWS)
         .map(|(variant, enhancer)| Row {
             variant: variant.clone(),
@@ -209,24 +219,24 @@ fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
         .collect()
 }
 
-/// The first models that saw images.
+/// First models that were shown images.
 fn models<'a>(grid: &'a Grid<'_>) -> Vec<&'a str> {
-    let mut seeing: Vec<&str> = grid
+    let mut models: Vec<&str> = grid
         .subjects
         .iter()
         .filter(|subject| subject.level.is_some())
         .map(|subject| &*subject.model)
         .collect();
-    seeing.dedup();
-    let pooled = pooled_models(seeing.iter().copied());
-    seeing.retain(|model| pooled.contains(model));
-    seeing.truncate(MAX_MODELS);
-    seeing
+    models.dedup();
+    let pooled = pooled_models(models.iter().copied());
+    models.retain(|model| pooled.contains(model));
+    models.truncate(MAX_MODELS);
+    models
 }
 
-/// An item as a model saw it: at a level of a row.
+/// One item asked of one model at a level of a row.
 #[derive(Clone, Copy)]
-struct Seen<'a> {
+struct StripTrial<'a> {
     grid: &'a Grid<'a>,
     model: &'a str,
     item: usize,
@@ -234,8 +244,8 @@ struct Seen<'a> {
     row: &'a Row<'a>,
 }
 
-impl Seen<'_> {
-    /// The result, with an enhancer of the row or without; `None` if the grid has no such subject.
+impl StripTrial<'_> {
+    /// Result with or without an enhancer; `None` if the model was not asked in this condition.
     fn result(self, enhancer: Option<&EnhancerName>) -> Option<TrialResult> {
         let subject =
             ModelInCondition::with_images(self.model, self.level, &self.row.variant, enhancer);
@@ -245,7 +255,8 @@ impl Seen<'_> {
         )
     }
 
-    /// Whether the strict parsing of the reply is right, that at L0 without an enhancer; `None` without a reply or a true choice.
+    /// True if the answer by strict parsing is right; `None` without a reply or a true choice. At L0, the raw frame counts even in a row
+    /// with an enhancer.
     fn is_right(self) -> Option<bool> {
         let enhancer = self.row.enhancer.filter(|_| self.level != AxisLevel::L0);
         let reading = self.result(enhancer)?.reading(ReadingMode::Strict)?;
@@ -254,8 +265,8 @@ impl Seen<'_> {
         Some(item.is_right(reading))
     }
 
-    /// The answer, with the model's name or without; `None` if the item was not asked.
-    fn answer(self, is_named: bool) -> Option<Answer> {
+    /// Answer with its mark; `None` if the item was not asked. `has_name` puts the model's name before the text.
+    fn answer(self, has_name: bool) -> Option<Answer> {
         let result = self.result(self.row.enhancer)?;
         if !result.is_asked() {
             return None;
@@ -277,7 +288,7 @@ impl Seen<'_> {
         Some(Answer {
             class,
             sign,
-            text: if is_named {
+            text: if has_name {
                 format!("{}: {text}", self.model)
             } else {
                 text.to_owned()

@@ -1,42 +1,43 @@
-//! Tables as a page shows them: [`page_tables`].
+//! Tables of the page: [`page_tables`].
 
 use serde::Serialize;
 
 use crate::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
 use crate::text::words::{ends, interval, words};
+use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance;
 
 /// Maximum number of rows of a table that is not folded.
 const MAX_OPEN_ROWS: usize = 60;
 
-/// Least number of rows in which nothing is shown that are folded: fewer are read faster than opened.
-const LEAST_UNSHOWN: usize = 3;
+/// Minimum number of rows without a detected effect that are folded (chosen); fewer stay visible.
+const MIN_FOLDED_ROWS: usize = 3;
 
-/// A table as the template reads it.
+/// Table for the template.
 #[derive(Serialize)]
 pub(in crate::report) struct PageTable<'a> {
     caption: &'a str,
-    /// Whether the table is closed until the reader opens it.
+    /// True if the table is closed until the reader opens it.
     folded: bool,
-    /// The line below it; `None` without one.
+    /// Line below the table; `None` without one.
     foot: Option<&'a str>,
     head: Vec<&'a str>,
     rows: Vec<PageRow<'a>>,
-    /// Rows of tests in which nothing is shown, which are closed until the reader opens them; `None` without any.
-    unshown: Option<UnshownRows<'a>>,
+    /// Rows of tests without a detected effect, closed until the reader opens them; `None` without any.
+    unshown: Option<FoldedRows<'a>>,
 }
 
-/// Rows of tests in which nothing is shown.
+/// Rows of tests without a detected effect.
 #[derive(Serialize)]
-struct UnshownRows<'a> {
-    /// Their number and the largest effect among them.
+struct FoldedRows<'a> {
+    /// Number of rows, and the largest effect among them.
     summary: String,
     rows: Vec<PageRow<'a>>,
 }
 
 #[derive(Serialize)]
 struct PageRow<'a> {
-    /// The heading above the row; `None` without one.
+    /// Heading above the row; `None` without one.
     heading: Option<&'a str>,
     cells: Vec<PageCell>,
 }
@@ -44,37 +45,38 @@ struct PageRow<'a> {
 #[derive(Serialize)]
 struct PageCell {
     text: String,
-    /// Both ends of the interval, which stand beneath the text; empty if there are none.
+    /// Both ends of the interval, shown below the text; empty without an interval.
     ends: String,
     class: &'static str,
 }
 
-/// The tables of a section that have a row.
+/// Tables of a section that have rows.
 pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTable<'a>> {
     tables
         .iter()
         .filter(|table| table.section == section)
         .map(|table| {
-            let head = table.columns.iter();
-            let all = table.rows_in(TableFormat::Page);
-            let (unshown, shown): (Vec<&TableRow>, Vec<&TableRow>) =
-                all.partition(|row| is_unshown(row));
-            let (unshown, shown) = match unshown.len() {
-                0..LEAST_UNSHOWN => (Vec::new(), table.rows_in(TableFormat::Page).collect()),
-                _ => (unshown, shown),
-            };
-            let rows = page_rows(table, &shown);
+            let (mut folded, mut visible): (Vec<&TableRow>, Vec<&TableRow>) = table
+                .rows_in(TableFormat::Page)
+                .partition(|row| is_undetected(row));
+            if folded.len() < MIN_FOLDED_ROWS {
+                folded.clear();
+                visible = table.rows_in(TableFormat::Page).collect();
+            }
+            let rows = page_rows(table, &visible);
             PageTable {
                 caption: &table.caption,
                 folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,
-                unshown: (!unshown.is_empty()).then(|| UnshownRows {
-                    summary: summary(table, &unshown),
-                    rows: page_rows(table, &unshown),
+                unshown: (!folded.is_empty()).then(|| FoldedRows {
+                    summary: summary(table, &folded),
+                    rows: page_rows(table, &folded),
                 }),
                 foot: table.foot.as_deref(),
-                head: head
+                head: table
+                    .columns
+                    .iter()
                     .filter_map(|column| column.heads.page.as_deref())
-                    // A column without a head holds verdicts; whoever hears the table needs its name.
+                    // Columns of verdicts have no head; screen readers need one.
                     .map(|head| if head.is_empty() { "verdict" } else { head })
                     .collect(),
                 rows,
@@ -84,69 +86,76 @@ pub(in crate::report) fn page_tables<'a>(tables: &'a [Table], section: &str) -> 
         .collect()
 }
 
-/// Whether a row is of a test in which nothing is shown.
-fn is_unshown(row: &TableRow) -> bool {
+/// True for the row of a test that detected no effect.
+fn is_undetected(row: &TableRow) -> bool {
     row.cells.iter().any(|cell| match cell {
         TableCell::Significance(significance) => !significance.is_shown(),
         _ => false,
     })
 }
 
-/// Rows as the template reads them, with a heading where a group begins or ends.
+/// Rows for the template, with a heading where the group changes.
 fn page_rows<'a>(table: &'a Table, rows: &[&'a TableRow]) -> Vec<PageRow<'a>> {
-    let mut above: Option<&str> = None;
+    let mut last_group: Option<&str> = None;
     rows.iter()
         .map(|row| {
             let group = row.group.as_deref();
-            let heading = (group != above).then(|| group.unwrap_or_default());
-            above = group;
-            let cells = table.cells(row);
-            let cells = cells
-                .filter(|(column, _)| column.heads.page.is_some())
-                .map(|(column, cell)| text(column.kind, cell));
+            let heading = (group != last_group).then(|| group.unwrap_or_default());
+            last_group = group;
             PageRow {
                 heading,
-                cells: cells.collect(),
+                cells: table
+                    .cells(row)
+                    .filter(|(column, _)| column.heads.page.is_some())
+                    .map(|(column, cell)| page_cell(column.kind, cell))
+                    .collect(),
             }
         })
         .collect()
 }
 
-/// The number of rows in which nothing is shown, and the largest difference among them with the texts that stand before it.
+/// First difference in a row, with its text.
+fn difference(table: &Table, row: &TableRow) -> Option<(Estimate, String)> {
+    table
+        .cells(row)
+        .find_map(|(column, cell)| match (column.kind, cell) {
+            (ColumnKind::Points, TableCell::Estimate(difference)) => {
+                Some((*difference, words(column.kind, cell)))
+            }
+            _ => None,
+        })
+}
+
+/// Number of rows without a detected effect, and the largest difference among them with the names in its row.
 fn summary(table: &Table, rows: &[&TableRow]) -> String {
     let count = match rows.len() {
         1 => "1 row in which nothing is shown".to_owned(),
         count => format!("{count} rows in which nothing is shown"),
     };
-    let difference = |row: &&TableRow| {
-        let mut cells = table.cells(row);
-        cells.find_map(|(column, cell)| match (column.kind, cell) {
-            (ColumnKind::Points, TableCell::Estimate(found)) => {
-                Some((*found, words(column.kind, cell)))
-            }
-            _ => None,
-        })
-    };
-    let differences = rows.iter().filter_map(|row| Some((row, difference(row)?)));
-    let largest =
-        differences.max_by(|(_, (a, _)), (_, (b, _))| a.value.abs().total_cmp(&b.value.abs()));
+    let largest = rows
+        .iter()
+        .filter_map(|row| Some((row, difference(table, row)?)))
+        .max_by(|(_, (a, _)), (_, (b, _))| a.value.abs().total_cmp(&b.value.abs()));
     let Some((row, (_, text))) = largest else {
         return count;
     };
-    let cells = table.cells(row);
-    let cells = cells.filter(|(column, _)| column.heads.page.is_some());
-    let names = cells.map_while(|(column, cell)| match (column.kind, cell) {
-        (ColumnKind::Text, cell) => Some(words(column.kind, cell)),
-        _ => None,
-    });
-    let names: Vec<String> = names.filter(|name| !name.is_empty()).collect();
+    let names: Vec<String> = table
+        .cells(row)
+        .filter(|(column, _)| column.heads.page.is_some())
+        .map_while(|(column, cell)| match (column.kind, cell) {
+            (ColumnKind::Text, cell) => Some(words(column.kind, cell)),
+            _ => None,
+        })
+        .filter(|name| !name.is_empty())
+        .collect();
     format!(
         "{count}; the largest difference is {text} ({})",
         names.join(", ")
     )
 }
 
-fn text(kind: ColumnKind, cell: &TableCell) -> PageCell {
+/// Cell for the template.
+fn page_cell(kind: ColumnKind, cell: &TableCell) -> PageCell {
     let class = match (kind, cell) {
         (_, TableCell::Below(_)) => "below",
         (_, TableCell::Significance(Significance::Better)) => "better",

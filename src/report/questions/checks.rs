@@ -1,4 +1,4 @@
-//! Findings of people who checked questions, as text and as JSON: [`text`], [`json()`].
+//! Report on questions that people checked, as text and as JSON: [`text`], [`json()`].
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use crate::types::Family;
 use darkqa_score::answers::checks::{Checks, agreements, shares};
 use darkqa_score::estimate::Estimate;
 
-/// The table of each person's findings by family, with a line about each two people; empty without checks.
+/// Table of wrong and ambiguous questions by person and family, with a line on the agreement of each two people; empty without checks.
 #[must_use]
 pub(crate) fn text(checks: &Checks) -> String {
     if checks.is_empty() {
@@ -55,10 +55,14 @@ pub(crate) fn text(checks: &Checks) -> String {
     text
 }
 
-/// The same as JSON.
+/// Value and interval as JSON, without the sample size.
+fn estimate_json(estimate: Estimate) -> Value {
+    json!({"value": estimate.value, "low": estimate.low, "high": estimate.high})
+}
+
+/// Shares by person and family, and agreements, as JSON.
 #[must_use]
 pub(crate) fn json(checks: &Checks) -> Value {
-    let estimate = |estimate: Estimate| json!({"value": estimate.value, "low": estimate.low, "high": estimate.high});
     let shares: Vec<Value> = shares(checks)
         .into_iter()
         .map(|share| {
@@ -66,8 +70,8 @@ pub(crate) fn json(checks: &Checks) -> Value {
                 "person": share.person,
                 "family": share.family.as_ref().map_or(Family::TOTAL, Family::name),
                 "questions": share.wrong.n,
-                "wrong": estimate(share.wrong),
-                "ambiguous": estimate(share.ambiguous),
+                "wrong": estimate_json(share.wrong),
+                "ambiguous": estimate_json(share.ambiguous),
             })
         })
         .collect();
@@ -77,7 +81,7 @@ pub(crate) fn json(checks: &Checks) -> Value {
             json!({
                 "people": pair.people,
                 "questions": pair.same.n,
-                "same": estimate(pair.same),
+                "same": estimate_json(pair.same),
                 "kappa": pair.kappa,
                 "kappa_interval": pair.interval,
             })

@@ -1,13 +1,13 @@
-//! Statistics of a set of questions: a table, files of all counts, and a figure.
+//! Reports on a set of questions: statistics as a table, as files and as a figure, checks by people, and comparison with another set.
 
 pub(crate) mod against;
 pub(crate) mod checks;
 pub(crate) mod figure;
 pub(crate) mod review;
 
-use std::fmt::{Display, Write as _};
+use std::fmt::Display;
 
-use against::LookComparison;
+use against::AppearanceComparison;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -20,40 +20,31 @@ use crate::types::Family;
 use darkqa_questions::summary::{Baselines, CandidateCounts, QuestionSummary};
 use darkqa_score::answers::checks::Checks;
 
-/// Maximum number of reasons in a line of the table.
-const REASONS: usize = 3;
+/// Maximum number of reasons in a row of the table.
+const MAX_REASONS: usize = 3;
 
-/// The table for the terminal: questions by family, with their candidates and with the scores of answering without images.
+/// Table for the terminal: questions by family, with the scores of answering without images and the number of valid candidates.
 #[must_use]
 pub(crate) fn table(summary: &QuestionSummary) -> String {
     let families = Family::PAPER.iter().filter_map(|family| {
         let candidates = summary.candidates.get(family)?;
         Some((family.name(), Some(candidates)))
     });
-    let whole = summary.baselines.get(Family::TOTAL);
-    let rows = families.chain(whole.map(|_| (Family::TOTAL, None)));
-    let share = |family: &str, right: fn(&Baselines) -> f64| {
-        let base = summary
-            .baselines
-            .get(family)
-            .filter(|base| base.questions > 0);
-        base.map_or("–".to_owned(), |base| {
-            format!("{:.1}", 100.0 * right(base) / base.questions as f64)
-        })
-    };
+    let total = summary.baselines.get(Family::TOTAL);
+    let rows = families.chain(total.map(|_| (Family::TOTAL, None)));
     let table = TableBuilder::new("questions", rows)
         .column(Text, "terminal family", |(family, _)| *family)
         .column(Count, "terminal questions", |(_, candidates)| {
             candidates.map_or(summary.questions, |counts| counts.asked as usize)
         })
         .column(Count, "terminal chance %", |(family, _)| {
-            share(family, |base| base.chance)
+            baseline_text(summary, family, |base| base.chance)
         })
         .column(Count, "terminal majority %", |(family, _)| {
-            share(family, |base| base.majority as f64)
+            baseline_text(summary, family, |base| base.majority as f64)
         })
         .column(Count, "terminal prior %", |(family, _)| {
-            share(family, |base| base.prior)
+            baseline_text(summary, family, |base| base.prior)
         })
         .column(Count, "terminal candidates that hold", |(_, candidates)| {
             candidates.map_or(String::new(), |counts| counts.viable.to_string())
@@ -62,12 +53,25 @@ pub(crate) fn table(summary: &QuestionSummary) -> String {
             candidates.map_or(String::new(), reasons)
         })
         .build();
-    let mut text = terminal::table(&[table]);
-    notes(summary, &mut text);
-    text
+    let notes: String = notes(summary).into_iter().map(|note| note + "\n").collect();
+    terminal::table(&[table]) + &notes
 }
 
-/// The most frequent reasons for rejected candidates, with counts.
+/// Score of a way to answer without images, in percent. `right` reads the expected number of right answers.
+fn baseline_text(summary: &QuestionSummary, family: &str, right: fn(&Baselines) -> f64) -> String {
+    let baselines = summary
+        .baselines
+        .get(family)
+        .filter(|baselines| baselines.questions > 0);
+    baselines.map_or("–".to_owned(), |baselines| {
+        format!(
+            "{:.1}",
+            100.0 * right(baselines) / baselines.questions as f64
+        )
+    })
+}
+
+/// Most frequent reasons for rejected candidates, with counts.
 fn reasons(candidates: &CandidateCounts) -> String {
     let mut rejected: Vec<(String, u64)> = candidates
         .rejections
@@ -77,101 +81,98 @@ fn reasons(candidates: &CandidateCounts) -> String {
     rejected.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
     let reasons: Vec<String> = rejected
         .iter()
-        .take(REASONS)
+        .take(MAX_REASONS)
         .map(|(reason, count)| format!("{reason} {count}"))
         .collect();
     reasons.join(", ")
 }
 
-/// Appends the notes below the table.
-fn notes(summary: &QuestionSummary, text: &mut String) {
-    let mut note = |line: String| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{line}");
-    };
-    note(format!(
+/// Notes below the table.
+fn notes(summary: &QuestionSummary) -> Vec<String> {
+    let mut notes = vec![format!(
         "{} about {} of {}; prior: the commonest answer to the same words in other scenes",
         counted(summary.questions, "question"),
         counted(summary.frames, "frame"),
         counted(summary.scenes, "scene")
-    ));
-    let sum = |count: fn(&CandidateCounts) -> u64| -> u64 {
-        summary.candidates.values().map(count).sum()
-    };
-    let (unbalanced, rejected) = (sum(|c| c.unbalanced), sum(|c| c.rejected));
+    )];
+    let candidates = summary.candidates.values();
+    let unbalanced: u64 = candidates.clone().map(|counts| counts.unbalanced).sum();
+    let rejected: u64 = candidates.map(|counts| counts.rejected).sum();
     if unbalanced > 0 {
-        note(format!(
+        notes.push(format!(
             "{unbalanced} more were left out to even out the answers (--balance {})",
             summary.balance
         ));
     }
     if rejected > 0 {
-        note(format!("{rejected} more were rejected by a person"));
+        notes.push(format!("{rejected} more were rejected by a person"));
     }
     let [both, same] = summary.room_agreement;
     if both > 0 {
-        note(format!(
+        notes.push(format!(
             "rooms: {same} of {both} that are both seen and stated agree"
         ));
     }
     if summary.dark > 0 {
-        note(format!(
+        notes.push(format!(
             "too dark to ask about: {}",
             counted(summary.dark, "frame")
         ));
     }
     if summary.failed > 0 {
-        note(format!(
+        notes.push(format!(
             "no questions, because measuring failed: {}",
             counted(summary.failed, "frame")
         ));
     }
     if !summary.unknown.is_empty() {
         let ids: Vec<String> = summary.unknown.keys().take(8).map(u16::to_string).collect();
-        note(format!(
+        notes.push(format!(
             "{} not in classes.json and read as unlabelled, for example {} (--strict makes this an error)",
             counted(summary.unknown.len(), "number"),
             ids.join(", ")
         ));
     }
+    notes
 }
 
-/// The serialised name of a unit variant, with spaces.
+/// Serialized name of an enum variant, with spaces for underscores.
 fn variant_words<T: serde::Serialize>(value: &T) -> String {
     let json = serde_json::to_value(value).unwrap_or_default();
     json.as_str().unwrap_or_default().replace('_', " ")
 }
 
-/// The summary, with what people found about the questions and the comparison with another set.
+/// Content of the JSON file: the summary, checks by people, and a comparison with another set.
 #[derive(Serialize)]
-struct WrittenSummary<'a> {
+struct SummaryFile<'a> {
     #[serde(flatten)]
     summary: &'a QuestionSummary,
     #[serde(skip_serializing_if = "Option::is_none")]
     checks: Option<serde_json::Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    against: Option<&'a LookComparison>,
+    against: Option<&'a AppearanceComparison>,
 }
 
-/// The summary as JSON, with what people found about the questions and the comparison with another set, if there is one.
+/// Serializes the summary as JSON, with the checks by people and a comparison with another set, if there are any.
 ///
 /// # Errors
-/// If the statistics cannot be written.
+/// If the statistics cannot be serialized.
 pub(crate) fn json(
     summary: &QuestionSummary,
     checks: &Checks,
-    against: Option<&LookComparison>,
+    against: Option<&AppearanceComparison>,
 ) -> Result<String> {
-    let wrong = |e: serde_json::Error| Error::data("statistics", e);
-    let written = WrittenSummary {
+    let file = SummaryFile {
         summary,
         checks: (!checks.is_empty()).then(|| checks::json(checks)),
         against,
     };
-    Ok(serde_json::to_string_pretty(&written).map_err(wrong)? + "\n")
+    serde_json::to_string_pretty(&file)
+        .map(|text| text + "\n")
+        .map_err(|e| Error::data("statistics", e))
 }
 
-/// All counts as CSV: `table, row, column, count`.
+/// Writes all counts as CSV with the columns `table, row, column, count`.
 ///
 /// # Errors
 /// If the statistics cannot be written.
@@ -180,7 +181,7 @@ pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
     let mut row = |table: &str, row: &dyn Display, column: &str, count: &dyn Display| {
         rows.push([table, &row.to_string(), column, &count.to_string()].map(str::to_owned));
     };
-    for (what, count) in [
+    for (name, count) in [
         ("scenes", summary.scenes),
         ("frames", summary.frames),
         ("failed", summary.failed),
@@ -188,7 +189,7 @@ pub(crate) fn csv(summary: &QuestionSummary) -> Result<Vec<u8>> {
         ("questions", summary.questions),
         ("repeats", summary.repeats),
     ] {
-        row("all", &what, "", &count);
+        row("all", &name, "", &count);
     }
     for (family, candidates) in &summary.candidates {
         let name = family.name();

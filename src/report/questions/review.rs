@@ -1,4 +1,4 @@
-//! The page on which a person checks each question: [`page`].
+//! HTML page on which a person checks each question: [`page`].
 
 use serde::Serialize;
 
@@ -7,12 +7,12 @@ use crate::text::script::embedded;
 use crate::types::Digest;
 use darkqa_questions::GeneratedQuestion;
 
-/// The template of the page.
+/// Template of the page.
 const PAGE: &str = include_str!("review.html");
-/// The text in the template that the questions replace.
+/// Text in the template that the questions replace.
 const PLACEHOLDER: &str = "/*QUESTIONS*/null";
 
-/// A question as the page shows it.
+/// Question on the page.
 #[derive(Debug, Serialize)]
 pub(crate) struct ReviewItem<'a> {
     id: &'a str,
@@ -29,7 +29,7 @@ pub(crate) struct ReviewItem<'a> {
 }
 
 impl<'a> ReviewItem<'a> {
-    /// A question about the image at path `image`; `size` is its width and height in pixels.
+    /// Item for a question about the image at path `image`, whose `size` is width and height in pixels.
     #[must_use]
     pub(crate) fn new(generated: &'a GeneratedQuestion, image: String, size: [usize; 2]) -> Self {
         let question = &generated.question;
@@ -47,20 +47,21 @@ impl<'a> ReviewItem<'a> {
     }
 }
 
-/// The data of the page.
+/// Data of the page's script.
 #[derive(Serialize)]
 struct ReviewPage<'a> {
-    /// Digest of the question ids. The browser stores what a person found under it and the person's name until it is saved.
+    /// Digest of the question ids. The browser keeps a person's results under it and the person's name until they are saved.
     set: Digest,
     items: &'a [ReviewItem<'a>],
 }
 
-/// The page as one HTML file. It shows each question with its image, and takes the person's own answer. Only then does it show
-/// the answer of the rule with its evidence, so that the shares found wrong are those of people who did not know it. It saves
-/// lines of JSON under the person's name.
+/// Renders the page as one HTML file.
+///
+/// The page shows each question with its image and asks for the person's own answer. Only then does it show the generated answer with its
+/// evidence, so that the answer does not influence the person. It saves lines of JSON under the person's name.
 ///
 /// # Errors
-/// If the questions cannot be written.
+/// If the questions cannot be serialized.
 pub(crate) fn page(items: &[ReviewItem<'_>]) -> Result<String> {
     let set = Digest::from_parts(items.iter().map(|item| item.id.as_bytes()));
     Ok(PAGE.replacen(PLACEHOLDER, &embedded(&ReviewPage { set, items })?, 1))
@@ -74,7 +75,7 @@ mod tests {
     use crate::types::{Choices, Family, FrameId, Question, QuestionId};
 
     #[test]
-    fn no_text_of_a_question_ends_the_script() {
+    fn question_texts_cannot_end_the_script() {
         let choices = ["</script><b>", "no"].map(str::to_owned).to_vec();
         let question = Question {
             id: QuestionId("a".into()),

@@ -1,4 +1,4 @@
-//! The files of a comparison: CSV tables, the figure of the residuals, and crops.
+//! Files of a comparison of synthetic with real low light: CSV tables, the figure of residuals, and crops.
 
 use crate::drawing::chart::LineStyle;
 use crate::drawing::chart::points::{PointPanel, PointSeries};
@@ -14,7 +14,7 @@ use darkqa_score::photographs::realism::{
     CameraOrigin, ImageComparison, NoiseComparison, NoiseMethod, PairComparison,
 };
 
-/// One way to make the image of one pair; no noise for exposure drop alone.
+/// Synthetic image of one pair; `noise` is `None` for exposure drop alone.
 struct PairRow<'a> {
     pair: &'a PairComparison,
     noise: Option<&'a NoiseComparison>,
@@ -25,19 +25,18 @@ impl PairRow<'_> {
         self.noise.map_or(&self.pair.exposure, |noise| &noise.image)
     }
 
-    /// Difference of a number from that of exposure drop alone.
+    /// Difference of a measure from exposure drop alone, by its index in [`ImageComparison::differences`].
     fn difference(&self, index: usize) -> Option<f64> {
         let differences = self.noise?.image.differences(&self.pair.exposure);
         Some(differences[index])
     }
 }
 
-/// CSV file with a row for each pair and each way of making its image.
+/// CSV file with a row for each pair and each way to synthesize its image.
 pub(crate) fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
     let rows = pairs.iter().flat_map(|pair| {
-        let noise = pair.noise.iter().map(Some);
         std::iter::once(None)
-            .chain(noise)
+            .chain(pair.noise.iter().map(Some))
             .map(|noise| PairRow { pair, noise })
     });
     let table = TableBuilder::new("pairs", rows)
@@ -70,7 +69,7 @@ pub(crate) fn pairs(pairs: &[&PairComparison]) -> Result<Vec<u8>> {
     csv(&[table])
 }
 
-/// Residuals of all pairs together: of the real images, and of each way of making noise.
+/// Residuals of all pairs together: of the real images, and of each noise method.
 pub(crate) struct PooledResiduals {
     pub real: Residuals,
     pub noise: Vec<(NoiseMethod, Residuals)>,
@@ -100,32 +99,35 @@ pub(crate) fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
     csv(&[table])
 }
 
-/// Figure of the shares of real and synthetic residuals by their size in 8-bit codes.
+/// Figure with histograms of real and synthetic residuals in 8-bit codes.
 pub(crate) fn figure(residuals: &PooledResiduals) -> Result<String> {
-    let real = histogram("real".to_owned(), LineStyle::BLACK, residuals.real.shares());
-    let noise = residuals.noise.iter().enumerate();
-    let noise = noise.map(|(style, (method, noise))| {
+    let mut series = vec![histogram(
+        "real".to_owned(),
+        LineStyle::BLACK,
+        residuals.real.shares(),
+    )];
+    for (style, (method, noise)) in residuals.noise.iter().enumerate() {
         let name = format!("synthetic, {method}");
-        histogram(name, LineStyle(style), noise.shares())
-    });
+        series.push(histogram(name, LineStyle(style), noise.shares()));
+    }
     point_figure(&[PointPanel {
         title: "Residuals over the dropped clean image, all pairs".to_owned(),
         axes: ["residual in 8-bit codes", "log10 of the share of samples"],
-        series: std::iter::once(real).chain(noise).collect(),
+        series,
     }])
 }
 
 /// Smallest share that is drawn.
 const MIN_SHARE: f64 = 1e-7;
 
-/// A line over the sizes of residuals, with a gap where a size does not occur. A size between two that do not occur is a point.
+/// Histogram on a logarithmic scale as lines, with gaps at residuals that do not occur. A residual without neighbours is a point.
 fn histogram(
     name: String,
     style: LineStyle,
     shares: impl Iterator<Item = (i32, f64)>,
 ) -> PointSeries {
-    let shares: Vec<(i32, f64)> = shares.collect();
     let (points, lines): (Vec<_>, Vec<_>) = shares
+        .collect::<Vec<_>>()
         .split(|(_, share)| *share <= MIN_SHARE)
         .filter(|run| !run.is_empty())
         .map(|run| {
@@ -142,7 +144,7 @@ fn histogram(
     }
 }
 
-/// Crops of pairs, brightened by the exposure drop of each pair: the real image, that of exposure drop alone, and those with noise.
+/// Sheet of crops from each pair, brightened by its exposure drop: real image, exposure drop alone, and each noise method.
 #[must_use]
 pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rgb])>) -> Rgb {
     let pairs: Vec<_> = pairs.collect();
@@ -151,17 +153,17 @@ pub(crate) fn crops<'a>(pairs: impl Iterator<Item = (&'a PairComparison, &'a [Rg
         .map(|(pair, images)| CropRow {
             name: format!("{} (drop {:.2} EV)", pair.pair, pair.drop),
             images: images.iter().collect(),
-            amplified: f64::from(pair.drop).exp2(),
+            gain: f64::from(pair.drop).exp2(),
         })
         .collect();
-    let noise = pairs.iter().take(1).flat_map(|(pair, _)| &pair.noise);
-    // A column is 36 letters wide.
-    let noise = noise.map(|noise| match noise.method.camera {
-        CameraOrigin::Given => format!("with noise, {}", noise.method.reading),
-        _ => format!("with noise, {}, fitted", noise.method.reading),
-    });
-    let columns = ["real", "exposure drop alone"].map(str::to_owned);
-    let columns: Vec<String> = columns.into_iter().chain(noise).collect();
+    let mut columns = vec!["real".to_owned(), "exposure drop alone".to_owned()];
+    for noise in pairs.iter().take(1).flat_map(|(pair, _)| &pair.noise) {
+        // A column has space for 36 letters.
+        columns.push(match noise.method.camera {
+            CameraOrigin::Given => format!("with noise, {}", noise.method.reading),
+            _ => format!("with noise, {}, fitted", noise.method.reading),
+        });
+    }
     let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
     sheet::crops(&columns, &rows)
 }
@@ -171,7 +173,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn histogram_has_gaps_where_nothing_occurs() {
+    fn histograms_have_gaps() {
         let shares = [
             (-1, 0.1),
             (0, 0.8),

@@ -1,4 +1,4 @@
-//! The table and the file of fitted gains: [`table`], [`by_pair`] and [`csv()`].
+//! Table and file of the gains fitted to real images: [`table`], [`pair_lines`] and [`csv()`].
 
 use crate::error::Result;
 use crate::text::csv;
@@ -8,27 +8,24 @@ use crate::text::terminal;
 use darkqa_score::photographs::realism::gain::{FitOutcome, PairFit, PooledGain, ReadingFit};
 use darkqa_score::photographs::realism::mean::Mean;
 
-/// The definition of a picture's gain, printed beside every gain.
+/// Remark on the gain of a saved image, printed with every gain.
 pub(crate) const AS_SAVED: &str =
     "as saved; a smaller K than the sensor's means that noise was averaged away";
 
-/// The table of the gains over pairs, a row for each noise profile.
+/// Table of the gains over pairs, with a row for each noise profile.
 pub(super) fn table(fits: &[ReadingFit]) -> String {
-    let range = |gains: &PooledGain| {
-        let [low, high] = gains.range.map(number);
-        format!("{low} to {high}")
-    };
     let table = TableBuilder::new("fits", fits)
         .column(Text, "terminal", |fit| fit.reading.to_string())
         .column(Text, "terminal K", |fit| {
-            fit.pooled.as_ref().map(|gains| mean(fit, gains, 1.0))
+            fit.pooled.as_ref().map(|gains| mean_text(fit, gains, 1.0))
         })
         .column(Text, "terminal rK", |fit| {
-            let product = mean(fit, fit.pooled.as_ref()?, fit.ratio?);
+            let product = mean_text(fit, fit.pooled.as_ref()?, fit.ratio?);
             Some(format!("{product} at r {}", number(fit.ratio?)))
         })
         .column(Text, "terminal 10–90 %", |fit| {
-            fit.pooled.as_ref().map(range)
+            let [low, high] = fit.pooled.as_ref()?.range.map(number);
+            Some(format!("{low} to {high}"))
         })
         .column(Text, "terminal pairs fitted", |fit| {
             let fitted = fit.pooled.as_ref().map_or(0, |gains| gains.n);
@@ -41,34 +38,33 @@ pub(super) fn table(fits: &[ReadingFit]) -> String {
     )
 }
 
-/// The geometric mean of a multiple of K with its interval; the values alone where there are too few for it.
-fn mean(fit: &ReadingFit, gains: &PooledGain, factor: f64) -> String {
-    let number = |gain: f64| number(factor * gain);
+/// Geometric mean of K times a factor, with its interval; a list of all values if they are too few for an interval.
+fn mean_text(fit: &ReadingFit, gains: &PooledGain, factor: f64) -> String {
     if let Some(Mean {
         value,
-        interval: Some(ends),
+        interval: Some([low, high]),
         ..
-    }) = &gains.mean
+    }) = gains.mean
     {
-        let [low, high] = ends.map(&number);
-        return format!("{} ({low} to {high})", number(*value));
+        let [value, low, high] = [value, low, high].map(|gain| number(factor * gain));
+        return format!("{value} ({low} to {high})");
     }
     fit.pairs
         .iter()
         .filter_map(|pair| pair.fit.fitted())
-        .map(number)
+        .map(|gain| number(factor * gain))
         .collect::<Vec<_>>()
         .join(", ")
 }
 
-/// A line of text for each pair and each noise profile.
-pub(super) fn by_pair(fits: &[ReadingFit]) -> impl Iterator<Item = String> {
+/// One line of text for each pair and each noise profile.
+pub(super) fn pair_lines(fits: &[ReadingFit]) -> impl Iterator<Item = String> {
     fits.iter()
-        .flat_map(|fit| fit.pairs.iter().map(|pair| line(fit, pair)))
+        .flat_map(|fit| fit.pairs.iter().map(|pair| pair_line(fit, pair)))
 }
 
-fn line(fit: &ReadingFit, PairFit { pair, fit: found }: &PairFit) -> String {
-    let gain = found.gain.map(|gain| match fit.ratio {
+fn pair_line(fit: &ReadingFit, PairFit { pair, fit: result }: &PairFit) -> String {
+    let gain = result.gain.map(|gain| match fit.ratio {
         Some(ratio) => format!(
             "rK {} (K {} at r {})",
             number(ratio * gain),
@@ -77,14 +73,13 @@ fn line(fit: &ReadingFit, PairFit { pair, fit: found }: &PairFit) -> String {
         ),
         None => format!("K {}", number(gain)),
     });
-    let misfit = found.misfit.map(|misfit| format!("misfit {misfit:.2}"));
-    let outcome = found.outcome != FitOutcome::Fitted;
-    let outcome = outcome.then(|| found.outcome.to_string());
+    let misfit = result.misfit.map(|misfit| format!("misfit {misfit:.2}"));
+    let outcome = (result.outcome != FitOutcome::Fitted).then(|| result.outcome.to_string());
     let parts: Vec<String> = [gain, misfit, outcome].into_iter().flatten().collect();
     format!("{pair}, {}: {}", fit.reading, parts.join(", "))
 }
 
-/// A number with three significant digits.
+/// Formats a number with three significant digits.
 fn number(value: f64) -> String {
     let digits = 2 - libm::log10(value.abs().max(1e-9)).floor() as i32;
     let text = format!("{value:.*}", digits.clamp(0, 9) as usize);

@@ -1,4 +1,4 @@
-//! Report of a comparison with real pairs: [`RealismSummary`], its files and its figures.
+//! Report on a comparison of synthetic with real low light: [`RealismSummary`], its files and its figures.
 
 mod files;
 mod fits;
@@ -26,23 +26,23 @@ pub(crate) struct RealismSummary {
     pairs: usize,
     #[serde(flatten)]
     source: ComparedData,
-    /// Bins and rule for empty bins of the divergence, in words.
+    /// Text for the bins of the KL divergence and their rule for empty bins.
     kl_rule: String,
-    /// The same with the other rule for empty bins; `None` for bins that are never empty.
+    /// Text with the other rule for empty bins; `None` for bins that are never empty.
     kl_other_rule: Option<String>,
     /// Mean exposure drop in EV.
     drop: Mean,
     exposure: MethodRow,
-    /// A row for each noise profile and camera.
+    /// One row for each noise profile and camera.
     noise: Vec<NoiseRow>,
     /// Fitted gains by noise profile; empty without `--fit`.
     fits: Vec<ReadingFit>,
-    /// A line of text for each pair.
+    /// One line of text for each pair.
     #[serde(skip)]
-    by_pair: Vec<String>,
+    pair_lines: Vec<String>,
 }
 
-/// The rules by which residuals are compared.
+/// Histogram rules for the comparison of residuals.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ResidualRules {
     /// Bins of the histograms.
@@ -52,7 +52,8 @@ pub(crate) struct ResidualRules {
 }
 
 impl ResidualRules {
-    fn named(self, empty: EmptyBins) -> String {
+    /// Text for the bins with a rule for empty bins.
+    fn text(self, empty: EmptyBins) -> String {
         match self.bins {
             Bins::Fu => format!("{}; {empty}", self.bins),
             Bins::Kousha => self.bins.to_string(),
@@ -60,7 +61,7 @@ impl ResidualRules {
     }
 }
 
-/// The data and settings of a comparison.
+/// Data and settings of a comparison.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct ComparedData {
     /// Seed of the noise.
@@ -73,58 +74,59 @@ pub(crate) struct ComparedData {
     pub left_out: LeftOut,
 }
 
-/// Names of the pairs that were not compared, by the reason.
+/// Names of the pairs that were not compared, by reason.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub(crate) struct LeftOut {
-    /// Their images cannot be read or compared.
+    /// Pairs whose images could not be decoded or compared.
     pub failed: Vec<String>,
-    /// The image in low light is brighter than the other one.
+    /// Pairs whose low-light image is brighter than the other image.
     pub swapped: Vec<String>,
-    /// The two images show two scenes.
+    /// Pairs whose images show different scenes.
     pub two_scenes: Vec<String>,
 }
 
 impl LeftOut {
-    /// Whether every pair was compared.
+    /// True if every pair was compared.
     #[must_use]
     pub(crate) fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// The reasons with their numbers of pairs.
-    fn parts(&self) -> impl Iterator<Item = String> {
-        let parts = [
+    /// One text for each reason, with its number of pairs.
+    fn reasons(&self) -> impl Iterator<Item = String> {
+        [
             (&self.failed, "failed"),
             (&self.swapped, "left out as swapped"),
             (&self.two_scenes, "left out as images of two scenes"),
-        ];
-        parts
-            .into_iter()
-            .filter(|(names, _)| !names.is_empty())
-            .map(|(names, why)| format!("{} {why}", counted(names.len(), "pair")))
+        ]
+        .into_iter()
+        .filter(|(names, _)| !names.is_empty())
+        .map(|(names, why)| format!("{} {why}", counted(names.len(), "pair")))
     }
 }
 
-/// The numbers of one pair as lines of text, exposure drop alone first.
-fn lines(pair: &PairComparison) -> impl Iterator<Item = String> {
-    let numbers = |comparison: &ImageComparison| {
-        let (psnr, ssim, kl) = (comparison.psnr, comparison.ssim, comparison.kl.nats);
-        format!("PSNR {psnr:.2} SSIM {ssim:.4} D_KL {kl:.3}")
-    };
+/// Similarity of a synthetic image to the real one, as text.
+fn similarity_text(comparison: &ImageComparison) -> String {
+    let (psnr, ssim, kl) = (comparison.psnr, comparison.ssim, comparison.kl.nats);
+    format!("PSNR {psnr:.2} SSIM {ssim:.4} D_KL {kl:.3}")
+}
+
+/// Lines of text for one pair: exposure drop alone, then each noise method.
+fn pair_lines(pair: &PairComparison) -> impl Iterator<Item = String> {
     let head = format!("{}: drop {:.3} EV", pair.pair, pair.drop);
-    let alone = format!("{head}; alone {}", numbers(&pair.exposure));
+    let alone = format!("{head}; alone {}", similarity_text(&pair.exposure));
     let noise = pair.noise.iter().map(move |noise| {
-        let numbers = numbers(&noise.image);
+        let numbers = similarity_text(&noise.image);
         format!("{}: with noise, {}: {numbers}", pair.pair, noise.method)
     });
     std::iter::once(alone).chain(noise)
 }
 
 impl RealismSummary {
-    /// Means over all pairs.
+    /// Computes the means over all pairs.
     ///
     /// # Errors
-    /// If there is no pair.
+    /// If no pair was compared.
     pub(crate) fn new(
         rules: ResidualRules,
         source: ComparedData,
@@ -133,36 +135,37 @@ impl RealismSummary {
     ) -> Result<Self> {
         let drops: Vec<f64> = pairs.iter().map(|pair| f64::from(pair.drop)).collect();
         let exposures: Vec<&ImageComparison> = pairs.iter().map(|pair| &pair.exposure).collect();
-        let summary = || {
-            Some(Self {
-                pairs: pairs.len(),
-                kl_rule: rules.named(rules.empty),
-                kl_other_rule: (rules.bins == Bins::Fu).then(|| rules.named(rules.empty.other())),
-                drop: Mean::from_values(&drops)?,
-                exposure: MethodRow::new(&exposures)?,
-                noise: NoiseRow::all(pairs),
-                source,
-                fits,
-                by_pair: pairs.iter().flat_map(|pair| lines(pair)).collect(),
-            })
+        let (Some(drop), Some(exposure)) = (Mean::from_values(&drops), MethodRow::new(&exposures))
+        else {
+            return Err(Error::data("pairs", "none of them could be compared"));
         };
-        summary().ok_or_else(|| Error::data("pairs", "none of them could be compared"))
+        Ok(Self {
+            pairs: pairs.len(),
+            kl_rule: rules.text(rules.empty),
+            kl_other_rule: (rules.bins == Bins::Fu).then(|| rules.text(rules.empty.other())),
+            drop,
+            exposure,
+            noise: NoiseRow::all(pairs),
+            source,
+            fits,
+            pair_lines: pairs.iter().flat_map(|pair| pair_lines(pair)).collect(),
+        })
     }
 
-    /// The summary as JSON.
+    /// Serializes the summary as JSON.
     #[must_use]
     pub(crate) fn json(&self) -> String {
         format!("{:#}\n", serde_json::json!(self))
     }
 
-    /// The paper's table with intervals, the differences, the fitted gains, and notes on the rules of the numbers below them.
+    /// Formats the paper's table with intervals, the differences from exposure drop alone, the fitted gains, and notes.
     #[must_use]
     pub(crate) fn table(&self) -> String {
         let mut text = format!(
             "Synthetic against real low light, {}: mean ± half of the 95 % interval (Student's t, from {MIN_VALUES} pairs on)\n{}{}",
             counted(self.pairs, "pair"),
-            self.methods(),
-            self.differences(),
+            self.methods_table(),
+            self.differences_table(),
         );
         if !self.fits.is_empty() {
             text += &fits::table(&self.fits);
@@ -170,12 +173,14 @@ impl RealismSummary {
         format!("{text}{}\n", self.notes().join("\n"))
     }
 
-    /// The paper's table: a row for each way of making the images.
-    fn methods(&self) -> String {
+    /// The paper's table, with a row for each way to synthesize the images.
+    fn methods_table(&self) -> String {
         let exposure = ("exposure drop alone".to_owned(), &self.exposure);
-        let noise = self.noise.iter();
-        let noise = noise.map(|row| (format!("with sensor noise, {}", row.method), &row.images));
-        let mut layout = TableBuilder::new("realism", std::iter::once(exposure).chain(noise))
+        let noise = self
+            .noise
+            .iter()
+            .map(|row| (format!("with sensor noise, {}", row.method), &row.images));
+        let mut builder = TableBuilder::new("realism", std::iter::once(exposure).chain(noise))
             .column(Text, "terminal", |(name, _)| name.clone())
             .column(Text, "terminal PSNR dB", |(_, row)| mean_text(&row.psnr, 2))
             .column(Text, "terminal SSIM", |(_, row)| mean_text(&row.ssim, 4))
@@ -185,13 +190,13 @@ impl RealismSummary {
             });
         if self.kl_other_rule.is_some() {
             let name = "terminal D_KL (other rule)";
-            layout = layout.column(Text, name, |(_, row)| mean_text(&row.kl_other, 3));
+            builder = builder.column(Text, name, |(_, row)| mean_text(&row.kl_other, 3));
         }
-        terminal::table(&[layout.build()])
+        terminal::table(&[builder.build()])
     }
 
-    /// The differences of noise from exposure drop alone, pair by pair.
-    fn differences(&self) -> String {
+    /// Table of the mean differences between noise and exposure drop alone, paired by image.
+    fn differences_table(&self) -> String {
         let table = TableBuilder::new("differences", &self.noise)
             .column(Text, "terminal noise − exposure drop alone", |row| {
                 row.method.to_string()
@@ -210,14 +215,15 @@ impl RealismSummary {
         terminal::table(&[table])
     }
 
-    /// The notes below the tables: the rules of their numbers, and lines for each pair.
+    /// Notes below the tables: rules of the numbers, a line for each pair, and pairs left out.
     fn notes(&self) -> Vec<String> {
         let mut notes = vec![format!(
             "D_KL(real ‖ synthetic) of residuals over the dropped clean image, in nats: {}",
             self.kl_rule
         )];
-        let other = self.kl_other_rule.iter();
-        notes.extend(other.map(|rule| format!("other rule: {rule}")));
+        if let Some(rule) = &self.kl_other_rule {
+            notes.push(format!("other rule: {rule}"));
+        }
         notes.push(
             "exposure drop alone has no residual: its D_KL shows the rule, not noise".to_owned(),
         );
@@ -239,9 +245,9 @@ impl RealismSummary {
             mean_text(&self.drop, 3),
             clean.join(", ")
         ));
-        notes.extend(self.by_pair.iter().cloned());
-        notes.extend(fits::by_pair(&self.fits));
-        let mut left_out: Vec<String> = self.source.left_out.parts().collect();
+        notes.extend(self.pair_lines.iter().cloned());
+        notes.extend(fits::pair_lines(&self.fits));
+        let mut left_out: Vec<String> = self.source.left_out.reasons().collect();
         if self.source.unmatched > 0 {
             let images = counted(self.source.unmatched, "image");
             left_out.push(format!("{images} without a partner"));

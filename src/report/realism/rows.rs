@@ -1,4 +1,4 @@
-//! Rows of the tables of a comparison: means over pairs, [`MethodRow`], and those of a way to make noise, [`NoiseRow`].
+//! Table rows with means over pairs: of any synthesis method ([`MethodRow`]), and of a noise method ([`NoiseRow`]).
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use darkqa_score::photographs::realism::{
     ImageComparison, NoiseComparison, NoiseMethod, PairComparison,
 };
 
-/// Means over pairs for one way of making the low-light images.
+/// Means over pairs for one way to synthesize the low-light images.
 #[derive(Debug, Serialize)]
 pub(super) struct MethodRow {
     pub psnr: Mean,
@@ -19,23 +19,24 @@ pub(super) struct MethodRow {
 }
 
 impl MethodRow {
-    /// Means over images; `None` without any.
+    /// Computes the means over images; `None` without any.
     pub(super) fn new(images: &[&ImageComparison]) -> Option<Self> {
-        let mean = |number: fn(&ImageComparison) -> f64| {
-            let numbers: Vec<f64> = images.iter().map(|image| number(image)).collect();
-            Mean::from_values(&numbers)
-        };
         Some(Self {
-            psnr: mean(|m| m.psnr)?,
-            ssim: mean(|m| m.ssim)?,
-            kl: mean(|m| m.kl.nats)?,
-            kl_other: mean(|m| m.kl_other.nats)?,
-            empty_bins: mean(|m| m.kl.empty as f64)?,
+            psnr: mean(images, |image| image.psnr)?,
+            ssim: mean(images, |image| image.ssim)?,
+            kl: mean(images, |image| image.kl.nats)?,
+            kl_other: mean(images, |image| image.kl_other.nats)?,
+            empty_bins: mean(images, |image| image.kl.empty as f64)?,
         })
     }
 }
 
-/// Means over pairs for one way of making images with sensor noise.
+fn mean(images: &[&ImageComparison], value: fn(&ImageComparison) -> f64) -> Option<Mean> {
+    let values: Vec<f64> = images.iter().map(|image| value(image)).collect();
+    Mean::from_values(&values)
+}
+
+/// Means over pairs for one noise method.
 #[derive(Debug, Serialize)]
 pub(super) struct NoiseRow {
     #[serde(flatten)]
@@ -47,31 +48,32 @@ pub(super) struct NoiseRow {
     pub differences: Differences,
 }
 
-/// Means over pairs of the differences from exposure drop alone, pair by pair.
+/// Means of the paired differences from exposure drop alone.
 #[derive(Debug, Serialize)]
 pub(super) struct Differences {
-    /// Difference of the PSNR in dB.
+    /// Difference in PSNR, in dB.
     pub psnr: Mean,
     pub ssim: Mean,
-    /// Difference of the divergence in nats.
+    /// Difference in KL divergence, in nats.
     pub kl: Mean,
 }
 
 impl NoiseRow {
-    /// The rows of all ways of making noise, which are the same, in the same order, for all pairs.
+    /// Rows of all noise methods. All pairs have the same methods in the same order.
     pub(super) fn all(pairs: &[&PairComparison]) -> Vec<Self> {
-        let first = pairs.iter().take(1).flat_map(|pair| &pair.noise);
+        let Some(first) = pairs.first() else {
+            return Vec::new();
+        };
         first
+            .noise
+            .iter()
             .enumerate()
-            .filter_map(|(index, first)| {
-                let of_pairs: Vec<(&ImageComparison, &NoiseComparison)> = pairs
+            .filter_map(|(index, noise)| {
+                let comparisons: Vec<(&ImageComparison, &NoiseComparison)> = pairs
                     .iter()
-                    .filter_map(|pair| {
-                        let noise = pair.noise.get(index)?;
-                        Some((&pair.exposure, noise))
-                    })
+                    .filter_map(|pair| Some((&pair.exposure, pair.noise.get(index)?)))
                     .collect();
-                Self::new(&first.method, &of_pairs)
+                Self::new(&noise.method, &comparisons)
             })
             .collect()
     }
@@ -83,24 +85,24 @@ impl NoiseRow {
             .iter()
             .map(|(exposure, noise)| noise.image.differences(exposure))
             .collect();
-        let mean = |index: usize| {
-            let numbers: Vec<f64> = differences.iter().map(|numbers| numbers[index]).collect();
-            Mean::from_values(&numbers)
-        };
+        let [psnr, ssim, kl] = [0, 1, 2].map(|index: usize| {
+            let values: Vec<f64> = differences.iter().map(|values| values[index]).collect();
+            Mean::from_values(&values)
+        });
         Some(Self {
             method: method.clone(),
             images: MethodRow::new(&images)?,
             clean_psnr: Mean::from_values(&clean)?,
             differences: Differences {
-                psnr: mean(0)?,
-                ssim: mean(1)?,
-                kl: mean(2)?,
+                psnr: psnr?,
+                ssim: ssim?,
+                kl: kl?,
             },
         })
     }
 }
 
-/// A mean as text with half of its interval, if it has one.
+/// Formats a mean with half the width of its interval, if it has one.
 pub(super) fn mean_text(mean: &Mean, digits: usize) -> String {
     if mean.value.is_infinite() {
         let sign = if mean.value < 0.0 { "−" } else { "" };
@@ -112,7 +114,7 @@ pub(super) fn mean_text(mean: &Mean, digits: usize) -> String {
     }
 }
 
-/// A mean difference as text, with its sign and half of its interval, if it has one.
+/// Formats a mean difference with its sign, and half the width of its interval, if it has one.
 pub(super) fn difference_text(mean: &Mean, digits: usize) -> String {
     let sign = if mean.value > 0.0 { "+" } else { "" };
     format!("{sign}{}", mean_text(mean, digits).replace('-', "−"))
@@ -123,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn differences_have_signs_and_intervals_from_three_on() {
+    fn differences_have_signs_and_intervals() {
         for (numbers, text) in [
             (&[1.0, 2.0][..], "+1.50"),
             (&[-1.0, -2.0], "−1.50"),

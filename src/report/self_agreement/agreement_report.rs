@@ -1,4 +1,4 @@
-//! All that a report without true answers shows: [`AgreementReport`].
+//! Content of a report on questions without true answers: [`AgreementReport`].
 
 use super::tables;
 use crate::sentences::{Sentence, self_agreement};
@@ -7,26 +7,26 @@ use crate::text::alert::Alert;
 use crate::text::table::Table;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 
-/// All that a report without true answers shows.
+/// Results of one or more runs on questions without true answers, as sentences and as tables.
 pub(crate) struct AgreementReport<'a> {
     pub(super) found: &'a SelfAgreement<'a>,
-    /// Warnings above the numbers.
+    /// Warnings at the top of the report.
     pub(super) alerts: Vec<Alert>,
-    /// The findings in words.
+    /// Findings as sentences.
     pub(super) sentences: Vec<Sentence>,
-    /// The tables; the first is the summary.
+    /// All tables; the first is the summary.
     pub(super) tables: Vec<Table>,
 }
 
 impl<'a> AgreementReport<'a> {
-    /// The report of these results; `used` states how each enhancer was used.
+    /// Writes the sentences and the tables of a report. `enhancer_rows` describe the use of each enhancer.
     pub(crate) fn new(
         found: &'a SelfAgreement<'a>,
         alerts: Vec<Alert>,
-        used: &[EnhancerRow],
+        enhancer_rows: &[EnhancerRow],
     ) -> Self {
         let mut tables = with_training(tables::tables(found), &found.grid.listing);
-        tables.extend(enhancers(used));
+        tables.extend(enhancers(enhancer_rows));
         Self {
             sentences: self_agreement(found),
             found,

@@ -1,7 +1,7 @@
-//! Figures of a run without true answers: [`figures`].
+//! Figures of a report on questions without true answers: [`figures`].
 
-use crate::drawing::chart::drawn::Drawn;
-use crate::drawing::chart::{Chart, Figure, LineStyle, Panel, PanelContent, PlotLine};
+use crate::drawing::chart::figure_chart::FigureChart;
+use crate::drawing::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
 use crate::drawing::paper::figure;
 use crate::error::Result;
 use crate::text::ladder::{Ladder, Series, SeriesByLevel};
@@ -10,7 +10,7 @@ use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::estimate::Estimate;
 
-/// Agreement by level with its floor, and the evidence kept, for each light. Empty if only one level was asked.
+/// Draws agreement by level with its floor, and the evidence kept, each with a panel for each variant. Empty if only one level was asked.
 ///
 /// # Errors
 /// If a figure cannot be drawn.
@@ -31,12 +31,16 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
         |cell| cell.agreement,
         |panel| panel.extend(floors(found)),
     );
-    let kept = |cell: &AgreementCell| match cell.role() {
-        // The ceiling is the whole evidence by definition.
-        CellRole::Ceiling => None,
-        _ => cell.evidence?.ok(),
-    };
-    let evidence = panels(found, &ladder, kept, |_| {});
+    let evidence = panels(
+        found,
+        &ladder,
+        |cell| match cell.role() {
+            // The ceiling is 100 % by definition.
+            CellRole::Ceiling => None,
+            _ => cell.evidence?.ok(),
+        },
+        |_| {},
+    );
     let charts = [
         (
             "agreement",
@@ -54,11 +58,6 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
     ];
     let mut figures = Vec::new();
     for (name, caption, measure, panels) in charts {
-        let has_points = |panel: &Panel| {
-            panel.lines.iter().any(
-                |line| matches!(&line.content, PanelContent::Curve(points) if !points.is_empty()),
-            )
-        };
         let panels: Vec<Panel> = panels.into_iter().filter(has_points).collect();
         if panels.is_empty() {
             continue;
@@ -69,23 +68,33 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
             columns: 2,
             note: note.clone(),
         };
-        figures.push(figure(name, caption, &Drawn::Lines(chart))?);
+        figures.push(figure(name, caption, &FigureChart::Lines(chart))?);
     }
     Ok(figures)
 }
 
-/// A panel for each light, raw or with one enhancer, with a line for each model.
+/// True if a curve of the panel has a point.
+fn has_points(panel: &Panel) -> bool {
+    panel
+        .lines
+        .iter()
+        .any(|line| matches!(&line.content, LineContent::Curve(points) if !points.is_empty()))
+}
+
+/// One panel for each variant, raw or with one enhancer, with a line for each model. `add` adds further lines to a panel.
 fn panels(
     found: &SelfAgreement<'_>,
     ladder: &Ladder<'_, AgreementCell>,
-    number: impl Fn(&AgreementCell) -> Option<Estimate>,
+    value: impl Fn(&AgreementCell) -> Option<Estimate>,
     add: impl Fn(&mut Vec<PlotLine>),
 ) -> Vec<Panel> {
     let mut panels: Vec<(String, Vec<PlotLine>)> = Vec::new();
-    let degraded = ladder.series.iter();
-    // One level is no line.
-    for (series, cells) in degraded.filter(|(series, _)| series.axis().is_some()) {
-        let line = line(found, series, cells, &number);
+    for (series, cells) in &ladder.series {
+        // A series of clean frames alone has one level and makes no line.
+        if series.axis().is_none() {
+            continue;
+        }
+        let line = line(found, series, cells, &value);
         let title = series.light(&[]);
         match panels.iter_mut().find(|(known, _)| *known == title) {
             Some((_, lines)) => lines.push(line),
@@ -109,29 +118,29 @@ fn line(
     found: &SelfAgreement<'_>,
     series: &Series<'_>,
     cells: &SeriesByLevel<'_, AgreementCell>,
-    number: impl Fn(&AgreementCell) -> Option<Estimate>,
+    value: impl Fn(&AgreementCell) -> Option<Estimate>,
 ) -> PlotLine {
     let points: Vec<(AxisLevel, Estimate)> = cells
         .iter()
-        .filter_map(|(level, cell)| Some((*level, number(cell)?)))
+        .filter_map(|(level, cell)| Some((*level, value(cell)?)))
         .collect();
     PlotLine {
         name: series.model.to_owned(),
         style: style(found, series.model),
-        content: PanelContent::Curve(points),
+        content: LineContent::Curve(points),
         model: Some(series.model.to_owned()),
         items: None,
     }
 }
 
-/// The place of a model among those of the report decides its style.
+/// Line style of a model, by its index in the report.
 fn style(found: &SelfAgreement<'_>, model: &str) -> LineStyle {
     let models = found.models();
-    let place = models.iter().position(|known| *known == model);
-    LineStyle(place.unwrap_or(models.len()))
+    let index = models.iter().position(|known| *known == model);
+    LineStyle(index.unwrap_or(models.len()))
 }
 
-/// A flat line for each model that was asked without images.
+/// Horizontal line for each model that was asked without images.
 fn floors(found: &SelfAgreement<'_>) -> Vec<PlotLine> {
     found
         .whole()
@@ -141,7 +150,7 @@ fn floors(found: &SelfAgreement<'_>) -> Vec<PlotLine> {
             Some(PlotLine {
                 name: format!("{model} without images"),
                 style: style(found, model),
-                content: PanelContent::Flat(cell.agreement?.value),
+                content: LineContent::Flat(cell.agreement?.value),
                 model: Some(model.to_owned()),
                 items: None,
             })

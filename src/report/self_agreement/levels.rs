@@ -1,9 +1,9 @@
-//! The table of agreement by level, with a row for each measure: [`levels`].
+//! Tables of agreement by level, with a row for each measure: [`levels`].
 
 use std::collections::BTreeSet;
 
 use super::measure::AGREEMENT;
-use crate::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::text::ladder::{Ladder, SeriesByLevel};
 use crate::text::table::ColumnKind::{Accuracy, Text};
 use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::{percent, with_interval};
@@ -13,7 +13,7 @@ use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::comparisons::self_agreement::evidence::{MIN_DISTANCE, NoEvidence};
 use darkqa_score::estimate::Estimate;
 
-/// A measure of a series: a row of the table.
+/// Measure of a series; each has a row of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Measure {
     Agreement,
@@ -51,14 +51,10 @@ impl Measure {
         }
     }
 
-    /// The cell of the measure; at L0 what concerns L0 itself is that of the first replies there.
+    /// Table cell of the measure. At L0, entropy and unusable replies are of the first replies, agreement is of the repeated ones.
     fn cell(self, found: &SelfAgreement<'_>, cell: &AgreementCell) -> TableCell {
         let is_light = cell.role() == CellRole::Ceiling;
         let light = found.light_of(&cell.subject.model).filter(|_| is_light);
-        let of_replies = |count: usize, all: usize| -> TableCell {
-            let share = (all > 0).then(|| percent(count as f64 / all as f64));
-            share.map(TableCell::Text).into()
-        };
         match self {
             Self::Agreement => cell.agreement.into(),
             Self::Informative => share(cell.informative),
@@ -75,19 +71,19 @@ impl Measure {
                 None => share(cell.unread),
             },
             Self::Refused => match light {
-                Some(light) => of_replies(light.refused, light.replies()),
-                None => of_replies(cell.refused, cell.replies()),
+                Some(light) => share_of_replies(light.refused, light.replies()),
+                None => share_of_replies(cell.refused, cell.replies()),
             },
             Self::CannotTell => match light {
-                Some(light) => of_replies(light.cannot_tell, light.replies()),
+                Some(light) => share_of_replies(light.cannot_tell, light.replies()),
                 None => share(cell.cannot_tell),
             },
         }
     }
 
-    /// Whether the row says something of a series: the informative questions only if there are others, refusals only if there are any,
-    /// and a way out only if the questions have one.
-    fn says_something(
+    /// True if the measure is meaningful for a series: informative questions only if some questions are not informative, refusals only if
+    /// they occur, and "cannot tell" only if the questions have this choice.
+    fn applies_to(
         self,
         found: &SelfAgreement<'_>,
         cells: &SeriesByLevel<'_, AgreementCell>,
@@ -108,17 +104,24 @@ impl Measure {
     }
 }
 
-/// A number with two decimals.
+/// Number with two decimals.
 fn decimals(value: Option<f64>) -> TableCell {
-    let text = |value: f64| {
-        let text = format!("{value:.2}");
-        TableCell::Text(if text == "-0.00" {
-            "0.00".to_owned()
-        } else {
-            text.replace('-', "−")
-        })
+    let Some(value) = value else {
+        return TableCell::Missing;
     };
-    value.map_or(TableCell::Missing, text)
+    let text = format!("{value:.2}");
+    TableCell::Text(if text == "-0.00" {
+        "0.00".to_owned()
+    } else {
+        text.replace('-', "−")
+    })
+}
+
+/// Share of some replies in percent; missing without replies.
+fn share_of_replies(count: usize, replies: usize) -> TableCell {
+    (replies > 0)
+        .then(|| TableCell::Text(percent(count as f64 / replies as f64)))
+        .into()
 }
 
 fn share(share: Option<Estimate>) -> TableCell {
@@ -127,14 +130,16 @@ fn share(share: Option<Estimate>) -> TableCell {
     })
 }
 
-/// A row: the model with the light, the measure, and a cell for each level.
+/// Row of the table.
 struct MeasureRow {
+    /// Model and condition.
     series: String,
     measure: Measure,
+    /// One cell for each level.
     cells: Vec<TableCell>,
 }
 
-/// The tables of each axis: agreement with what stands beside it, a block of rows for each model in each light.
+/// One table for each axis, with a block of rows for each model in each variant.
 pub(super) fn levels(found: &SelfAgreement<'_>) -> Vec<Table> {
     let mut ladder = Ladder::new(found.whole().map(|cell| (&cell.subject, cell))).with_clean();
     ladder.set = found.set.light;
@@ -154,24 +159,26 @@ pub(super) fn levels(found: &SelfAgreement<'_>) -> Vec<Table> {
 }
 
 fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementCell>) -> Table {
-    // L0 stands at the front even if nothing was asked again there.
+    // L0 has a column even if it was not asked a second time.
     let mut levels: BTreeSet<AxisLevel> = ladder.levels.clone();
     levels.insert(AxisLevel::L0);
     let mut rows = Vec::new();
     for (series, cells) in &ladder.series {
-        let measures = Measure::ALL
-            .into_iter()
-            .filter(|measure| measure.says_something(found, cells));
         let model = found.grid.listing.label(series.model);
-        for measure in measures {
-            let cell = |level: &AxisLevel| match cells.get(level) {
-                Some(cell) => measure.cell(found, cell),
-                None => TableCell::Blank,
-            };
+        for measure in Measure::ALL {
+            if !measure.applies_to(found, cells) {
+                continue;
+            }
             rows.push(MeasureRow {
                 series: format!("{model}, {}", ladder.light(series)),
                 measure,
-                cells: levels.iter().map(cell).collect(),
+                cells: levels
+                    .iter()
+                    .map(|level| match cells.get(level) {
+                        Some(cell) => measure.cell(found, cell),
+                        None => TableCell::Blank,
+                    })
+                    .collect(),
             });
         }
     }
@@ -188,10 +195,11 @@ fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, Agreeme
         .column(Text, "terminal | page measure | latex Measure", |row| {
             row.measure.name()
         });
-    let is_enhanced = |(series, cells): (&Series<'_>, &SeriesByLevel<'_, AgreementCell>)| {
-        series.is_enhanced() && cells.contains_key(&AxisLevel::L0)
-    };
-    let (again, first) = if ladder.series.iter().any(is_enhanced) {
+    let has_enhanced_clean = ladder
+        .series
+        .iter()
+        .any(|(series, cells)| series.is_enhanced() && cells.contains_key(&AxisLevel::L0));
+    let (again, first) = if has_enhanced_clean {
         (
             "",
             "L0: the same images asked again, the ceiling; in a row with an enhancer, these images enhanced",
@@ -218,7 +226,7 @@ fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, Agreeme
     table
 }
 
-/// Lines about each model: its answers at L0, the floor, and why no evidence is given.
+/// Notes on each model: its answers at L0, its floor, and the reason if the evidence kept is unknown.
 pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
     let mut notes = Vec::new();
     for model in found.models() {
@@ -245,15 +253,18 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
             ));
         }
         let reason = cells.find_map(|cell| cell.evidence?.err());
-        notes.extend(
-            reason.map(|reason| format!("{model}: evidence kept is not given: {}", why(reason))),
-        );
+        notes.extend(reason.map(|reason| {
+            format!(
+                "{model}: evidence kept is not given: {}",
+                no_evidence_reason(reason)
+            )
+        }));
     }
     notes
 }
 
-/// Why no share of evidence is given.
-pub(super) fn why(reason: NoEvidence) -> String {
+/// Text for the reason why the evidence kept is unknown.
+pub(super) fn no_evidence_reason(reason: NoEvidence) -> String {
     match reason {
         NoEvidence::NotAgain => {
             "the images at L0 were not asked about again (--repeats)".to_owned()

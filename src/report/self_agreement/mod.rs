@@ -1,7 +1,7 @@
-//! The report of a run without true answers: its files ([`products`]), its summary ([`summary`]) and its text ([`text()`]).
+//! Report on questions without true answers: its files ([`products`]), its summary ([`summary`]) and its text ([`text()`]).
 //!
-//! The measure is agreement with the model's own answer at L0. It never stands without what keeps it honest, and the word
-//! accuracy never stands over it.
+//! The measure is agreement with the model's own answer at L0. Reports always give it with its floor, its ceiling and other measures that
+//! are needed to interpret it, and never call it accuracy.
 
 mod agreement_report;
 mod figures;
@@ -78,7 +78,7 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
         .collect()
 }
 
-/// The parts of a Markdown report.
+/// Content for a Markdown report.
 pub(super) struct MarkdownParts<'a> {
     /// Numbers of models, questions and replies.
     pub(super) head: String,
@@ -90,7 +90,7 @@ pub(super) struct MarkdownParts<'a> {
     pub(super) levels: &'static str,
 }
 
-/// The parts of a report in Markdown.
+/// Selects the content for a Markdown report.
 pub(super) fn markdown_parts<'a>(report: &'a AgreementReport<'_>) -> MarkdownParts<'a> {
     MarkdownParts {
         head: text::head(report),
@@ -102,7 +102,7 @@ pub(super) fn markdown_parts<'a>(report: &'a AgreementReport<'_>) -> MarkdownPar
     }
 }
 
-/// The head of the summary.
+/// Head of the summary.
 #[derive(Serialize)]
 struct Head<'a> {
     #[serde(flatten)]
@@ -111,14 +111,14 @@ struct Head<'a> {
     readings: NoiseProfiles,
     alerts: &'a [Alert],
     findings: &'a [Sentence],
-    /// The rows of `own_answers.csv`.
+    /// Rows of `own_answers.csv`.
     own_answers: Option<Rows<'a>>,
 }
 
-/// The summary of runs as JSON, with the rows of `summary.csv`.
+/// Serializes the summary of runs as JSON, with the rows of `summary.csv`.
 ///
 /// # Errors
-/// If the document cannot be written.
+/// If the document cannot be serialized.
 pub(crate) fn summary(
     report: &AgreementReport<'_>,
     runs: SummaryRuns<'_>,

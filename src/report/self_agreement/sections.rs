@@ -1,8 +1,8 @@
-//! Sections of the page of a run without true answers: [`SECTIONS`].
+//! Sections of the page on questions without true answers: [`SECTIONS`].
 
 use crate::tables::{ENHANCERS, Section};
 
-/// The sections of the page in order.
+/// All sections of the page in order.
 pub(super) const SECTIONS: [Section; 8] = [
     (
         "agreement",

@@ -1,22 +1,23 @@
-//! The tables of a run without true answers: [`tables`].
+//! Tables of a report on questions without true answers: [`tables`].
 
-use super::levels::{levels, why};
+use super::levels::{levels, no_evidence_reason};
 use super::measure::AGREEMENT;
 use crate::tables::{
-    commonest_answers, comparisons_of, counted_answers, health, level_words, reading,
+    agreement_comparisons, commonest_answers, counted_answers, health, missing_threshold_reason,
+    reading,
 };
 use crate::text::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
 use crate::text::table::SUMMARY;
-use crate::text::table::{Table, TableBuilder, TableCell};
+use crate::text::table::{Table, TableBuilder, TableCell, TableFormat};
 use crate::text::words::{counted, light};
 use crate::types::RunGroup;
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
-use darkqa_score::comparisons::self_agreement::evidence::{EvidenceCurve, NoHalf};
+use darkqa_score::comparisons::self_agreement::evidence::NoHalf;
+use darkqa_score::comparisons::self_agreement::light::LightReplies;
 use darkqa_score::comparisons::self_agreement::models_in_light::ModelsInLight;
-use darkqa_score::comparisons::self_agreement::question_in_light::QuestionInLight;
 
 /// Name of the table of all agreements.
 pub(super) const OWN_ANSWERS: &str = "own_answers";
@@ -29,17 +30,22 @@ pub(super) fn tables(found: &SelfAgreement<'_>) -> Vec<Table> {
     tables.push(models_in_light(&found.between));
     tables.push(thresholds(found));
     tables.push(questions(found));
-    tables.extend(comparisons_of(&found.comparisons, found.unit, AGREEMENT));
+    tables.extend(agreement_comparisons(
+        &found.comparisons,
+        found.unit,
+        AGREEMENT,
+    ));
     tables.extend([
-        changed(&found.hallucinations),
-        commonest(&found.confusions),
-        against_light(&found.confusions),
+        presence_changes(&found.hallucinations),
+        most_frequent_answers(&found.confusions),
+        confusion_with_l0(&found.confusions),
         health(&found.health),
     ]);
     tables
 }
 
-/// The columns that all reports have, with the measure as the last one. There is no number of right replies: nothing is known to be right.
+/// Summary with the columns that all reports have, and the name of the measure in the last column. The number of right replies is empty,
+/// because the true answers are unknown.
 pub(super) fn summary(found: &SelfAgreement<'_>) -> Table {
     let builder = TableBuilder::new(SUMMARY, &found.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
@@ -52,9 +58,9 @@ pub(super) fn summary(found: &SelfAgreement<'_>) -> Table {
         .column(Share, "csv value low high", |cell| cell.agreement)
         .column(Text, "csv reading", |cell| reading(&cell.subject))
         .model_facts(&found.grid.listing, |cell| &cell.subject);
-    let has_groups = found.cells.iter().any(|cell| group(cell).is_some());
+    let has_groups = found.cells.iter().any(|cell| run_group(cell).is_some());
     let builder = if has_groups {
-        builder.column(Text, "csv light", |cell| group(cell))
+        builder.column(Text, "csv light", |cell| run_group(cell))
     } else {
         builder
     };
@@ -68,17 +74,18 @@ fn mode(mode: ReadingMode) -> &'static str {
     }
 }
 
-fn group(cell: &AgreementCell) -> Option<&str> {
+/// Name of a cell's run group; `None` if it has none.
+fn run_group(cell: &AgreementCell) -> Option<&str> {
     cell.subject.variant.group.as_ref().map(RunGroup::name)
 }
 
-/// Number of replies in which no answer could be read.
+/// Number of replies that could not be parsed.
 fn unread(cell: &AgreementCell) -> usize {
-    let unread = cell.unread;
-    unread.map_or(0, |share| (share.value * share.n as f64).round() as usize)
+    cell.unread
+        .map_or(0, |share| (share.value * share.n as f64).round() as usize)
 }
 
-/// The role of a cell among those of its model, in files.
+/// Role of a cell as files name it.
 fn role(cell: &AgreementCell) -> &'static str {
     match cell.role() {
         CellRole::Floor => "floor",
@@ -87,12 +94,19 @@ fn role(cell: &AgreementCell) -> &'static str {
     }
 }
 
-/// A row for each agreement, with all that stands beside it.
+/// Answers at L0 of the model of a cell, by the same way of parsing.
+fn answers_at_l0<'a>(
+    found: &'a SelfAgreement<'_>,
+    cell: &AgreementCell,
+) -> Option<&'a LightReplies> {
+    found
+        .light
+        .iter()
+        .find(|light| light.model == cell.subject.model && light.mode == cell.mode)
+}
+
+/// Table of all agreements with the measures that are needed to interpret them.
 fn own_answers(found: &SelfAgreement<'_>) -> Table {
-    let light = |cell: &AgreementCell| {
-        let mut light = found.light.iter();
-        light.find(|light| light.model == cell.subject.model && light.mode == cell.mode)
-    };
     TableBuilder::new(OWN_ANSWERS, &found.cells)
         .subject(|cell| &cell.subject, ToString::to_string)
         .family(|cell| cell.family.as_ref())
@@ -111,7 +125,7 @@ fn own_answers(found: &SelfAgreement<'_>) -> Table {
             cell.evidence.and_then(Result::ok)
         })
         .column(Text, "csv no_evidence", |cell| {
-            cell.evidence.and_then(Result::err).map(why)
+            cell.evidence.and_then(Result::err).map(no_evidence_reason)
         })
         .column(Share, "csv unread unread_low unread_high", |cell| {
             cell.unread
@@ -124,19 +138,20 @@ fn own_answers(found: &SelfAgreement<'_>) -> Table {
             |cell| cell.cannot_tell,
         )
         .column(Count, "csv asked_light", |cell| {
-            light(cell).map(|light| light.asked)
+            answers_at_l0(found, cell).map(|light| light.asked)
         })
         .column(Number, "csv read_light", |cell| {
-            light(cell)
+            answers_at_l0(found, cell)
                 .and_then(|light| light.read)
                 .map(|read| read.value)
         })
         .column(Count, "csv refused_light", |cell| {
-            light(cell).map(|light| light.refused)
+            answers_at_l0(found, cell).map(|light| light.refused)
         })
         .build()
 }
 
+/// Table of the agreement of each two models at L0.
 fn models_in_light(pairs: &[ModelsInLight]) -> Table {
     let mut table = TableBuilder::new("models_in_light", pairs)
         .page("models", "Two models at L0: each against the other, not against the truth")
@@ -152,17 +167,17 @@ fn models_in_light(pairs: &[ModelsInLight]) -> Table {
     table
 }
 
-/// Why the exposure drop at which half is lost is not known.
-fn why_no_half(reason: &NoHalf) -> String {
+/// Text for the reason why the exposure drop at which half of the evidence is lost is unknown.
+fn no_half_reason(reason: &NoHalf) -> String {
     match reason {
-        NoHalf::NoEvidence(reason) => why(*reason),
-        NoHalf::Curve(reason) => level_words(reason).replace("chance", "the floor"),
+        NoHalf::NoEvidence(reason) => no_evidence_reason(*reason),
+        NoHalf::Curve(reason) => missing_threshold_reason(reason).replace("chance", "the floor"),
     }
 }
 
+/// Table of the exposure drops at which models keep half of their evidence.
 fn thresholds(found: &SelfAgreement<'_>) -> Table {
     let columns = "csv threshold low high | terminal half kept down to, interval | page half kept down to [95 %]";
-    let unit = |curve: &EvidenceCurve| curve.darkest.axis().map(|axis| axis.unit);
     let mut table = TableBuilder::new("evidence_thresholds", &found.curves)
         .page("thresholds", "Where half of the evidence is lost")
         .column(Text, "csv model | terminal model | page model", |curve| {
@@ -179,14 +194,14 @@ fn thresholds(found: &SelfAgreement<'_>) -> Table {
         .column(ColumnKind::Threshold, columns, |curve| {
             match &curve.threshold {
                 Ok(threshold) => TableCell::Threshold(*threshold, curve.darkest.value()),
-                Err(reason) => TableCell::Unknown(why_no_half(reason)),
+                Err(reason) => TableCell::Unknown(no_half_reason(reason)),
             }
         })
         .column(Text, "csv unit | terminal unit | page unit", |curve| {
-            unit(curve)
+            curve.darkest.axis().map(|axis| axis.unit)
         })
         .column(Text, "csv reason", |curve| {
-            curve.threshold.as_ref().err().map(why_no_half)
+            curve.threshold.as_ref().err().map(no_half_reason)
         })
         .build();
     if !found.curves.is_empty() {
@@ -198,6 +213,7 @@ fn thresholds(found: &SelfAgreement<'_>) -> Table {
     table
 }
 
+/// Table of the questions, with the answers at L0.
 fn questions(found: &SelfAgreement<'_>) -> Table {
     let mut table = TableBuilder::new("own_questions", &found.questions)
         .page("questions", "Answers at L0, by question of the bank")
@@ -238,40 +254,36 @@ fn questions(found: &SelfAgreement<'_>) -> Table {
         .column(Text, "csv informative", |question| {
             question.is_informative().to_string()
         })
-        .column(Text, "terminal | page", |question| tells(question))
+        .column(Text, "terminal | page", |question| {
+            if question.is_informative() {
+                ""
+            } else {
+                "not informative"
+            }
+        })
         .build();
     table.is_folded = true;
-    let without = |question: &QuestionInLight| !question.is_informative();
-    if found.questions.iter().any(without) {
-        let count = found
-            .questions
-            .iter()
-            .filter(|question| without(question))
-            .count();
+    let count = found
+        .questions
+        .iter()
+        .filter(|question| !question.is_informative())
+        .count();
+    if count > 0 {
         table.heading = Some(format!(
             "{} without information, because one answer is given about 95 % of the images or more",
             counted(count, "question")
         ));
         for (row, question) in table.rows.iter_mut().zip(&found.questions) {
             if question.is_informative() {
-                row.hidden_in
-                    .push(crate::text::table::TableFormat::Terminal);
+                row.hidden_in.push(TableFormat::Terminal);
             }
         }
     }
     table
 }
 
-fn tells(question: &QuestionInLight) -> &'static str {
-    if question.is_informative() {
-        ""
-    } else {
-        "not informative"
-    }
-}
-
-/// Rates of “yes” where L0 says no, and of “no” where L0 says yes.
-fn changed(rates: &[Hallucination]) -> Table {
+/// Table of the rates of “yes” to questions answered “no” at L0, and the reverse.
+fn presence_changes(rates: &[Hallucination]) -> Table {
     TableBuilder::new("presence_changes", rates)
         .page(
             "answers",
@@ -291,8 +303,8 @@ fn changed(rates: &[Hallucination]) -> Table {
         .build()
 }
 
-/// The answer given most often, beside how often it is that at L0.
-fn commonest(confusions: &[Confusion]) -> Table {
+/// Table of the answer given most often, with its share at L0.
+fn most_frequent_answers(confusions: &[Confusion]) -> Table {
     let caption = "The answer given most often, and how often it is the answer at L0";
     let mut table = commonest_answers("commonest_answers", caption, confusions)
         .column(Percent, "csv light_share | page at L0 in %", |(_, c)| {
@@ -312,7 +324,7 @@ fn commonest(confusions: &[Confusion]) -> Table {
     table
 }
 
-/// A row for each answer at L0 and each answer given instead.
-fn against_light(confusions: &[Confusion]) -> Table {
+/// Confusion matrix of the answers at L0 and in each other condition.
+fn confusion_with_l0(confusions: &[Confusion]) -> Table {
     counted_answers("answers_against_light", "csv at_l0", confusions)
 }

@@ -1,5 +1,6 @@
-//! The text of a report without true answers in the terminal: [`text`].
+//! Terminal text of a report on questions without true answers: [`text`].
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -16,7 +17,7 @@ use crate::text::wrapped::wrapped;
 use crate::types::manifests::RunManifest;
 use darkqa_score::accuracies::Health;
 
-/// The report as text. `runs` are the runs with their folders.
+/// Renders the report as text. `runs` are the manifests with the folders of their runs.
 #[must_use]
 pub(crate) fn text(
     report: &AgreementReport<'_>,
@@ -30,21 +31,21 @@ pub(crate) fn text(
         ReportLength::Summary => text += &short_tables(report),
         ReportLength::Full => text += &render(&report.tables),
     }
-    let readings = NoiseProfiles::new(&report.found.grid.subjects);
-    let open = readings.open_question();
-    text += &open.map_or_else(String::new, |open| wrapped(" ", &open, " "));
+    if let Some(question) = NoiseProfiles::new(&report.found.grid.subjects).open_question() {
+        text += &wrapped(" ", &question, " ");
+    }
     for (_, folder) in runs {
         let _ = writeln!(text, "run: {}", folder.display());
     }
     text
 }
 
-/// The table of each axis, within the width of a terminal as far as its levels allow, and the notes.
+/// Table of each axis with a wrapped heading, and the notes.
 fn short_tables(report: &AgreementReport<'_>) -> String {
     let mut text = String::new();
-    for part in levels(report.found) {
-        text += &wrapped(" ", part.heading.as_deref().unwrap_or_default(), " ");
-        text += &table(&[part]);
+    for levels in levels(report.found) {
+        text += &wrapped(" ", levels.heading.as_deref().unwrap_or_default(), " ");
+        text += &table(&[levels]);
     }
     for note in notes(report.found) {
         text += &wrapped(" ", &note, "   ");
@@ -52,7 +53,7 @@ fn short_tables(report: &AgreementReport<'_>) -> String {
     text
 }
 
-/// Numbers of models, questions, images and replies.
+/// Head line with the numbers of models, questions, images and replies.
 pub(super) fn head(report: &AgreementReport<'_>) -> String {
     let found = report.found;
     let items = &found.grid.items;
@@ -61,10 +62,8 @@ pub(super) fn head(report: &AgreementReport<'_>) -> String {
         [one] => (*one).to_owned(),
         several => counted(several.len(), "model"),
     };
-    let questions: std::collections::BTreeSet<_> =
-        items.iter().map(|item| &*item.asked.question).collect();
-    let frames: std::collections::BTreeSet<_> =
-        items.iter().map(|item| &*item.asked.frame).collect();
+    let questions: BTreeSet<_> = items.iter().map(|item| &*item.asked.question).collect();
+    let frames: BTreeSet<_> = items.iter().map(|item| &*item.asked.frame).collect();
     let replies: usize = found.health.iter().map(|health| health.replies).sum();
     let failed: usize = found.health.iter().map(Health::failures).sum();
     format!(

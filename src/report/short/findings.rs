@@ -1,8 +1,8 @@
-//! The opening of a report in the terminal: [`findings`].
+//! Start of a report in the terminal, with its findings: [`findings`].
 
 use std::fmt::Write;
 
-use super::marked;
+use super::styled_lines;
 use crate::report::finding_groups::{Finding, FindingGroups};
 use crate::report::report_length::ReportLength;
 use crate::text::alert::{Alert, lines};
@@ -11,10 +11,10 @@ use crate::text::words::counted;
 use crate::text::wrapped::wrapped;
 use crate::types::text::shown;
 
-/// Width of the column of groups, in characters.
-const GROUP: usize = 15;
+/// Width of the column of group titles, in characters.
+const GROUP_WIDTH: usize = 15;
 
-/// The head, the alerts and the summary; then the first finding of each group, or all findings and how to read them.
+/// Head, alerts and summary, then the main finding of each group, or all findings with a note on how to read them.
 pub(in crate::report) fn findings(
     head: &str,
     alerts: &[Alert],
@@ -25,14 +25,14 @@ pub(in crate::report) fn findings(
     let mut text = match length {
         // As wide as the tables.
         ReportLength::Full => line(["", head, " "]) + &lines(alerts),
-        _ => format!("{head}\n") + &alerts.iter().map(marked::alert).collect::<String>(),
+        _ => format!("{head}\n") + &alerts.iter().map(styled_lines::alert).collect::<String>(),
     };
     if groups.count() == 0 {
         return text + "\n";
     }
-    let _ = write!(text, "\n{}\n", marked::summary(&groups.summary()));
+    let _ = write!(text, "\n{}\n", styled_lines::summary(&groups.summary()));
     if length == ReportLength::Summary {
-        for (title, finding) in groups.first() {
+        for (title, finding) in groups.main_findings() {
             text += &row(title, finding);
         }
         let all = counted(groups.count(), "finding");
@@ -45,22 +45,22 @@ pub(in crate::report) fn findings(
             + "\n";
     }
     for group in groups.all() {
-        text += &marked::heading(group.title);
+        text += &styled_lines::heading(group.title);
         for sentence in group.sentences() {
-            text += &marked::sentence(sentence);
+            text += &styled_lines::sentence(sentence);
         }
     }
     text + &wrapped(" ", how_to_read, " ") + "\n"
 }
 
-/// A finding behind the title of its group, with its intervals beneath.
+/// Title of a group and its main finding, with the intervals below.
 fn row(title: &str, finding: &Finding<'_>) -> String {
-    let tone = finding.shown().tone;
-    let first = format!(" {title:<GROUP$}{}  ", tone.sign());
+    let tone = finding.main_sentence().tone;
+    let first = format!(" {title:<GROUP_WIDTH$}{}  ", tone.sign());
     let rest = " ".repeat(first.chars().count());
     let lines = wrapped(&first, &shown(&(finding.text() + ".")), &rest);
-    let text = marked::signed(&lines, GROUP + 2, tone);
-    let intervals = finding.interval_words();
+    let text = styled_lines::colour_sign(&lines, GROUP_WIDTH + 2, tone);
+    let intervals = finding.intervals_text();
     if intervals.is_empty() {
         return text;
     }

@@ -1,8 +1,8 @@
-//! The lines below the short table: models without images and chance ([`baselines`]), and marks and facts of models
+//! Lines below the short table: models without images and chance ([`baselines`]), and marks and facts of models
 //! ([`about_models`]).
 
 use crate::report::choice_report::ChoiceReport;
-use crate::tables::{unread, what_it_is};
+use crate::tables::{control_text, unread_note};
 use crate::text::ladder::Ladder;
 use crate::text::words::{percent, with_interval};
 use crate::text::wrapped::wrapped;
@@ -11,10 +11,10 @@ use darkqa_score::accuracies::AccuracyCell;
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::subject::{CHANCE, is_observer, without_run};
 
-/// Mark of an accuracy that is shown to be below that without images.
+/// Mark of an accuracy that is detected to be below the accuracy without images.
 pub(super) const BELOW: char = '▼';
 
-/// Lines below the table: what the last column means, models without images, chance, and the mark.
+/// Lines below the table: models without images, chance, and explanations of the last column and of the mark.
 pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> String {
     let mut parts = Vec::new();
     for (subject, cell) in &ladder.without_level {
@@ -42,12 +42,13 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
             Some(_) => format!("{} {}", subject.model, with_interval(share)),
         });
     }
-    let cells = report
+    let has_mark = report
         .findings
         .summary
-        .family_cells(None, ReadingMode::Strict);
-    let mut cells = cells.filter(|cell| cell.subject.level.is_some());
-    if cells.any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty()) {
+        .family_cells(None, ReadingMode::Strict)
+        .filter(|cell| cell.subject.level.is_some())
+        .any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty());
+    if has_mark {
         parts.push(format!("{BELOW} less often right than without images"));
     }
     let mut text = String::new();
@@ -74,13 +75,13 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
         text += &wrapped(" ", &parts.join(" · "), " ");
     }
     text += &observer_control(report);
-    if let Some(reasons) = unread(&report.findings.summary) {
+    if let Some(reasons) = unread_note(&report.findings.summary) {
         text += &wrapped(" ", &reasons, " ");
     }
     text
 }
 
-/// Defines the observer, and has the score of its standing control, for each run that has its own; empty if it is not shown.
+/// Line that defines the observer, with the score of its standing control in each run; empty if the observer is not in the report.
 fn observer_control(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let is_shown = findings
@@ -92,24 +93,28 @@ fn observer_control(report: &ChoiceReport<'_>) -> String {
     let Some(first) = controls.first().filter(|_| is_shown) else {
         return String::new();
     };
-    let scores = controls.iter().map(|cell| {
-        let run = &cell.subject.model[without_run(&cell.subject.model).len()..];
-        with_interval(cell.score) + run
-    });
+    let scores: Vec<String> = controls
+        .iter()
+        .map(|cell| {
+            let run = &cell.subject.model[without_run(&cell.subject.model).len()..];
+            with_interval(cell.score) + run
+        })
+        .collect();
     let line = format!(
         "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: {}, scores {}; chance is {}",
-        what_it_is(first),
-        scores.collect::<Vec<_>>().join(" and "),
+        control_text(first),
+        scores.join(" and "),
         percent(first.chance)
     );
     wrapped(" ", &line, " ")
 }
 
-/// The meaning of the marks of models, and a line for each model with its further columns.
+/// Explanations of the marks of models, training data of enhancers, and a line for each model with the facts that the user gave about it.
 pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
     let listing = &report.findings.grid.listing;
-    let foot = listing.foot(models.iter().copied());
-    let mut text = foot.map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
+    let mut text = listing
+        .foot(models.iter().copied())
+        .map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
     for (enhancer, training) in listing.trainings() {
         text += &wrapped(" ", &format!("{enhancer}: {training}"), "   ");
     }

@@ -1,48 +1,50 @@
-//! The first column of the short table: [`NameColumn`].
+//! Column of names in the short table: [`NameColumn`].
 
 use std::collections::BTreeSet;
 
 use crate::text::words::shortened;
 
 /// Width of the column of a level, in characters.
-pub(super) const LEVEL: usize = 7;
+pub(super) const LEVEL_WIDTH: usize = 7;
 
-/// The first column of the table: names, cut to a width.
+/// First column of the table: names, shortened to a width.
 pub(super) struct NameColumn {
     width: usize,
-    /// Cut names that several different names share.
-    alike: BTreeSet<String>,
+    /// Shortened names that several different names have in common.
+    ambiguous: BTreeSet<String>,
 }
 
 impl NameColumn {
-    /// A column of at most `width` characters for these names.
+    /// Column of at most `width` characters for some names.
     pub(super) fn new<'a>(names: impl Iterator<Item = &'a str>, width: usize) -> Self {
         let names: BTreeSet<&str> = names.collect();
         let mut seen = BTreeSet::new();
-        let alike = names
+        let ambiguous = names
             .into_iter()
             .map(|name| shortened(name, width))
             .filter(|name| !seen.insert(name.clone()))
             .collect();
-        Self { width, alike }
+        Self { width, ambiguous }
     }
 
-    /// A line of the table. A name that cannot be told from another one when it is cut has a line of its own above it.
+    /// Formats a row: name, values, and the reach of the widest interval. A name that is ambiguous when shortened gets its own line above
+    /// the values.
     pub(super) fn line(
         &self,
         name: &str,
         values: impl Iterator<Item = String>,
         reach: &str,
     ) -> String {
-        let (width, mut text, mut short) = (self.width, String::new(), shortened(name, self.width));
-        if self.alike.contains(&short) {
+        let width = self.width;
+        let mut text = String::new();
+        let mut short = shortened(name, width);
+        if self.ambiguous.contains(&short) {
             text = format!(" {name}\n");
             short.clear();
         }
-        let values = values
-            .map(|value| format!("{value:>LEVEL$}"))
-            .collect::<Vec<_>>()
-            .concat();
+        let values: String = values
+            .map(|value| format!("{value:>LEVEL_WIDTH$}"))
+            .collect();
         let line = format!(" {short:<width$}{values}  {reach}");
         text + line.trim_end() + "\n"
     }
@@ -53,16 +55,14 @@ mod tests {
     use super::NameColumn;
 
     #[test]
-    fn names_that_are_cut_to_the_same_letters_stand_whole() {
+    fn ambiguous_names_are_not_shortened() {
         let names = ["vision-one-instruct", "vision-two-instruct", "raw"];
         let column = NameColumn::new(names.into_iter(), 12);
-        let line = |name| column.line(name, ["50.0".to_owned()].into_iter(), "−1 +2");
-        assert_eq!(
-            line(names[0]),
-            " vision-one-instruct\n                50.0  −1 +2\n"
-        );
-        assert_ne!(line(names[0]), line(names[1]));
-        assert_eq!(line(names[2]), " raw            50.0  −1 +2\n");
+        let [first, second, third] =
+            names.map(|name| column.line(name, ["50.0".to_owned()].into_iter(), "−1 +2"));
+        assert_eq!(first, " vision-one-instruct\n                50.0  −1 +2\n");
+        assert_ne!(first, second);
+        assert_eq!(third, " raw            50.0  −1 +2\n");
         let single = NameColumn::new(names[..1].iter().copied(), 12);
         let line = single.line(names[0], std::iter::empty(), "");
         assert_eq!(line, " visio…struct\n");

@@ -1,4 +1,4 @@
-//! A table of the leaderboard as its page shows it: [`BoardTable`].
+//! Table of the leaderboard's page: [`BoardTable`].
 
 use serde::Serialize;
 
@@ -6,37 +6,38 @@ use crate::text::readable::readable;
 use crate::text::table::{ColumnKind, TableCell};
 use crate::text::words::{ends, interval, words};
 
-/// A table as the template reads it.
+/// Table for the template.
 #[derive(Serialize)]
 pub(super) struct BoardTable {
     pub(super) head: Vec<String>,
     pub(super) rows: Vec<BoardRow>,
 }
 
-/// A row: its first cells, the model with the page of its run, and the others.
+/// Table row for the template.
 #[derive(Serialize)]
 pub(super) struct BoardRow {
-    /// The text that the filter searches.
+    /// Text that the filter of the page searches.
     pub(super) words: String,
     pub(super) cells: Vec<BoardCell>,
 }
 
-/// A cell as the template reads it.
+/// Table cell for the template.
 #[derive(Serialize)]
 pub(super) struct BoardCell {
     text: String,
-    /// Lines beneath it in small letters.
+    /// Lines below the text, in a small font.
     small: Vec<String>,
+    /// CSS class.
     class: &'static str,
-    /// By what the column is sorted: a number, or a text; empty if there is nothing.
+    /// Sort key, a number or a text; empty for a missing value.
     key: String,
-    /// The page that it leads to; empty without one.
+    /// Address of a page; empty without a link.
     link: String,
     is_header: bool,
 }
 
 impl BoardCell {
-    /// A text.
+    /// Cell with a text, which is also its sort key.
     pub(super) fn text(text: &str) -> Self {
         let text = readable(text);
         Self {
@@ -49,13 +50,13 @@ impl BoardCell {
         }
     }
 
-    /// A cell of a table, whose interval stands beneath it.
+    /// Cell of a table, with its interval below.
     pub(super) fn new(kind: ColumnKind, cell: &TableCell) -> Self {
         let share = interval(kind, cell).or(match (kind, cell) {
             (ColumnKind::Share, TableCell::Estimate(share)) => Some(*share),
             _ => None,
         });
-        let (shown, small) = match share {
+        let (text, small) = match share {
             Some(share) => (words(ColumnKind::Accuracy, cell), Some(ends(share))),
             None => split(&words(kind, cell)),
         };
@@ -66,33 +67,34 @@ impl BoardCell {
             TableCell::Threshold(threshold, _) => Some(threshold.value),
             _ => None,
         };
-        // Infinity is beyond every number of its column.
+        // The script cannot sort infinity; a huge number takes its place.
         let key = number.map(|number| number.clamp(-1e300, 1e300).to_string());
         Self {
             small: small.into_iter().collect(),
             class: "",
             key: key.unwrap_or_default(),
-            ..Self::text(&shown)
+            ..Self::text(&text)
         }
     }
 
-    /// The same, sorted by this.
-    pub(super) fn keyed(self, key: String) -> Self {
+    /// Sets the sort key.
+    pub(super) fn with_key(self, key: String) -> Self {
         Self { key, ..self }
     }
 
-    /// The same with a line beneath it.
-    pub(super) fn small(mut self, line: &str) -> Self {
+    /// Adds a line below the text.
+    pub(super) fn with_line(mut self, line: &str) -> Self {
         self.small.push(readable(line));
         self
     }
 
-    pub(super) fn class(self, class: &'static str) -> Self {
+    /// Sets the CSS class.
+    pub(super) fn with_class(self, class: &'static str) -> Self {
         Self { class, ..self }
     }
 
-    /// The head of a row, with a link.
-    pub(super) fn header(self, link: String) -> Self {
+    /// Makes the cell a row header with a link.
+    pub(super) fn into_header(self, link: String) -> Self {
         Self {
             link,
             is_header: true,
@@ -101,7 +103,7 @@ impl BoardCell {
     }
 }
 
-/// A number and the interval behind it, if the text has both.
+/// Splits a text into a number and its interval in brackets, if it has one.
 fn split(text: &str) -> (String, Option<String>) {
     match text.split_once(" [") {
         Some((number, interval)) => (number.to_owned(), Some(format!("[{interval}"))),

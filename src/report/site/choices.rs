@@ -1,8 +1,8 @@
-//! Rows of models that answered questions with choices: [`ChoiceRow`].
+//! Leaderboard rows of models that answered multiple-choice questions: [`ChoiceRow`].
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::run_link::{GroupDigests, RunLink};
-use crate::tables::level_words as why;
+use crate::tables::missing_threshold_reason;
 use crate::text::table::ColumnKind::{Count, Points, Share, Text, Threshold};
 use crate::text::table::{ColumnKind, Table, TableBuilder, TableCell};
 use crate::text::words::points;
@@ -16,38 +16,38 @@ use darkqa_score::significance::Significance;
 use darkqa_score::subject::{ModelInCondition, is_reference};
 use darkqa_score::threshold::{NoThreshold, Threshold as EvThreshold};
 
-/// A model of a run.
+/// Results of one model in one run.
 #[derive(Debug, Clone)]
 pub(crate) struct ChoiceRow {
     pub(crate) model: String,
     pub(crate) run: RunLink,
-    /// Its place among the models of its table; `None` if it is not ranked.
+    /// Rank among the models of its table; `None` if it is not ranked.
     pub(crate) rank: Option<RankRange>,
-    /// Accuracy at L0; `None` if there is no reply.
+    /// Accuracy at L0; `None` without a reply.
     clean: Option<Estimate>,
     /// Mean accuracy from L0 to the darkest level.
     area: Option<Estimate>,
-    /// The darkest level; `None` if no degraded level was asked.
+    /// Darkest level; `None` if no degraded level was asked.
     darkest: Option<AxisLevel>,
-    /// Accuracy at the darkest level less that at L0, and whether a loss is shown.
+    /// Accuracy at the darkest level minus accuracy at L0, with its test.
     change: Option<(Estimate, Significance)>,
     threshold: Option<Result<EvThreshold, NoThreshold>>,
-    /// The enhancer, the level and the difference from raw images of the largest gain.
+    /// Largest gain by an enhancer over raw images: enhancer, level and difference, with its test.
     gain: Option<(String, AxisLevel, Estimate, Significance)>,
-    /// The levels at which the model is detected to be less often right than a model without images.
+    /// Levels at which the model is detected to be worse than a model without images.
     below: Vec<AxisLevel>,
-    /// Replies that cannot be read, and all replies.
+    /// Number of unreadable replies, and of all replies.
     unread: [usize; 2],
 }
 
 impl ChoiceRow {
-    /// Whether the model stands for comparison only, and has no rank.
+    /// True for a reference model, which is listed for comparison and has no rank.
     pub(crate) fn is_reference(&self) -> bool {
         is_reference(&self.model)
     }
 
-    /// The place of the row before a person sorts: by rank, then by area; what has no rank is last.
-    pub(crate) fn order(&self) -> (usize, usize, bool, i64) {
+    /// Key of the initial order: by rank, then by area; rows without a rank come last.
+    pub(crate) fn sort_key(&self) -> (usize, usize, bool, i64) {
         let rank = self.rank.unwrap_or(RankRange {
             first: usize::MAX,
             last: usize::MAX,
@@ -69,29 +69,24 @@ impl ChoiceRow {
         }
     }
 
-    fn below_text(&self, by: &str) -> String {
+    fn below_text(&self, separator: &str) -> String {
         self.below
             .iter()
             .map(ToString::to_string)
             .collect::<Vec<_>>()
-            .join(by)
+            .join(separator)
     }
 }
 
-/// A row for each model with images of a run, in the kind of degradation that its report leads with. All numbers are those of its report.
+/// Rows of a run's models with images, in the main variant of its report. All numbers are the same as in the report.
 pub(crate) fn choice_rows(
     findings: &Findings<'_>,
     variant: &Variant,
     run: &RunLink,
 ) -> Vec<ChoiceRow> {
-    let seeing = findings
-        .grid
-        .subjects
-        .iter()
-        .filter(|subject| subject.view == Some(View::Image));
     let mut models: Vec<&str> = Vec::new();
-    for subject in seeing {
-        if !models.contains(&&*subject.model) {
+    for subject in &findings.grid.subjects {
+        if subject.view == Some(View::Image) && !models.contains(&&*subject.model) {
             models.push(&subject.model);
         }
     }
@@ -103,13 +98,8 @@ pub(crate) fn choice_rows(
 
 fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -> ChoiceRow {
     let grid = &findings.grid;
-    let clean = grid.find_up_to_group(&ModelInCondition::with_images(
-        model,
-        AxisLevel::L0,
-        variant,
-        None,
-    ));
-    let clean = clean.and_then(|index| {
+    let clean = ModelInCondition::with_images(model, AxisLevel::L0, variant, None);
+    let clean = grid.find_up_to_group(&clean).and_then(|index| {
         let summary = &findings.summary;
         let cell = summary.cell(&grid.subjects[index], None, ReadingMode::Strict)?;
         cell.accuracy
@@ -121,32 +111,35 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
             && curve.family.is_none()
     });
     let darkest = curve.map(|curve| curve.summary.darkest);
-    let of = |kind| {
-        findings
-            .comparisons
-            .iter()
-            .filter(move |comparison: &&Comparison| {
-                let first = &comparison.first;
-                comparison.kind == kind
-                    && comparison.family.is_none()
-                    && first.model == model
-                    && first.variant == *variant
-            })
-    };
-    let change = of(ComparisonKind::Level).find(|found| found.first.level == darkest);
-    let gains = of(ComparisonKind::Enhancer);
-    let gain = gains.max_by(|a, b| {
-        let value = |found: &Comparison| found.strict.paired.difference.value;
-        value(a).total_cmp(&value(b))
+    let comparisons: Vec<&Comparison> = findings
+        .comparisons
+        .iter()
+        .filter(|comparison| {
+            comparison.family.is_none()
+                && comparison.first.model == model
+                && comparison.first.variant == *variant
+        })
+        .collect();
+    let change = comparisons.iter().find(|comparison| {
+        comparison.kind == ComparisonKind::Level && comparison.first.level == darkest
     });
+    let gain = comparisons
+        .iter()
+        .filter(|comparison| comparison.kind == ComparisonKind::Enhancer)
+        .max_by(|a, b| {
+            let [a, b] = [a, b].map(|gain| gain.strict.paired.difference.value);
+            a.total_cmp(&b)
+        });
     let below = grid.subjects.iter().filter(|subject| {
         subject.model == model
             && subject.variant == *variant
             && subject.enhancer.is_none()
             && !findings.below_blind(subject, None).is_empty()
     });
-    let health = findings.health.iter();
-    let health = health.filter(|health| health.subject.model == model);
+    let health = findings
+        .health
+        .iter()
+        .filter(|health| health.subject.model == model);
     ChoiceRow {
         model: model.to_owned(),
         run: run.clone(),
@@ -173,13 +166,14 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
     }
 }
 
-/// The rows as a table for files. Numbers are as in the files of the runs.
+/// Table for files. Numbers have the precision of the runs' files. `number` is the group's number on the site.
 pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -> Table {
-    let end = |row: &&ChoiceRow, of: fn(RankRange) -> usize| row.rank.map(of);
     TableBuilder::new("leaderboard", rows)
         .column(Count, "csv group", |_| number)
-        .column(Count, "csv rank_first", |row| end(row, |rank| rank.first))
-        .column(Count, "csv rank_last", |row| end(row, |rank| rank.last))
+        .column(Count, "csv rank_first", |row| {
+            row.rank.map(|rank| rank.first)
+        })
+        .column(Count, "csv rank_last", |row| row.rank.map(|rank| rank.last))
         .column(Text, "csv model", |row| row.model.clone())
         .column(Text, "csv run", |row| row.run.name.clone())
         .column(Share, "csv l0 l0_low l0_high n", |row| row.clean)
@@ -230,12 +224,12 @@ fn threshold(row: &ChoiceRow) -> TableCell {
     let darkest = row.darkest.map_or(0.0, AxisLevel::value);
     match &row.threshold {
         Some(Ok(threshold)) => TableCell::Threshold(*threshold, darkest),
-        Some(Err(reason)) => TableCell::Unknown(why(reason)),
+        Some(Err(reason)) => TableCell::Unknown(missing_threshold_reason(reason)),
         None => TableCell::Missing,
     }
 }
 
-/// The heads of the columns on the page.
+/// Heads of the columns on the page.
 const HEAD: [&str; 12] = [
     "rank",
     "model",
@@ -251,7 +245,7 @@ const HEAD: [&str; 12] = [
     "version",
 ];
 
-/// The rows as the page shows them.
+/// Table for the page.
 pub(super) fn board(rows: &[ChoiceRow]) -> BoardTable {
     BoardTable {
         head: HEAD.map(str::to_owned).to_vec(),
@@ -260,10 +254,9 @@ pub(super) fn board(rows: &[ChoiceRow]) -> BoardTable {
 }
 
 fn board_row(row: &ChoiceRow) -> BoardRow {
-    let share = |share: Option<Estimate>| BoardCell::new(Share, &TableCell::from(share));
-    let rank = row.rank.map(|rank| rank.first * 1000 + rank.last);
+    let rank_key = row.rank.map(|rank| rank.first * 1000 + rank.last);
     let rank = BoardCell::text(&row.rank_text())
-        .keyed(rank.map_or_else(String::new, |rank| rank.to_string()));
+        .with_key(rank_key.map_or_else(String::new, |key| key.to_string()));
     let run = if row.is_reference() {
         format!("{}, for comparison", row.run.name)
     } else {
@@ -282,18 +275,14 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
         }
         None => BoardCell::new(Points, &TableCell::Missing),
     };
-    let why = match &row.threshold {
-        Some(Err(reason)) => why(reason),
-        _ => String::new(),
-    };
-    let threshold = if why.is_empty() {
-        BoardCell::new(Threshold, &threshold(row))
-    } else {
-        BoardCell::new(Threshold, &TableCell::Missing).small(&why)
+    let threshold = match &row.threshold {
+        Some(Err(reason)) => BoardCell::new(Threshold, &TableCell::Missing)
+            .with_line(&missing_threshold_reason(reason)),
+        _ => BoardCell::new(Threshold, &threshold(row)),
     };
     let [unread, replies] = row.unread;
-    let part = unread as f64 / replies.max(1) as f64;
-    let below = BoardCell::text(&row.below_text(", ")).keyed(
+    let unread_share = unread as f64 / replies.max(1) as f64;
+    let below = BoardCell::text(&row.below_text(", ")).with_key(
         row.below
             .first()
             .map_or_else(String::new, |level| level.value().to_string()),
@@ -301,34 +290,36 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
     BoardRow {
         words: format!("{} {}", row.model, row.run.name).to_lowercase(),
         cells: vec![
-            rank.class("rank"),
+            rank.with_class("rank"),
             BoardCell::text(&row.model)
-                .small(&run)
-                .header(row.run.path()),
+                .with_line(&run)
+                .into_header(row.run.path()),
             BoardCell::new(Count, &TableCell::from(n)),
-            share(row.clean),
-            share(row.area),
+            BoardCell::new(Share, &TableCell::from(row.clean)),
+            BoardCell::new(Share, &TableCell::from(row.area)),
             change,
             threshold,
             gain,
-            below.class(if row.below.is_empty() { "" } else { "below" }),
-            BoardCell::new(ColumnKind::Percent, &TableCell::Number(part))
-                .small(&format!("{unread} of {replies}")),
+            below.with_class(if row.below.is_empty() { "" } else { "below" }),
+            BoardCell::new(ColumnKind::Percent, &TableCell::Number(unread_share))
+                .with_line(&format!("{unread} of {replies}")),
             BoardCell::text(&row.run.date),
             BoardCell::text(&row.run.version),
         ],
     }
 }
 
-/// A difference in points, with its interval and where it was found. A word stands where nothing is shown.
-fn difference(difference: Estimate, verdict: Significance, place: &str) -> BoardCell {
+/// Cell with a difference in points, its interval, and its condition. A difference that was not detected is marked.
+fn difference(difference: Estimate, verdict: Significance, condition: &str) -> BoardCell {
     let ends = format!("[{}, {}]", points(difference.low), points(difference.high));
     let cell = BoardCell::text(&points(difference.value))
-        .keyed(difference.value.to_string())
-        .small(&ends);
+        .with_key(difference.value.to_string())
+        .with_line(&ends);
     match verdict {
-        Significance::Better => cell.small(place).class("better"),
-        Significance::Worse => cell.small(place).class("worse"),
-        _ => cell.small(&format!("{place}, not shown")).class("unshown"),
+        Significance::Better => cell.with_line(condition).with_class("better"),
+        Significance::Worse => cell.with_line(condition).with_class("worse"),
+        _ => cell
+            .with_line(&format!("{condition}, not shown"))
+            .with_class("unshown"),
     }
 }

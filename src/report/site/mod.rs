@@ -1,4 +1,4 @@
-//! A site of many runs: a leaderboard and a page a run ([`products`]). It needs no server and no network.
+//! Site of many runs, with a leaderboard and a page for each run: [`products`]. It needs no server and no network.
 
 mod board;
 mod choices;
@@ -19,10 +19,10 @@ pub(crate) use content::{DATA, GroupDifference, GroupRows, Ranking, Site, SiteGr
 pub(crate) use open::{OpenRow, open_rows};
 pub(crate) use run_link::{GroupDigests, PAGES, RunLink};
 
-/// The schema of `data.json`.
+/// Schema of `data.json`.
 pub(crate) const SCHEMA: &str = "darkqa.site/1";
 
-/// A group in `data.json`.
+/// Group in `data.json`.
 #[derive(Serialize)]
 struct GroupData<'a> {
     kind: &'static str,
@@ -36,7 +36,7 @@ struct GroupData<'a> {
     rows: Rows<'a>,
 }
 
-/// The content of `data.json`.
+/// Content of `data.json`.
 #[derive(Serialize)]
 struct SiteData<'a> {
     schema: &'static str,
@@ -45,36 +45,42 @@ struct SiteData<'a> {
     groups: Vec<GroupData<'a>>,
 }
 
-/// The files of a site by name: the leaderboard, the pages, `data.json`, and the tables as CSV.
+/// Files of a site by name: the leaderboard, the pages, `data.json`, and the tables as CSV.
 ///
 /// # Errors
 /// If a file cannot be made.
 pub(crate) fn products(site: Site) -> Result<Vec<(String, Vec<u8>)>> {
-    let tables: Vec<Table> = site.groups.iter().enumerate().map(table).collect();
-    let mut named: Vec<&Table> = tables.iter().collect();
-    named.sort_by_key(|table| table.name);
-    let named: Vec<Table> = named.into_iter().cloned().collect();
-    let mut files = csv::files(&named)?;
+    let tables: Vec<Table> = site
+        .groups
+        .iter()
+        .zip(1..)
+        .map(|(group, number)| table(number, group))
+        .collect();
+    // Tables of the same name share a file.
+    let mut by_name = tables.clone();
+    by_name.sort_by_key(|table| table.name);
+    let mut files = csv::files(&by_name)?;
     let downloads: Vec<String> = files.iter().map(|(name, _)| name.clone()).collect();
     files.push((DATA.to_owned(), data(&site, &tables)?));
     let index = page::index(&site, &downloads)?;
     files.push(("index.html".to_owned(), index.into_bytes()));
-    let pages = site.pages.into_iter();
-    files.extend(pages.map(|(link, page)| (link.path(), page)));
+    for (link, page) in site.pages {
+        files.push((link.path(), page));
+    }
     Ok(files)
 }
 
-/// The table of a group with its number.
-fn table((index, group): (usize, &SiteGroup)) -> Table {
+/// Table of a group with its number on the site.
+fn table(number: usize, group: &SiteGroup) -> Table {
     match &group.rows {
-        GroupRows::Choices(rows, _) => choices::table(index + 1, &group.digests, rows),
-        GroupRows::Open(rows) => open::table(index + 1, &group.digests, rows),
+        GroupRows::Choices(rows, _) => choices::table(number, &group.digests, rows),
+        GroupRows::Open(rows) => open::table(number, &group.digests, rows),
     }
 }
 
+/// Contents of `data.json`.
 fn data(site: &Site, tables: &[Table]) -> Result<Vec<u8>> {
     let groups = site.groups.iter().zip(tables).map(|(group, table)| {
-        let shared = group.shared.iter();
         let (kind, ranking) = match &group.rows {
             GroupRows::Choices(_, ranking) => ("choices", Some(&*ranking.words)),
             GroupRows::Open(_) => ("openeqa", None),
@@ -83,7 +89,11 @@ fn data(site: &Site, tables: &[Table]) -> Result<Vec<u8>> {
             kind,
             title: &group.title,
             digests: &group.digests,
-            shared: shared.map(|(name, value)| [&**name, &**value]).collect(),
+            shared: group
+                .shared
+                .iter()
+                .map(|(name, value)| [&**name, &**value])
+                .collect(),
             differs: group.differs.as_ref(),
             ranking,
             rows: Rows::new(table),

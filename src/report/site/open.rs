@@ -1,4 +1,4 @@
-//! Rows of models that answered open questions: [`OpenRow`].
+//! Leaderboard rows of models that answered open questions: [`OpenRow`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,94 +9,135 @@ use crate::text::table::{Table, TableBuilder, TableCell};
 use crate::text::words::light;
 use crate::types::{AxisLevel, View};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::open::{Group, OpenSummary};
+use darkqa_score::open::{Group, OpenCell, OpenSummary};
 
-/// A model of a run in one light, raw or with an enhancer, with its score (LLM-Match) at each level.
+/// Scores (LLM-Match) of one model in one run by level, in one variant, raw or with an enhancer.
 #[derive(Debug, Clone)]
 pub(crate) struct OpenRow {
     model: String,
     run: RunLink,
     light: String,
-    /// The score at each level, with the number of answers that are scored, and of those that were to be.
-    levels: BTreeMap<AxisLevel, (Option<Estimate>, usize, usize)>,
-    /// The score without images; `None` if it was not asked so.
+    levels: BTreeMap<AxisLevel, LevelScore>,
+    /// Score without images; `None` if the model was not asked without images.
     blind: Option<Estimate>,
 }
 
-/// The rows of a run, over all its questions. Untouched frames are L0 of every light.
+/// Score at one level.
+#[derive(Debug, Clone, Copy)]
+struct LevelScore {
+    score: Option<Estimate>,
+    /// Number of scored answers.
+    scored: usize,
+    /// Number of answers that the run plans.
+    planned: usize,
+}
+
+/// Rows of a run over all its questions. The clean frames are L0 of every variant without an enhancer.
 pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
-    let cells = || summary.cells.iter().filter(|cell| cell.group == Group::All);
-    let seeing = || cells().filter(|cell| cell.subject.view == Some(View::Image));
-    let mut rows = Vec::new();
-    let mut series = Vec::new();
-    for cell in seeing() {
+    let cells: Vec<&OpenCell> = summary
+        .cells
+        .iter()
+        .filter(|cell| cell.group == Group::All)
+        .collect();
+    let with_images: Vec<&OpenCell> = cells
+        .iter()
+        .copied()
+        .filter(|cell| cell.subject.view == Some(View::Image))
+        .collect();
+    let mut all_series = Vec::new();
+    for cell in &with_images {
         let subject = &cell.subject;
-        let own = (&subject.model, &subject.variant, subject.enhancer.as_ref());
-        if !series.contains(&own) {
-            series.push(own);
+        let series = (&subject.model, &subject.variant, subject.enhancer.as_ref());
+        if !all_series.contains(&series) {
+            all_series.push(series);
         }
     }
-    let is_alone = |model: &String| series.iter().filter(|own| own.0 == model).count() == 1;
-    for (model, variant, enhancer) in &series {
+    let mut rows = Vec::new();
+    for (model, variant, enhancer) in &all_series {
         let is_clean = variant.is_untouched() && enhancer.is_none();
-        if is_clean && !is_alone(model) {
+        let has_other_series = all_series
+            .iter()
+            .any(|other| other.0 == *model && (other.1 != *variant || other.2 != *enhancer));
+        if is_clean && has_other_series {
             continue;
         }
-        let levels = seeing()
+        let levels = with_images
+            .iter()
             .filter(|cell| {
                 let subject = &cell.subject;
-                let is_own = subject.variant == **variant && subject.enhancer.as_ref() == *enhancer;
-                // The untouched frames are where every light begins; those of an enhancer are its own.
-                let is_start = subject.variant.is_untouched() && subject.enhancer.is_none();
-                subject.model == **model && (is_own || is_start && enhancer.is_none())
+                let is_in_series =
+                    subject.variant == **variant && subject.enhancer.as_ref() == *enhancer;
+                let is_clean = subject.variant.is_untouched() && subject.enhancer.is_none();
+                subject.model == **model && (is_in_series || is_clean && enhancer.is_none())
             })
             .filter_map(|cell| {
-                let level = cell.subject.level?;
-                Some((level, (cell.score, cell.scored(), cell.planned)))
-            });
-        let mut blind = cells()
-            .filter(|cell| cell.subject.view == Some(View::Blind) && cell.subject.model == **model);
+                let score = LevelScore {
+                    score: cell.score,
+                    scored: cell.scored(),
+                    planned: cell.planned,
+                };
+                Some((cell.subject.level?, score))
+            })
+            .collect();
+        let blind = cells
+            .iter()
+            .find(|cell| cell.subject.view == Some(View::Blind) && cell.subject.model == **model);
         rows.push(OpenRow {
             model: (*model).clone(),
             run: run.clone(),
             light: light(variant, *enhancer),
-            levels: levels.collect(),
-            blind: blind.next().and_then(|cell| cell.score),
+            levels,
+            blind: blind.and_then(|cell| cell.score),
         });
     }
     rows
 }
 
-/// The rows as a table for files, with a line for each level.
+/// Row of the file: one level of an [`OpenRow`].
+struct FileRow<'a> {
+    row: &'a OpenRow,
+    level: String,
+    score: Option<Estimate>,
+    planned: usize,
+}
+
+/// Table for files, with a row for each level. `number` is the group's number on the site.
 pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[OpenRow]) -> Table {
-    let lines = rows.iter().flat_map(|row| {
-        row.levels
-            .iter()
-            .map(move |(level, cell)| (row, level.to_string(), *cell))
+    let levels = rows.iter().flat_map(|row| {
+        row.levels.iter().map(move |(level, score)| FileRow {
+            row,
+            level: level.to_string(),
+            score: score.score,
+            planned: score.planned,
+        })
     });
     let blind = rows.iter().filter_map(|row| {
         let score = row.blind?;
-        Some((row, "blind".to_owned(), (Some(score), score.n, score.n)))
+        Some(FileRow {
+            row,
+            level: "blind".to_owned(),
+            score: Some(score),
+            planned: score.n,
+        })
     });
-    let lines: Vec<_> = lines.chain(blind).collect();
-    TableBuilder::new("openeqa", lines)
+    TableBuilder::new("openeqa", levels.chain(blind))
         .column(Count, "csv group", |_| number)
-        .column(Text, "csv model", |(row, ..)| row.model.clone())
-        .column(Text, "csv run", |(row, ..)| row.run.name.clone())
-        .column(Text, "csv light", |(row, ..)| row.light.clone())
-        .column(Text, "csv level", |(_, level, _)| level.clone())
-        .column(Share, "csv score low high n", |(.., (score, ..))| *score)
-        .column(Count, "csv due", |(.., (_, _, due))| *due)
-        .column(Text, "csv date", |(row, ..)| row.run.date.clone())
-        .column(Text, "csv version", |(row, ..)| row.run.version.clone())
-        .column(Text, "csv page", |(row, ..)| row.run.path())
+        .column(Text, "csv model", |line| line.row.model.clone())
+        .column(Text, "csv run", |line| line.row.run.name.clone())
+        .column(Text, "csv light", |line| line.row.light.clone())
+        .column(Text, "csv level", |line| line.level.clone())
+        .column(Share, "csv score low high n", |line| line.score)
+        .column(Count, "csv due", |line| line.planned)
+        .column(Text, "csv date", |line| line.row.run.date.clone())
+        .column(Text, "csv version", |line| line.row.run.version.clone())
+        .column(Text, "csv page", |line| line.row.run.path())
         .column(Text, "csv questions", |_| digests.questions.clone())
         .column(Text, "csv light_digest", |_| digests.light.clone())
         .column(Text, "csv prompts", |_| digests.prompts.clone())
         .build()
 }
 
-/// The rows as the page shows them.
+/// Table for the page.
 pub(super) fn board(rows: &[OpenRow]) -> BoardTable {
     let levels: BTreeSet<AxisLevel> = rows
         .iter()
@@ -107,36 +148,42 @@ pub(super) fn board(rows: &[OpenRow]) -> BoardTable {
     head.extend(levels.iter().map(ToString::to_string));
     head.extend(has_blind.then(|| "without images".to_owned()));
     head.extend(["date", "version"].map(str::to_owned));
-    let board_row = |row: &OpenRow| {
-        let [scored, due] = row.levels.values().fold([0, 0], |[scored, due], cell| {
-            [scored + cell.1, due + cell.2]
-        });
-        let share = |score: Option<Estimate>| BoardCell::new(Share, &TableCell::from(score));
-        let mut cells = vec![
-            BoardCell::text(&row.model)
-                .small(&row.run.name)
-                .header(row.run.path()),
-            BoardCell::text(&row.light),
-            BoardCell::text(&format!("{scored} of {due}"))
-                .keyed(scored.to_string())
-                .class(""),
-        ];
-        cells.extend(levels.iter().map(|level| match row.levels.get(level) {
-            Some((score, ..)) => share(*score),
-            None => BoardCell::new(Share, &TableCell::Absent),
-        }));
-        if has_blind {
-            cells.push(share(row.blind));
-        }
-        cells.push(BoardCell::text(&row.run.date));
-        cells.push(BoardCell::text(&row.run.version));
-        BoardRow {
-            words: format!("{} {}", row.model, row.run.name).to_lowercase(),
-            cells,
-        }
-    };
     BoardTable {
-        rows: rows.iter().map(board_row).collect(),
+        rows: rows
+            .iter()
+            .map(|row| board_row(row, &levels, has_blind))
+            .collect(),
         head,
+    }
+}
+
+/// Row for the page, with a cell for each level, and one without images if `has_blind`.
+fn board_row(row: &OpenRow, levels: &BTreeSet<AxisLevel>, has_blind: bool) -> BoardRow {
+    let scored: usize = row.levels.values().map(|level| level.scored).sum();
+    let planned: usize = row.levels.values().map(|level| level.planned).sum();
+    let mut cells = vec![
+        BoardCell::text(&row.model)
+            .with_line(&row.run.name)
+            .into_header(row.run.path()),
+        BoardCell::text(&row.light),
+        BoardCell::text(&format!("{scored} of {planned}"))
+            .with_key(scored.to_string())
+            .with_class(""),
+    ];
+    for level in levels {
+        let cell = match row.levels.get(level) {
+            Some(level) => TableCell::from(level.score),
+            None => TableCell::Absent,
+        };
+        cells.push(BoardCell::new(Share, &cell));
+    }
+    if has_blind {
+        cells.push(BoardCell::new(Share, &TableCell::from(row.blind)));
+    }
+    cells.push(BoardCell::text(&row.run.date));
+    cells.push(BoardCell::text(&row.run.version));
+    BoardRow {
+        words: format!("{} {}", row.model, row.run.name).to_lowercase(),
+        cells,
     }
 }

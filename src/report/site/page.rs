@@ -7,7 +7,7 @@ use super::content::{DATA, GroupRows, Site, SiteGroup};
 use super::{choices, open};
 use crate::error::Result;
 use crate::report::page::STYLE;
-use crate::report::template::filled;
+use crate::report::template::render;
 use crate::text::readable::readable;
 use crate::text::words::counted;
 
@@ -35,7 +35,7 @@ struct Page<'a> {
     script: &'static str,
 }
 
-/// A table of comparable runs, as the template needs it.
+/// Table of comparable runs for the template.
 #[derive(Serialize)]
 struct PageTable<'a> {
     id: usize,
@@ -72,7 +72,7 @@ pub(super) fn index(site: &Site, downloads: &[String]) -> Result<String> {
             why: readable(why),
         })
         .collect();
-    filled(
+    render(
         PAGE,
         Page {
             facts: format!(

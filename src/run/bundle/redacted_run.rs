@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::redact::{Paths, Redactor};
 use crate::error::{Error, Result};
-use crate::report::page::shown_thumbnails;
+use crate::report::page::fitting_thumbnails;
 use crate::runs::run_files::RunFiles;
 use crate::runs::stored::{AnyRun, ExperimentKind, StoredRun, read_run_manifest};
 use crate::store;
@@ -63,7 +63,7 @@ impl RedactedRun {
             ExperimentKind::Choice => {
                 let files = RunFiles::read(folder)?;
                 let frames: Vec<_> = files.questions.iter().map(|q| q.frame.clone()).collect();
-                let shown = |all: &[Thumbnail]| shown_thumbnails(all, &frames);
+                let shown = |all: &[Thumbnail]| fitting_thumbnails(all, &frames);
                 let records = store::read_records(folder)?;
                 let data = RedactedData::new(records, files, thumbnails, shown, redactor)?;
                 let run =

@@ -7,9 +7,10 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use crate::drawing::chart::drawn::Drawn;
+use crate::drawing::chart::figure_chart::FigureChart;
 use crate::drawing::figures::{
-    Drawing, FIGURES, KnownNames, Names, drawings, overview, paper_tables, without_threshold,
+    FIGURES, FigureSpec, KnownNames, Names, figure_specs, missing_threshold_message, overview,
+    paper_tables,
 };
 use crate::drawing::paper::{
     Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
@@ -117,7 +118,7 @@ fn font_size(text: &str) -> std::result::Result<f64, String> {
 pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
     let look = Look {
         width: args.width.points(args.columns)?,
-        letters: args.font_size.unwrap_or_else(|| args.width.font_size()),
+        font_size: args.font_size.unwrap_or_else(|| args.width.font_size()),
         palette: args.palette,
     };
     check_only(&args.only)?;
@@ -128,13 +129,13 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
         &args.label,
         &args.order,
         args.reference.as_ref(),
-        &KnownNames::new(findings),
+        &KnownNames::from_findings(findings),
     )?;
     let mut output = String::new();
     for alert in runs.alerts(&all) {
         let _ = writeln!(output, "note: {}", alert.text);
     }
-    let drawings = drawings(findings, &names);
+    let figure_specs = figure_specs(findings, &names);
     let mut files = Files::default();
     for name in wanted_names(&args.only) {
         if name == PAPER {
@@ -153,15 +154,15 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
             files.add_tables(&paper_tables(findings, &names), args, &look);
             continue;
         }
-        if let Some(drawing) = drawings.iter().find(|drawing| drawing.name == name) {
+        if let Some(drawing) = figure_specs.iter().find(|drawing| drawing.name == name) {
             files.add_drawing(drawing, &args.format, &look)?;
         } else {
-            let reason = without_threshold(findings, name);
+            let reason = missing_threshold_message(findings, name);
             let reason = reason.as_deref();
             files.leave_out(name, reason.unwrap_or("the runs have no records for it"));
         }
     }
-    let name_note = names.said();
+    let name_note = names.short_names_note();
     if !name_note.is_empty() {
         let _ = writeln!(files.captions, "{name_note}\n");
         let _ = writeln!(output, "note: {name_note}");
@@ -212,7 +213,7 @@ struct Files {
 impl Files {
     fn add_drawing(
         &mut self,
-        drawing: &Drawing,
+        drawing: &FigureSpec,
         formats: &[FigureFormat],
         look: &Look,
     ) -> Result<()> {
@@ -220,8 +221,8 @@ impl Files {
         self.add(name, &sheet(&drawing.chart, look), formats)?;
         if formats.contains(&FigureFormat::Tex) {
             match &drawing.chart {
-                Drawn::Lines(chart) => self.contents.extend(tex(name, chart, &in_tex(look))),
-                Drawn::Bars(_) | Drawn::Thresholds(_) | Drawn::Reliability(_) => {
+                FigureChart::Lines(chart) => self.contents.extend(tex(name, chart, &in_tex(look))),
+                FigureChart::Bars(_) | FigureChart::Thresholds(_) | FigureChart::Reliability(_) => {
                     self.leave_out(&format!("{name}.tex"), "it is not a chart of lines");
                 }
             }
@@ -240,7 +241,7 @@ impl Files {
         for (panel, why) in &overview.left_out {
             self.leave_out(&format!("{PAPER}, the panel {panel}"), why);
         }
-        if overview.sheet.marks.is_empty() {
+        if overview.sheet.shapes.is_empty() {
             self.leave_out(PAPER, "it has no panel");
             return Ok(());
         }
@@ -281,7 +282,7 @@ impl Files {
 
     /// Adds a sheet as PDF and SVG, if these formats are requested.
     fn add(&mut self, name: &str, sheet: &Sheet, formats: &[FigureFormat]) -> Result<()> {
-        sheet.check_letters()?;
+        sheet.check_characters()?;
         if formats.contains(&FigureFormat::Pdf) {
             self.contents
                 .push((format!("{name}.pdf"), pdf(sheet, name)?));

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::images::frames::InputTally;
 use crate::images::progress::Progress;
 use crate::images::workers::{ThreadArgs, pool};
-use crate::report::questions::against::LookComparison;
+use crate::report::questions::against::AppearanceComparison;
 use crate::types::FrameId;
 use darkqa_questions::appearance::FrameAppearance;
 use darkqa_questions::colors::Palette;
@@ -21,7 +21,7 @@ pub(super) fn compare(
     palette: &Palette,
     threads: ThreadArgs,
     progress: &Progress,
-) -> Result<LookComparison> {
+) -> Result<AppearanceComparison> {
     let looks = |set: &Dataset| {
         let found = looks(set, palette, threads, progress)?;
         if found.is_empty() {
@@ -30,7 +30,7 @@ pub(super) fn compare(
         Ok(found)
     };
     let [own, others] = [looks(sets[0])?, looks(sets[1])?];
-    Ok(LookComparison::new([
+    Ok(AppearanceComparison::new([
         (sets[0].name(), &own),
         (sets[1].name(), &others),
     ]))

@@ -21,7 +21,7 @@ use crate::images::progress::Progress;
 use crate::images::trials::questions::rules;
 use crate::images::workers::{ThreadArgs, pool};
 use crate::report;
-use crate::report::questions::against::LookComparison;
+use crate::report::questions::against::AppearanceComparison;
 use crate::runs::Outcome;
 use crate::runs::shard::Shard;
 use crate::runs::shard_args::{keep_shard, shard_from_flag};
@@ -168,7 +168,11 @@ impl<'a> QuestionSettings<'a> {
     }
 
     /// The comparison with the set of `--against`; `None` without the flag.
-    fn comparison(&self, dataset: &Dataset, progress: &Progress) -> Result<Option<LookComparison>> {
+    fn comparison(
+        &self,
+        dataset: &Dataset,
+        progress: &Progress,
+    ) -> Result<Option<AppearanceComparison>> {
         let args = self.args;
         let Some(folder) = &args.against else {
             return Ok(None);
@@ -248,7 +252,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
     }
     let looks = comparison
         .as_ref()
-        .map_or_else(String::new, LookComparison::table);
+        .map_or_else(String::new, AppearanceComparison::table);
     let table = report::questions::table(&summary);
     let checks = report::questions::checks::text(&verdicts.checks);
     let output = format!("{table}{looks}{checks}{}\n", args.out.display());

@@ -45,7 +45,7 @@ pub(super) fn ranked_rows(members: Vec<ChoiceMember>) -> GroupRows {
             row
         })
         .collect();
-    rows.sort_by_key(ChoiceRow::order);
+    rows.sort_by_key(ChoiceRow::sort_key);
     let words = words(best.as_ref(), models, &unit);
     GroupRows::Choices(rows, Ranking { words })
 }

@@ -1,4 +1,4 @@
-//! The content of a report's figure: [`Drawn`].
+//! Any of the charts that a report's figure can have: [`FigureChart`].
 
 use super::Chart;
 use super::bars::BarChart;
@@ -7,17 +7,17 @@ use super::reliability::ReliabilityChart;
 use super::thresholds::ThresholdChart;
 use crate::error::Result;
 
-/// The content of a figure.
+/// Chart of a figure, before it is drawn.
 #[derive(Debug, Clone)]
-pub(crate) enum Drawn {
+pub(crate) enum FigureChart {
     Lines(Chart),
     Bars(BarChart),
     Thresholds(ThresholdChart),
     Reliability(ReliabilityChart),
 }
 
-impl Drawn {
-    /// Further text of the caption: numbers of items, and the meaning of bands and bars.
+impl FigureChart {
+    /// Text for the end of the caption: number of items, and the meaning of bands and bars.
     pub(crate) fn note(&self) -> String {
         match self {
             Self::Lines(chart) => chart.note.clone(),
@@ -27,11 +27,11 @@ impl Drawn {
         }
     }
 
-    /// The data of the figure for the script of the page; `None` for a figure that the page shows as it is.
+    /// Data of the chart as JSON, for the page's script; `None` for a figure that the page shows as a static image.
     ///
     /// # Errors
-    /// If it cannot be written.
-    pub(crate) fn data(&self) -> Result<Option<String>> {
+    /// If the data cannot be serialized.
+    pub(crate) fn script_data(&self) -> Result<Option<String>> {
         match self {
             Self::Lines(chart) => ChartData::json(chart).map(Some),
             Self::Bars(_) | Self::Thresholds(_) | Self::Reliability(_) => Ok(None),

@@ -1,7 +1,7 @@
-//! Alerts and findings as lines of the terminal, with their signs in colour: [`alert`], [`summary`], [`signed`] and [`sentence`].
+//! Lines of a terminal report with coloured signs: [`alert`], [`summary`], [`sentence`], [`heading`] and [`table`].
 //!
-//! Colours stand in the text as ANSI sequences; whoever prints it takes them out where the terminal has none. A sign or a word states
-//! the same as each colour.
+//! Colours are ANSI sequences; the code that prints a text removes them if the terminal has no colours. A sign or a word always has the
+//! same meaning as the colour.
 
 use clap::builder::styling::{AnsiColor, Style};
 
@@ -11,45 +11,45 @@ use crate::text::alert::Alert;
 use crate::text::wrapped::wrapped;
 use crate::types::text::shown;
 
-/// An alert, wrapped.
+/// Wrapped text of an alert with its sign.
 pub(super) fn alert(alert: &Alert) -> String {
-    marked(
+    style_start(
         &wrapped("! ", &shown(&alert.text), "  "),
         1,
         colour(AnsiColor::Yellow),
     )
 }
 
-/// A sentence with its sign, and its detail beneath.
+/// Wrapped text of a sentence with its sign, and its detail below.
 pub(super) fn sentence(sentence: &Sentence) -> String {
     let first = format!(" {}  ", sentence.tone.sign());
     let text = wrapped(&first, &shown(&sentence.text), "    ");
-    signed(&text, 2, sentence.tone) + &wrapped("    ", &shown(&sentence.detail), "    ")
+    colour_sign(&text, 2, sentence.tone) + &wrapped("    ", &shown(&sentence.detail), "    ")
 }
 
-/// Lines whose sign ends at a column, in the colour of the tone.
-pub(super) fn signed(lines: &str, end: usize, tone: Tone) -> String {
+/// Applies the colour of a tone to the first `end` characters, at the end of which the sign is.
+pub(super) fn colour_sign(lines: &str, end: usize, tone: Tone) -> String {
     let style = match tone {
         Tone::Better => colour(AnsiColor::Green),
         Tone::Worse => colour(AnsiColor::Red),
         Tone::NotShown | Tone::Note => Style::new().bold(),
     };
-    marked(lines, end, style)
+    style_start(lines, end, style)
 }
 
-/// The summary of a report, in bold.
+/// Summary of a report, in bold.
 pub(super) fn summary(text: &str) -> String {
     let lines = wrapped(" ", &shown(text), " ");
     let style = Style::new().bold();
     format!("{style}{}{style:#}\n", lines.trim_end())
 }
 
-/// The title of a group of findings.
+/// Title of a group of findings.
 pub(super) fn heading(title: &str) -> String {
     format!(" {title}\n")
 }
 
-/// A table with its marks of what is below the score without images in red.
+/// Applies red to the marks of accuracies below the accuracy without images in a table.
 pub(super) fn table(text: &str) -> String {
     let style = colour(AnsiColor::Red);
     shown(text).replace(BELOW, &format!("{style}{BELOW}{style:#}"))
@@ -59,9 +59,12 @@ fn colour(colour: AnsiColor) -> Style {
     Style::new().bold().fg_color(Some(colour.into()))
 }
 
-/// Lines of which the first `sign` letters are in a style.
-fn marked(lines: &str, sign: usize, style: Style) -> String {
-    let at = lines.char_indices().nth(sign);
-    let (sign, rest) = lines.split_at(at.map_or(lines.len(), |(at, _)| at));
-    format!("{style}{sign}{style:#}{rest}")
+/// Applies a style to the first `count` characters of a text.
+fn style_start(text: &str, count: usize, style: Style) -> String {
+    let end = text
+        .char_indices()
+        .nth(count)
+        .map_or(text.len(), |(index, _)| index);
+    let (start, rest) = text.split_at(end);
+    format!("{style}{start}{style:#}{rest}")
 }
