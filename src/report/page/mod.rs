@@ -30,7 +30,7 @@ use crate::report::short::{head, who_is_judged};
 use crate::report::template::render;
 use crate::sentences::{Sentence, how_to_read};
 use crate::tables::{SECTIONS, Section};
-use crate::text::alert::Alert;
+use crate::text::alert::{Alert, AlertKind};
 use crate::text::noise_profiles::NoiseProfiles;
 use crate::text::table::Table;
 use crate::types::Truths;
@@ -180,6 +180,12 @@ pub(crate) fn page_of<'a>(
     inputs: &PageInputs<'a>,
 ) -> Result<String> {
     let sections = content.sections;
+    // A property of the noise profile holds for every run with it: a line of the introduction, no warning.
+    let (notes, warnings): (Vec<&Alert>, Vec<&Alert>) = content
+        .alerts
+        .iter()
+        .partition(|alert| alert.kind == AlertKind::Noise);
+    let notes = notes.into_iter().map(|note| note.text.clone());
     render(
         PAGE,
         Page {
@@ -191,12 +197,15 @@ pub(crate) fn page_of<'a>(
             heading: heading(&content.who, inputs),
             head: content.head,
             family: "family",
-            alerts: content.alerts.iter().map(|alert| &*alert.text).collect(),
+            alerts: warnings.iter().map(|alert| &*alert.text).collect(),
             findings: Some(content.groups.count()),
             groups: content.groups.all().iter().map(PageGroup::new).collect(),
             how_to_read: content.how_to_read,
             answers_title: content.answers_title,
-            intro: [content.intro, Vec::from_iter(sample::note(content.grid))].concat(),
+            intro: notes
+                .chain(content.intro)
+                .chain(sample::note(content.grid))
+                .collect(),
             sections: sections::sections(sections, content.tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(run_facts).collect(),
             data: items::packed(content.grid, content.confusions, inputs)?,
