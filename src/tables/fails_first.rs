@@ -10,7 +10,7 @@ use crate::types::{AxisLevel, Family, FrameId, Variant};
 use darkqa_score::choice::ReadingMode;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::{ALPHA, Significance, holm};
 
 /// Maximum number of frames for each variant (chosen).
 const MAX_FRAMES: usize = 5;
@@ -33,7 +33,12 @@ fn compare_losses(one: &PooledFinding, other: &PooledFinding) -> Ordering {
 
 /// A row for each family and a column for each variant. Families without a detected loss come last.
 fn families(findings: &Findings<'_>) -> Table {
-    let variants: Vec<&Variant> = findings.grid.variants().into_iter().collect();
+    let variants: Vec<(&Variant, BTreeMap<&Family, &PooledFinding>)> = findings
+        .grid
+        .variants()
+        .into_iter()
+        .map(|variant| (variant, first_losses(findings, variant)))
+        .collect();
     let mut families: Vec<(&Family, Option<&PooledFinding>)> = findings
         .grid
         .groups()
@@ -42,7 +47,7 @@ fn families(findings: &Findings<'_>) -> Table {
         .map(|family| {
             let loss = variants
                 .iter()
-                .filter_map(|variant| first_loss(findings, family, variant))
+                .filter_map(|(_, losses)| losses.get(family).copied())
                 .min_by(|one, other| compare_losses(one, other));
             (family, loss)
         })
@@ -63,15 +68,15 @@ fn families(findings: &Findings<'_>) -> Table {
         .column(Text, "terminal family | page family", |family| {
             family_name(Some(family)).to_owned()
         });
-    for variant in &variants {
+    for (variant, losses) in variants {
         let name = light(variant, None);
         let heads = ColumnHeads {
             terminal: vec![name.clone()],
             page: Some(name),
             ..ColumnHeads::default()
         };
-        builder = builder.column(Text, heads, |family| {
-            first_loss(findings, family, variant).map_or_else(
+        builder = builder.column(Text, heads, move |family| {
+            losses.get(family).map_or_else(
                 || "no loss detected".to_owned(),
                 |loss| {
                     let difference = loss.strict.difference;
@@ -83,26 +88,38 @@ fn families(findings: &Findings<'_>) -> Table {
         });
     }
     let mut table = builder.build();
-    table.heading = (!table.rows.is_empty()).then(|| "Families that fail first".to_owned());
+    if !table.rows.is_empty() {
+        table.heading = Some("Families that fail first".to_owned());
+        table.foot = Some(
+            "p < 0.05 after one correction over the families and levels of a column".to_owned(),
+        );
+    }
     table
 }
 
-/// Loss of a family at the first level where a loss is detected.
-fn first_loss<'f>(
+/// Loss of each family at the first level where a loss is detected in a variant. One correction (Holm) covers the tests of all families and
+/// levels of the variant, so that the many tests do not make a family fail by chance.
+fn first_losses<'f>(
     findings: &'f Findings<'_>,
-    family: &Family,
     variant: &Variant,
-) -> Option<&'f PooledFinding> {
-    findings
+) -> BTreeMap<&'f Family, &'f PooledFinding> {
+    let tested: Vec<(&Family, &PooledFinding)> = findings
         .pooled
         .iter()
-        .filter(|finding| {
-            finding.kind == PooledKind::Darkness
-                && finding.family.as_ref() == Some(family)
-                && finding.variant == *variant
-                && finding.strict.verdict == Significance::Worse
-        })
-        .min_by_key(|finding| finding.level)
+        .filter(|finding| finding.kind == PooledKind::Darkness && finding.variant == *variant)
+        .filter_map(|finding| Some((finding.family.as_ref()?, finding)))
+        .collect();
+    let p_values: Vec<f64> = tested.iter().map(|(_, finding)| finding.strict.p).collect();
+    let mut losses = BTreeMap::new();
+    for ((family, finding), p_holm) in tested.into_iter().zip(holm(&p_values)) {
+        if p_holm < ALPHA && finding.strict.verdict == Significance::Worse {
+            let first = losses.entry(family).or_insert(finding);
+            if finding.level < first.level {
+                *first = finding;
+            }
+        }
+    }
+    losses
 }
 
 /// Answers of the pooled models to the questions about one frame in one variant.
@@ -198,18 +215,15 @@ pub(crate) fn first_to_fail(findings: &Findings<'_>) -> Vec<String> {
     let findings = findings.shown();
     let mut lines: Vec<(Vec<String>, String)> = Vec::new();
     for variant in findings.grid.variants() {
-        let losses: Vec<(&Family, &PooledFinding)> = findings
+        let losses = first_losses(findings, variant);
+        let lowest = losses.values().map(|loss| loss.level).min();
+        let names: Vec<&str> = findings
             .grid
             .groups()
             .into_iter()
             .flatten()
-            .filter_map(|family| Some((family, first_loss(findings, family, variant)?)))
-            .collect();
-        let lowest = losses.iter().map(|(_, loss)| loss.level).min();
-        let names: Vec<&str> = losses
-            .iter()
-            .filter(|(_, loss)| Some(loss.level) == lowest)
-            .map(|(family, _)| family_name(Some(family)))
+            .filter(|family| losses.get(family).map(|loss| loss.level) == lowest)
+            .map(|family| family_name(Some(family)))
             .collect();
         let families = lowest.map(|level| format!("{} at {level}", names.join(", ")));
         let frames = frame_rows(findings, variant);
