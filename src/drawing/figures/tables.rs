@@ -105,10 +105,13 @@ impl FigureBuilder<'_> {
                     }
                     self.accuracy_of(subject, None)
                 });
-                let cells = points.into_iter().map(|(level, accuracy)| {
-                    (level, accuracy_cell(accuracy, below.contains(&level)))
-                });
-                (*model, cells.collect())
+                let cells = points
+                    .into_iter()
+                    .map(|(level, accuracy)| {
+                        (level, accuracy_cell(accuracy, below.contains(&level)))
+                    })
+                    .collect();
+                (*model, cells)
             })
             .collect();
         let levels: Vec<AxisLevel> = self

@@ -101,8 +101,10 @@ fn row_spacing(chart: &Chart, look: &Look, width: f64) -> f64 {
     let lines = chart
         .panels
         .iter()
-        .map(|panel| font.wrapped(&panel.title, look.font_size, width).len());
-    (6.3 + 1.25 * lines.max().unwrap_or(1) as f64) * look.font_size
+        .map(|panel| font.wrapped(&panel.title, look.font_size, width).len())
+        .max()
+        .unwrap_or(1);
+    (6.3 + 1.25 * lines as f64) * look.font_size
 }
 
 /// Number of legend columns that fit the longest name.
