@@ -62,7 +62,7 @@ pub(crate) fn png_16(image: &Rgb16Image) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// If a side is too long for the format, or the samples do not fill the sides.
-pub fn grey_png((width, height): (usize, usize), samples: &[u16]) -> Result<Vec<u8>> {
+pub fn grey_png(width: usize, height: usize, samples: &[u16]) -> Result<Vec<u8>> {
     if samples.len() != width * height {
         return Err(image_error("its samples do not fill its sides"));
     }

@@ -36,7 +36,7 @@ impl Payload {
             PayloadFormat::Png => png(image)?,
             PayloadFormat::Jpeg(quality) => jpeg(image.samples(), width, height, quality)?,
         };
-        Ok(Self::from_file(file, (width, height), format))
+        Ok(Self::from_file(file, width, height, format))
     }
 
     /// The bytes of a PNG file, without decoding or encoding. The file must have plain 8-bit RGB, and no chunk that changes its display or
@@ -45,13 +45,18 @@ impl Payload {
     /// The file is not checked for damage: it must have been decoded before.
     #[must_use]
     pub fn from_plain_png(file: &[u8]) -> Option<Self> {
-        let size = plain_png::size(file)?;
-        Some(Self::from_file(file.to_vec(), size, PayloadFormat::Png))
+        let (width, height) = plain_png::plain_size(file)?;
+        Some(Self::from_file(
+            file.to_vec(),
+            width,
+            height,
+            PayloadFormat::Png,
+        ))
     }
 
     /// The payload of a file that was encoded in this format, with its width and height in pixels.
     #[must_use]
-    pub fn from_file(file: Vec<u8>, (width, height): (u32, u32), format: PayloadFormat) -> Self {
+    pub fn from_file(file: Vec<u8>, width: u32, height: u32, format: PayloadFormat) -> Self {
         Self {
             facts: ImageFacts {
                 digest: Digest::from_bytes(&file),

@@ -1,11 +1,11 @@
-//! The check that a PNG file has nothing but plain pixels: [`size`].
+//! The check that a PNG file contains nothing but plain 8-bit RGB pixels: [`plain_size`].
 
 const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Width and height of a PNG file with plain 8-bit RGB: one header, image data, an end, and at most chunks that change nothing
 /// (`sRGB`, and `pHYs` with square pixels). `None` for all other files: further chunks (transparency, gamma, profiles,
 /// orientation, frames, text) could change how the image is shown, or give the endpoint more than the pixels.
-pub(super) fn size(file: &[u8]) -> Option<(u32, u32)> {
+pub(super) fn plain_size(file: &[u8]) -> Option<(u32, u32)> {
     let mut rest = file.strip_prefix(SIGNATURE)?;
     let (first, header, after) = chunk(rest)?;
     if &first != b"IHDR" {
@@ -81,11 +81,11 @@ mod tests {
             (b"IDAT", &[2; 9]),
             (b"IEND", &[]),
         ]);
-        assert_eq!(size(&file), Some((6, 4)));
+        assert_eq!(plain_size(&file), Some((6, 4)));
         for length in 0..file.len() {
-            assert_eq!(size(&file[..length]), None, "cut at {length}");
+            assert_eq!(plain_size(&file[..length]), None, "cut at {length}");
         }
-        assert_eq!(size(&[&file[..], b"x"].concat()), None);
+        assert_eq!(plain_size(&[&file[..], b"x"].concat()), None);
     }
 
     #[test]
@@ -102,7 +102,7 @@ mod tests {
                 (b"IDAT", &[1; 9]),
                 (b"IEND", &[]),
             ]);
-            assert_eq!(size(&file), None, "{other:?}");
+            assert_eq!(plain_size(&file), None, "{other:?}");
         }
         let rgb = header([8, 2, 0, 0, 0]);
         for kind in [
@@ -115,12 +115,12 @@ mod tests {
                 (b"IDAT", &[1; 9]),
                 (b"IEND", &[]),
             ]);
-            assert_eq!(size(&file), None, "{}", String::from_utf8_lossy(kind));
+            assert_eq!(plain_size(&file), None, "{}", String::from_utf8_lossy(kind));
         }
-        assert_eq!(size(&png(&[(b"IHDR", &rgb), (b"IEND", &[])])), None);
-        assert_eq!(size(&png(&[(b"IDAT", &[1]), (b"IEND", &[])])), None);
+        assert_eq!(plain_size(&png(&[(b"IHDR", &rgb), (b"IEND", &[])])), None);
+        assert_eq!(plain_size(&png(&[(b"IDAT", &[1]), (b"IEND", &[])])), None);
         let mut endless = png(&[(b"IHDR", &rgb)]);
         endless.extend(b"\xff\xff\xff\xffIDAT");
-        assert_eq!(size(&endless), None);
+        assert_eq!(plain_size(&endless), None);
     }
 }

@@ -25,11 +25,11 @@ pub enum Scaling {
 impl Scaling {
     /// Width and height of an image after scaling, from its original width and height, in pixels.
     #[must_use]
-    pub fn size(self, (width, height): (u32, u32)) -> (usize, usize) {
+    pub fn size(self, width: u32, height: u32) -> (usize, usize) {
         match self {
             Self::Never => (width as usize, height as usize),
             Self::MaxSide(side) => {
-                let (width, height) = fitted_size((width, height), side);
+                let (width, height) = fitted_size(width, height, side);
                 (width as usize, height as usize)
             }
             Self::LongerSide(side) => {

@@ -133,7 +133,7 @@ fn prompts(
             let prompt = |view| {
                 let words = setup.config.prompts.render(view, &shown.question)?;
                 let prompt = match (view, setup.config.image_place) {
-                    (View::Image, ImagePlace::BeforeWords) => Prompt::behind(words.into()),
+                    (View::Image, ImagePlace::BeforeWords) => Prompt::after_images(words.into()),
                     _ => Prompt::from_text(words.into()),
                 };
                 let several = setup.dataset.image_series(&question.frame);
@@ -169,7 +169,11 @@ fn group(
         return Ok(None);
     }
     let image = condition
-        .map(|condition| setup.recipe.stimulus(&setup.sources[source], condition))
+        .map(|condition| {
+            setup
+                .recipe
+                .stimulus_digest(&setup.sources[source], condition)
+        })
         .transpose()?;
     let is_control = |model: &ModelUnderTest| view == View::Image && is_other_room(model);
     let own = questions.own.iter().map(|shown| (shown, false));

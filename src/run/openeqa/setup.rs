@@ -70,7 +70,7 @@ impl<'a> OpenSetup<'a> {
         let recipe = Recipe::new(&job.light.kinds, job.format, None, &files);
         let recipe = recipe.for_walks(&config.walk);
         let recipe = if shows_frames {
-            recipe.with_elsewhere(&job.enhancers.enhanced)?
+            recipe.with_enhanced_images(&job.enhancers.enhanced)?
         } else {
             recipe
         };
@@ -86,7 +86,7 @@ impl<'a> OpenSetup<'a> {
             check_enhanced(&conditions, &job.enhancers)?;
             (sources, conditions)
         } else {
-            let unseen = |name| Source::unseen(FrameId(name));
+            let unseen = |name| Source::without_frames(FrameId(name));
             (names.into_iter().map(unseen).collect(), Vec::new())
         };
         recipe.check(&sources, &conditions)?;

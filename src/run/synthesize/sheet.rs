@@ -57,7 +57,7 @@ pub(super) struct SheetRecipe {
 
 impl ImageOrigin for SheetRecipe {
     const SCHEMAS: &'static [&'static str] = &["darkqa.sheet/1"];
-    const IS_REPLACED: bool = true;
+    const REPLACES_OTHER_SETTINGS: bool = true;
 }
 
 impl SheetRecipe {
@@ -170,7 +170,7 @@ fn draw_levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> 
             .into_iter()
             .map(|(variant, all)| {
                 let images = all.into_iter().map(|how| {
-                    let dark_ev = frame.applied(how)?.drop_ev();
+                    let dark_ev = frame.apply(how)?.drop_ev();
                     let image = Rgb::clone(frame.degraded(Some(how))?);
                     Ok(LevelImage { image, dark_ev })
                 });
