@@ -70,8 +70,8 @@ impl ImageSteps<'_> {
         note: &InputNote,
         exposure: Option<ExposureFacts>,
     ) -> Result<Arc<Payload>> {
-        let payload = payload.turned_by(note.orientation);
-        self.check_size(payload.exposed_by(exposure))
+        let payload = payload.with_orientation(note.orientation);
+        self.check_size(payload.with_exposure(exposure))
     }
 
     /// Scales and encodes an image; returns the payload and the scaled pixels. `note` tells how its frame was read.
@@ -84,8 +84,8 @@ impl ImageSteps<'_> {
         let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
             let encoded = self.scaled(image)?;
             let payload = Payload::encode(&encoded, self.recipe.format)?;
-            let payload = payload.turned_by(note.orientation);
-            Ok((payload.exposed_by(exposure), encoded))
+            let payload = payload.with_orientation(note.orientation);
+            Ok((payload.with_exposure(exposure), encoded))
         })?;
         Ok((self.check_size(payload)?, encoded))
     }

@@ -114,6 +114,6 @@ fn with_treatment(condition: &Condition, treatment: Treatment) -> Condition {
 pub(crate) fn with_pair_facts(payload: Arc<Payload>, pair: Option<PairFacts>) -> Arc<Payload> {
     match pair {
         None => payload,
-        pair => Arc::new(Arc::unwrap_or_clone(payload).paired_by(pair)),
+        pair => Arc::new(Arc::unwrap_or_clone(payload).with_pair(pair)),
     }
 }

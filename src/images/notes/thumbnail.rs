@@ -129,7 +129,7 @@ pub(crate) fn thumbnail(
     encoded: Option<&Rgb>,
     shown: Option<ShownObjects<'_>>,
 ) -> Result<Thumbnail> {
-    let image = sent.received(encoded)?;
+    let image = sent.received_pixels(encoded)?;
     let ev = crop_gain(condition, sent);
     Ok(Thumbnail {
         frame: frame.clone(),

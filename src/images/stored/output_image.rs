@@ -340,7 +340,7 @@ pub(crate) fn differing_fields(one: &Value, other: &Value) -> Vec<String> {
 /// The pixels of an image file; `None` if it cannot be decoded.
 fn decode(path: &Path, bytes: &[u8]) -> Option<Rgb> {
     let rule = ReadingRule {
-        most_pixels: u64::MAX / 8,
+        max_pixels: u64::MAX / 8,
         ..ReadingRule::default()
     };
     let file = ImageFile::new(bytes.to_vec(), path.display().to_string(), rule);

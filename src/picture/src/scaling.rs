@@ -16,7 +16,7 @@ use darkqa_ground::types::Rgb;
 pub enum Scaling {
     /// Not scaled.
     Never,
-    /// Reduced if a side is longer than this many pixels.
+    /// Reduced to this many pixels on the longer side, if it has more.
     MaxSide(NonZeroU32),
     /// Enlarged or reduced to this many pixels on the longer side.
     LongerSide(usize),
