@@ -149,7 +149,7 @@ impl ImageRecipe {
                 draws: synthesis.draws,
                 coupling: synthesis.coupling,
                 model: json!(synthesis.camera),
-                state: synthesis.state_by(key, applied.drop_ev()),
+                state: synthesis.state_after_drop(key, applied.drop_ev()),
             })
         });
         Self {
