@@ -116,7 +116,9 @@ impl<'a> RawPng<'a> {
                 .output_buffer_size()
                 .ok_or("too large for this machine")?;
             let mut bytes = vec![0; size];
-            self.reader.next_frame(&mut bytes).map_err(decoding_error)?;
+            self.reader
+                .next_frame(&mut bytes)
+                .map_err(|e| decoding_error(&e))?;
             for row in bytes.chunks_exact(row_size) {
                 append_row(row, width, bits, &convert, &mut samples);
             }
@@ -125,7 +127,7 @@ impl<'a> RawPng<'a> {
             while self
                 .reader
                 .read_row(&mut row)
-                .map_err(decoding_error)?
+                .map_err(|e| decoding_error(&e))?
                 .is_some()
             {
                 append_row(&row, width, bits, &convert, &mut samples);
@@ -138,7 +140,7 @@ impl<'a> RawPng<'a> {
     }
 }
 
-fn decoding_error(e: DecodingError) -> String {
+fn decoding_error(e: &DecodingError) -> String {
     format!("not a whole PNG: {e}")
 }
 

@@ -72,6 +72,9 @@ fn kolmogorov(mut sample: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
         * n.sqrt()
 }
 
+/// A number of a camera state.
+type Number = fn(&CameraState) -> f64;
+
 fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z / f64::sqrt(2.0))
 }
@@ -79,7 +82,6 @@ fn normal_cdf(z: f64) -> f64 {
 #[test]
 fn numbers_have_their_distributions() {
     let all = states(&CameraModel::default(), 10_000);
-    type Number = fn(&CameraState) -> f64;
     let uniform: [(&str, Number, [f64; 2]); 4] = [
         ("K", |s| s.system_gain.ln(), [0.1f64.ln(), 6.0f64.ln()]),
         ("r", |s| s.ratio, [100.0, 300.0]),

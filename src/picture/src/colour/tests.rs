@@ -117,7 +117,7 @@ fn bt709_codes_are_converted_to_srgb() {
 }
 
 /// An ICC profile with this colour space, connection space and one empty tag.
-fn profile_header(space: &[u8; 4], connection: &[u8; 4], tag: &[u8; 4]) -> Vec<u8> {
+fn profile_header([space, connection, tag]: [&[u8; 4]; 3]) -> Vec<u8> {
     let mut profile = vec![0; 128];
     profile[16..20].copy_from_slice(space);
     profile[20..24].copy_from_slice(connection);
@@ -130,18 +130,21 @@ fn profile_header(space: &[u8; 4], connection: &[u8; 4], tag: &[u8; 4]) -> Vec<u
 #[test]
 fn unsupported_profiles_are_refused_by_name() {
     for (profile, expected) in [
-        (profile_header(b"CMYK", b"Lab ", b"A2B0"), "for CMYK"),
-        (profile_header(b"Lab ", b"XYZ ", b"desc"), "for Lab"),
+        (profile_header([b"CMYK", b"Lab ", b"A2B0"]), "for CMYK"),
+        (profile_header([b"Lab ", b"XYZ ", b"desc"]), "for Lab"),
         (
-            profile_header(b"HSV ", b"XYZ ", b"desc"),
+            profile_header([b"HSV ", b"XYZ ", b"desc"]),
             "of the kind \"HSV\"",
         ),
-        (profile_header(b"RGB ", b"XYZ ", b"A2B1"), "by tables (A2B)"),
         (
-            profile_header(b"RGB ", b"Lab ", b"rXYZ"),
+            profile_header([b"RGB ", b"XYZ ", b"A2B1"]),
+            "by tables (A2B)",
+        ),
+        (
+            profile_header([b"RGB ", b"Lab ", b"rXYZ"]),
             "connection space of the ICC profile",
         ),
-        (profile_header(b"RGB ", b"XYZ ", b"rXYZ"), "broken"),
+        (profile_header([b"RGB ", b"XYZ ", b"rXYZ"]), "broken"),
         (vec![0; 100], "ends too early"),
     ] {
         let problem = ColourTag::Profile(profile)

@@ -19,13 +19,13 @@ pub(super) fn inks(file: &[u8], has_adobe_marker: bool) -> Result<Vec<u8>, Strin
         .set_max_width(usize::MAX)
         .set_max_height(usize::MAX);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(file), options);
-    decoder.decode_headers().map_err(decoding_error)?;
+    decoder.decode_headers().map_err(|e| decoding_error(&e))?;
     let stored = decoder.input_colorspace().unwrap_or(ColorSpace::CMYK);
     if stored.num_components() != 4 {
         return Err(format!("four components expected, not {stored:?}"));
     }
     decoder.set_options(options.jpeg_set_out_colorspace(stored));
-    let mut samples = decoder.decode().map_err(decoding_error)?;
+    let mut samples = decoder.decode().map_err(|e| decoding_error(&e))?;
     if stored == ColorSpace::YCCK {
         for pixel in samples.as_chunks_mut::<4>().0 {
             let [y, cb, cr, black] = *pixel;
@@ -41,7 +41,7 @@ pub(super) fn inks(file: &[u8], has_adobe_marker: bool) -> Result<Vec<u8>, Strin
     Ok(samples)
 }
 
-fn decoding_error(e: DecodeErrors) -> String {
+fn decoding_error(e: &DecodeErrors) -> String {
     format!("not a whole image: {e}")
 }
 

@@ -177,10 +177,13 @@ impl<'a> Reader<'a> {
     fn read_uint(&self, offset: u64, size: usize) -> Option<u64> {
         let start = usize::try_from(offset).ok()?;
         let bytes = self.file.get(start..start.checked_add(size)?)?;
+        let mut padded = [0; 8];
         Some(if self.is_big_endian {
-            bytes.iter().fold(0, append_byte)
+            padded[8 - size..].copy_from_slice(bytes);
+            u64::from_be_bytes(padded)
         } else {
-            bytes.iter().rev().fold(0, append_byte)
+            padded[..size].copy_from_slice(bytes);
+            u64::from_le_bytes(padded)
         })
     }
 
@@ -242,10 +245,6 @@ impl<'a> Reader<'a> {
     fn first_value(&self, directory: &[Entry], tag: u16) -> Option<u64> {
         self.values(directory, tag).next()
     }
-}
-
-fn append_byte(number: u64, byte: &u8) -> u64 {
-    number << 8 | u64::from(*byte)
 }
 
 /// Size in bytes of one value of an unsigned integer type; 1 for every other type.
