@@ -250,7 +250,7 @@ mod tests {
             Some("218 of 1000 trials answered, 2 failed, 780 left · 2.0/s · $1.20 · 6 min left")
         );
         let second_line = start + 2 * LINE_INTERVAL;
-        let too_early = second_line - Duration::from_secs(1);
+        let too_early = start + Duration::from_secs(119);
         assert_eq!(lines.next_line(230, 2, None, "", too_early), None);
         assert!(lines.next_line(230, 2, None, "", second_line).is_some());
     }

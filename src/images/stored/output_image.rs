@@ -182,19 +182,17 @@ impl ImageCounts {
 
     /// Text about the images that were not written, to append to a line; empty if all were written.
     pub(crate) fn not_written_text(self) -> String {
-        let mut text = String::new();
-        for (number, what) in [
+        [
             (
                 self.unchanged,
                 "left as they were (--force makes them again)",
             ),
             (self.failed, "failed"),
-        ] {
-            if number > 0 {
-                text += &format!(", {number} {what}");
-            }
-        }
-        text
+        ]
+        .into_iter()
+        .filter(|(number, _)| *number > 0)
+        .map(|(number, what)| format!(", {number} {what}"))
+        .collect()
     }
 }
 

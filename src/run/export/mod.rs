@@ -87,15 +87,13 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     let light = LightSettings::resolve(&args.light, set)?;
     let enhancement = args.enhancers.clone().for_set(set);
     check_used(&light, &enhancement)?;
-    let rules = rules(args.selection.rules.as_deref())?;
-    let rule = args.decode.rule();
     let dataset = open_data(
         &args.data,
         &args.scene,
         &args.set,
         &args.selection,
-        &rules,
-        rule,
+        &rules(args.selection.rules.as_deref())?,
+        args.decode.rule(),
         progress,
     )?;
     for line in dataset.printed_summary() {
