@@ -174,7 +174,7 @@ impl<'a> EnhancerModels<'a> {
     /// Takes all models out, loaded.
     ///
     /// # Errors
-    /// Those of [`Self::open`].
+    /// See [`Self::open`].
     pub(crate) fn take(&mut self) -> Result<Vec<Enhancer>> {
         self.take_models()?
             .into_iter()

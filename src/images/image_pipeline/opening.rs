@@ -33,7 +33,7 @@ impl EnhancerStopper {
     }
 }
 
-/// What the image store contains about an enhancer.
+/// Contents of the image store about an enhancer.
 enum StoredState<'a> {
     /// Nothing, so the enhancer is opened and probed. The findings are written to this place, if there is a store.
     Nothing(Option<FindingsPlace<'a>>),

@@ -124,8 +124,8 @@ impl SensorRecord {
 }
 
 impl ImageRecipe {
-    /// The recipe of an image of a frame. `source` is the digest of the input file, and `read` how it was read. For the clean frame, `how` and
-    /// `applied` are `None`.
+    /// The recipe of an image of a frame. `source` is the digest of the input file, and `read` how it was read. For the clean frame, `how`
+    /// and `applied` are `None`.
     pub(crate) fn new(
         frame: &FrameId,
         source: Digest,

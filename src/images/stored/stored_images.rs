@@ -144,7 +144,7 @@ pub(crate) struct StoredNotes {
     pub(crate) similarity: Option<Similarity>,
 }
 
-/// What is needed of an image.
+/// Parts of an image that a caller needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Needed {
     /// Only the image file.

@@ -9,7 +9,7 @@ use crate::picture::Payload;
 use crate::types::{Condition, Record, TrialKey};
 use darkqa_score::answers::record::Detail;
 
-/// What a trial asks: a question with choices, an open question, or an answer to judge.
+/// Subject of a trial: a question with choices, an open question, or an answer to judge.
 pub(crate) trait Item: Clone + Send + Sync + 'static {
     /// Fields that this kind of item adds to a record.
     type Detail: Detail;

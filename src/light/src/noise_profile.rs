@@ -28,7 +28,8 @@ pub struct Synthesis {
 /// A named interpretation of the paper's noise model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseProfile {
-    /// As the DarkQA paper states it. Read, row and quantisation noise are added after the amplification, and contribute less than 0.1 codes.
+    /// As the DarkQA paper states it. Read, row and quantisation noise are added after the amplification, and contribute less than 0.1
+    /// codes.
     #[default]
     Paper,
     /// The ratio amplifies all noise, as in ELD (Wei et al. 2020).
@@ -221,9 +222,9 @@ pub enum Coupling {
 }
 
 impl Coupling {
-    /// Light at which the sensor saturates for linear scene light, in EV above white. In the paper, light is clipped at white before the drop,
-    /// so the headroom is 0. If less light means fewer photons, light is reduced before it reaches the sensor, so the headroom equals the
-    /// drop.
+    /// Light at which the sensor saturates for linear scene light, in EV above white. In the paper, light is clipped at white before the
+    /// drop, so the headroom is 0. If less light means fewer photons, light is reduced before it reaches the sensor, so the headroom equals
+    /// the drop.
     #[must_use]
     pub fn headroom_ev(self, drop_ev: f64) -> f64 {
         match self {

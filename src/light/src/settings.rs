@@ -271,8 +271,8 @@ impl KindSettings {
     /// Resolves a degradation for a frame.
     ///
     /// # Errors
-    /// If `--profile` does not include the noise profile, the sensor does not have the gain that automatic exposure needs, or the image would
-    /// move too far.
+    /// If `--profile` does not include the noise profile, the sensor does not have the gain that automatic exposure needs, or the image
+    /// would move too far.
     pub fn apply(
         &self,
         how: &Degradation,

@@ -248,7 +248,7 @@ impl ImageFile {
     /// Decodes the file to 8-bit sRGB.
     ///
     /// # Errors
-    /// Those of [`Self::pixels`].
+    /// See [`Self::pixels`].
     pub fn decode(&self) -> Result<Rgb> {
         let codes = self.pixels()?.codes();
         Ok(Arc::try_unwrap(codes).unwrap_or_else(|shared| (*shared).clone()))

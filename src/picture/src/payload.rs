@@ -140,7 +140,7 @@ impl Payload {
     /// The pixels that the receiver gets. If the encoded pixels are passed in, a lossless payload is not decoded.
     ///
     /// # Errors
-    /// Those of [`Self::decode`].
+    /// See [`Self::decode`].
     pub fn received_pixels<'a>(&self, encoded: Option<&'a Rgb>) -> Result<Cow<'a, Rgb>> {
         match encoded {
             Some(pixels) if self.facts.format == PayloadFormat::Png.name() => {

@@ -35,8 +35,8 @@ impl ReadingRule {
         exposure_ev: None,
     };
 
-    /// Checks the width and height of an image, in pixels. The aspect ratio is limited because scaling a very narrow image can take far more
-    /// memory than the image itself.
+    /// Checks the width and height of an image, in pixels. The aspect ratio is limited because scaling a very narrow image can take far
+    /// more memory than the image itself.
     ///
     /// # Errors
     /// If it has too many pixels, or if `max_pixels` is the default and the aspect ratio is too large.

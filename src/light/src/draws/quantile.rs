@@ -17,8 +17,8 @@ pub struct Quantile(Piecewise);
 const MAX_CACHED_TABLES: usize = 16;
 
 thread_local! {
-    /// Cached tables with the bits of their shape λ, in order of insertion. The cache is per thread, because after a fork a shared one could
-    /// stay locked.
+    /// Cached tables with the bits of their shape λ, in order of insertion. The cache is per thread, because after a fork a shared one
+    /// could stay locked.
     static TUKEY_LAMBDA: RefCell<Vec<(u64, Arc<Quantile>)>> = const { RefCell::new(Vec::new()) };
 }
 

@@ -244,9 +244,9 @@ impl Capture {
         }
     }
 
-    /// Adapts the exposure to the pixel format of a frame. For codes and display light the sensor saturates at white. For linear scene light
-    /// it saturates `headroom_ev` EV above white, and the tone curve before the drop is omitted, because it would only undo the inverse tone
-    /// curve of codes.
+    /// Adapts the exposure to the pixel format of a frame. For codes and display light the sensor saturates at white. For linear scene
+    /// light it saturates `headroom_ev` EV above white, and the tone curve before the drop is omitted, because it would only undo the
+    /// inverse tone curve of codes.
     fn for_clean(self, clean: Clean<'_>, headroom_ev: f64) -> Self {
         if !matches!(clean, Clean::Scene(_)) {
             return self;

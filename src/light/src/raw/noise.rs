@@ -274,7 +274,8 @@ mod tests {
         }
     }
 
-    /// With [`Amplify::All`], the terms after the shot noise are r times larger than with [`Amplify::ShotOnly`]; the shot noise is the same.
+    /// With [`Amplify::All`], the terms after the shot noise are r times larger than with [`Amplify::ShotOnly`]; the shot noise is the
+    /// same.
     #[test]
     fn the_ratio_amplifies_the_chosen_terms() {
         let state = median();
